@@ -1,16 +1,17 @@
-"""The two integrators of the paper, on its schedule of steps.
+"""The two integration schemes of the 1983 paper, with the step sizes that the paper states.
 
 F. Hendriks, IBM J. Res. Develop. 27 (1983), "Numerical integration and graphics": the implicit trapezoidal
-rule, and the classical fourth-order Runge-Kutta method. Steps of 10 us off the backstop, 1 us in contact with
-it, 20 us late in the settle-out.
+rule, and the classical fourth-order Runge-Kutta method. The step is 10 us off the backstop, 1 us in contact
+with the backstop, and 20 us late in the settle-out.
 
-As a program of the time would, both evaluate the force as printed, step functions included, at whatever
-point a step gets to: no switch is located, no step ends at a pulse edge. The local maximum inside the pack is
-taken from the ends of steps. Hence a contact costs accuracy, of either scheme, and the order of the method
-shows in smooth motion only. The schemes are here to be compared with, not to be relied on.
+As a program of that time would, both schemes evaluate the force as printed, including step functions, at the
+points of the scheme: no discontinuity is located, and no step is aligned with a pulse edge. The local maximum
+in the pack is the largest displacement at the end of a step. Each contact therefore reduces the accuracy of
+both schemes, and the order of the method shows only in smooth motion. The schemes serve for comparison with
+the paper, not for production runs.
 
-The paper says "typical step sizes" and not when the short step begins and ends. `READINGS` are ways to read
-that; the first is the one of the claims.
+The paper states "typical step sizes" but not when the short step begins and ends. `READINGS` lists possible
+rules; the claims use the first one.
 """
 
 from __future__ import annotations
@@ -32,24 +33,25 @@ Array = NDArray[np.float64]
 Scheme = Literal["trapezoid", "runge-kutta-4"]
 Reading = Literal["look-ahead", "inside", "grid", "no-late-step", "firings"]
 READINGS: Final[tuple[Reading, ...]] = get_args(Reading)
-"""Rules for the short step. "look-ahead": if x < b, or if the next free step would end there. "inside": only
-if x < b, so that the first step into the backstop is a long one. "grid": a free step that begins or would
-end there is divided into ten short ones, so that free steps always begin on a grid of 10 us.
+"""Rules for when the short step is used. "look-ahead": if x < b, or if the next free step would end there.
+"inside": only if x < b, so that the first step into the backstop is a long one. "grid": a free step that
+begins or would end there is divided into ten short ones, so that free steps always begin on a grid of 10 us.
 "no-late-step": like "look-ahead", with short steps late in the settle-out as well. "firings": like
 "look-ahead", and a step ends at each firing, where the state of Fig. 11 is read."""
 
 FREE_STEP = 10e-6
-"""Step off the backstop, s."""
+"""Step size off the backstop, s."""
 CONTACT_STEP = 1e-6
-"""Step if x < b, or if the next free step would end there, s."""
+"""Step size if x < b, or if the next free step would end at x < b, s."""
 LATE_STEP = 20e-6
-"""Step in the backstop late in the settle-out, s."""
+"""Step size in the backstop late in the settle-out, s."""
 LATE_AFTER = 200e-6
-"""Time without leaving the backstop, and without a firing, after which the settle-out is late, s."""
+"""Time since the last separation from the backstop and the last firing after which the settle-out is late,
+s."""
 SAME_TIME = 1e-15
-"""Largest difference of times, s, due to rounding: a firing at the end of a step belongs to the next step."""
+"""Rounding tolerance of times, s, within which a firing at the end of a step belongs to the next step."""
 NEWTON_LIMIT = 50
-"""Newton iterations after which a step of the trapezoidal rule fails; arbitrary."""
+"""Limit of Newton iterations in a step of the trapezoidal rule; arbitrary."""
 
 LAW_NAMES = (
     "magnet_force",
@@ -61,19 +63,20 @@ LAW_NAMES = (
     "backstop_viscous",
     "backstop_rebound",
 )
-"""Law functions required by `integrate`."""
+"""Names of the law functions that `integrate` requires."""
 
 _STATUS = ("ok", "newton failed", "diverged")
 
 
 @dataclass(frozen=True)
 class SchemeRun:
-    """Ends of the steps, or moments asked for: ``t`` (s), ``x`` (m), ``v`` (m/s), ``memory`` and ``status``.
+    """Result of a run with a 1983 scheme: ``t`` (s), ``x`` (m), ``v`` (m/s), ``memory`` (m) and ``status``.
 
-    The memory is the latest local maximum, m, where the armature leaves the pack, and 0 elsewhere.
+    The arrays have one element per end of a step or per requested time. The memory is the latest local
+    maximum while the armature moves out of the pack, and 0 elsewhere.
 
     The status is "ok", "newton failed" (no solution of an implicit step found) or "diverged" (the motion is
-    no longer finite, has left the range of a law, or is further out than `integrate` was told).
+    no longer finite, has left the range of a law, or exceeds the displacement limit `far` of `integrate`).
     """
 
     t: Array
@@ -101,51 +104,54 @@ def integrate(
     reload_along_unloading: bool = False,
     far: float = 1.0,
 ) -> SchemeRun:
-    """Integrate a run as in 1983.
+    """Integrate the motion with an integration scheme of the 1983 paper.
 
     Parameters
     ----------
     laws : mapping
-        The plain law functions called `LAW_NAMES`; compiled here, once for each set.
+        Law functions by name, see `LAW_NAMES`, not compiled; they are compiled once for each set.
     constants : mapping
         Packed constants of "magnet", "spring", "pack" and "backstop", float64 arrays (empty for an absent
         part).
     drive : tuple
-        Firing times (s), first row of the table of each, tables of the waveforms, whether a pulse replaces
-        the one before, whether the drive is a force.
+        Firing times (s), first row of the waveform table of each firing, waveform tables, whether a pulse
+        replaces the pulse before it, and whether the drive is a force.
     mass : float
-        kg.
+        Mass of the armature, kg.
     front, position : float
-        First touch of pack and backstop, m; infinite, with the sign that is never reached, if absent.
+        Displacements of the pack front and the backstop, m; +inf and -inf for an absent pack and backstop.
     state : (x, v)
-        Start, m and m/s.
+        Initial displacement, m, and velocity, m/s.
     t_end : float
-        Duration, s.
+        Duration of the run, s.
     scheme : {"trapezoid", "runge-kutta-4"}
-        The trapezoidal rule is solved by Newton's method with a derivative by differences.
+        Integration scheme. The trapezoidal rule is solved by Newton's method with a finite-difference
+        derivative.
     scale : float
-        Factor of all steps of the schedule.
+        Factor that multiplies all step sizes.
     reading : str
-        One of `READINGS`.
+        Rule for the short step, one of `READINGS`.
     moments : array, optional
-        Ascending times, s, at which alone the state is kept; the cubic through both ends of a step stands
-        for the motion between them.
+        Ascending output times, s (default: the ends of the steps). The state is interpolated by the cubic
+        Hermite polynomial of the step.
     rigid : bool
-        The backstop is rigid: a step that ends beyond it ends on it, with the rebound speed.
+        Whether the backstop is rigid: a step that ends behind the backstop is reset to the backstop position,
+        with the rebound velocity.
     reload_along_unloading : bool
-        Reloading inside a contact follows the unloading branch up to the local maximum.
+        Whether reloading inside a contact follows the unloading branch up to the local maximum.
     far : float
-        Displacement, m, beyond which the motion counts as diverged.
+        Absolute displacement, m, beyond which the motion counts as diverged.
 
     Returns
     -------
     SchemeRun
-        The start and the end of every step; after a failure, what was reached.
+        States at the start and at the end of every step, or at `moments`; after a failure, only those
+        reached.
 
     Raises
     ------
     ValueError
-        Unknown scheme or reading, or a scale or duration that is not positive.
+        The scheme or reading is unknown, or the scale or duration is not positive.
     """
     if scheme not in ("trapezoid", "runge-kutta-4"):
         raise ValueError(f"scheme {scheme!r}, expected 'trapezoid' or 'runge-kutta-4'")
@@ -179,7 +185,7 @@ def integrate(
 
 @functools.lru_cache(maxsize=32)
 def _program(functions: tuple[Callable[..., float], ...], implicit: bool) -> Callable[..., Any]:
-    """Compile the program of 1983 for a set of laws; `model` is packed constants, drive, options, places."""
+    """Compile a 1983 scheme for a set of law functions; `implicit` selects the trapezoidal rule."""
     import numba
 
     from printhammer.kernel.compile.templates import compile_law
@@ -194,7 +200,7 @@ def _program(functions: tuple[Callable[..., float], ...], implicit: bool) -> Cal
         firings, begins, segments, fired = table
         longest = segments[segments.shape[0] - 1, 0]
         total = 0.0
-        # Earlier firings are counted already; one or two may lie within the step.
+        # `fired` counts the earlier firings; only firings within this step remain to be added.
         last = fired[0]
         while last < firings.size and firings[last] <= time + SAME_TIME:
             last += 1
@@ -261,17 +267,17 @@ def _program(functions: tuple[Callable[..., float], ...], implicit: bool) -> Cal
     def trapezoid(
         time: float, x: float, v: float, h: float, peak: float, model: Any
     ) -> tuple[float, float, bool]:
-        # Substitute the rule for x, x1 = x + h/2 (v + v1), into the rule for v: one equation for v1.
+        # Substituting x1 = x + h/2 (v + v1) into the rule for v leaves one equation for v1.
         half = 0.5 * h
         a = acceleration(time, x, v, peak, model)
         known = v + half * a
         new = v + h * a
-        # The smallest size keeps the tolerance above rounding for a hammer at rest.
+        # The lower bound keeps the tolerance above rounding errors for a hammer at rest.
         size = abs(v) + abs(h * a) + 1e-3
         a1 = acceleration(time + h, x + half * (v + new), new, peak, model)
         residual = new - known - half * a1
         if not math.isfinite(residual):
-            # The first guess is outside the range of a law; use the state at the start of the step.
+            # The initial guess lies outside the range of a law: start from the state before the step.
             new = -v
             a1 = acceleration(time + h, x, new, peak, model)
             residual = new - known - half * a1
@@ -282,8 +288,8 @@ def _program(functions: tuple[Callable[..., float], ...], implicit: bool) -> Cal
             if abs(change) <= 1e-10 * size:
                 new -= change
                 return x + half * (v + new), new, True
-            # Halve until the residual decreases: step functions and the stiff backstop would make the
-            # iteration cycle.
+            # Halve the Newton step until the residual decreases; otherwise step functions and the stiff
+            # backstop would make the iteration cycle.
             after = math.inf
             for _ in range(20):
                 trial = new - change
@@ -314,7 +320,7 @@ def _program(functions: tuple[Callable[..., float], ...], implicit: bool) -> Cal
         if not at_moments or (moments.size > 0 and moments[0] <= 0.0):
             keep(rows[0], time, place, speed, peak, front)
             n = 1
-        # A remainder due to rounding is not a step.
+        # Do not take a step for a remainder that is only a rounding error.
         while time < t_end - 1e-9 * steps[1] and not (at_moments and n == moments.size):
             while fired[0] < firings.size and firings[fired[0]] <= time + SAME_TIME:
                 settling_since = max(settling_since, firings[fired[0]])

@@ -1,4 +1,4 @@
-"""One controlled step in the backstop, in the regularised variables, ending on the first switch inside."""
+"""Error-controlled step in the elastic backstop, in regularised variables, with event location."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.pulses import Drive
 
 ContactState = Any
-"""Time, w, velocity, dv/ds."""
+"""State in the backstop: time [s], w = sqrt(compression) [m^0.5], velocity [m/s], and dv/ds."""
 
 PHASE_LIMIT = 2.0
 """Largest phase of the contact oscillation in one step; beyond about 5 the method is unstable."""
@@ -34,15 +34,15 @@ PHASE_LIMIT = 2.0
 
 @compiled
 def contact_rate(w: float, v: float, t: float, hammer: Hammer, drive: Drive) -> float:
-    """Return dv/ds in the backstop."""
+    """Return dv/ds = 2 w a, the derivative of the velocity with respect to s in the backstop."""
     return 2.0 * w * backstop_acceleration(t, w, v, hammer, drive)
 
 
 @compiled
 def length_while_pushed_in(left: float, w: float, v: float, kv: float) -> float:
-    """Return the ds in which a time `left` [s] passes if a force holds the armature in the backstop.
+    """Return the length in s of a time interval `left` [s] while forces press the armature into the backstop.
 
-    It is the root of 2 w ds - v ds^2 - kv ds^3 / 3 = left, whose left side increases monotonically.
+    Solves 2 w ds - v ds^2 - kv ds^3 / 3 = left for ds by Newton's method; the left side increases with ds.
     """
     ds = 0.0
     for _ in range(60):
@@ -56,10 +56,10 @@ def length_while_pushed_in(left: float, w: float, v: float, kv: float) -> float:
 
 @compiled
 def length_of(left: float, w: float, v: float, kv: float) -> float:
-    """Return the approximate ds in which a time `left` [s] passes in the backstop, for a correction of s.
+    """Return the approximate length in s of a time interval `left` [s] in the backstop.
 
-    It solves dt = 2 w ds - v ds^2, whose root stays regular at release, w = 0; the next term is included if
-    it matters and the armature does not leave.
+    Solves 2 w ds - v ds^2 = left for ds; the root is regular also at release, w = 0. The cubic term is
+    included if it matters and the armature does not leave. `s_at` iterates this approximation.
     """
     under_root = max(w * w - v * left, 0.0)
     if w > 0.0 and under_root > 0.0:
@@ -74,9 +74,9 @@ def length_of(left: float, w: float, v: float, kv: float) -> float:
 
 @compiled
 def s_at(t: float, t0: float, w0: float, v0: float, kv0: float, hammer: Hammer, drive: Drive) -> float:
-    """Return the s at which a step in the backstop from time `t0` reaches time `t` [s].
+    """Return the value of s at which a step in the backstop that starts at time `t0` reaches time `t` [s].
 
-    A time after the release yields the s of the release.
+    If `t` is later than the release, the value of s at the release is returned.
     """
     left = t - t0
     if left <= 0.0:
@@ -94,9 +94,9 @@ def s_at(t: float, t0: float, w0: float, v0: float, kv0: float, hammer: Hammer, 
 
 @inlined
 def longest_contact_step(w: float, hammer: Hammer, drive: Drive) -> float:
-    """Return the largest step in s allowed by the contact stiffness at compression ``w**2`` [m].
+    """Return the largest stable step in s for the contact stiffness at compression ``w**2`` [m].
 
-    The circuit of the coil, if any, limits the step as well.
+    The decay rate of a coil circuit, if any, also limits the step.
     """
     if w <= 0.0:
         return math.inf
@@ -116,7 +116,7 @@ def longest_contact_step(w: float, hammer: Hammer, drive: Drive) -> float:
 
 @compiled
 def contact_scales(w: float, v: float, h: float, control: Control) -> tuple[float, float, float]:
-    """Return the error scales of time, w and velocity that follow from those of `control`."""
+    """Return error scales of time, w and velocity, derived from the scales of displacement and velocity."""
     return control[0] / control[1], control[0] / (2.0 * max(w, abs(v) * h)), control[1]
 
 
@@ -130,7 +130,7 @@ def leave(
     drive: Drive,
     control: Control,
 ) -> tuple[float, float, float, float, float]:
-    """Return the state at which w falls to zero inside `upper` of a step of `h`, and its fraction."""
+    """Locate the release, w = 0, in a step `h` up to the fraction `upper`; return state and fraction."""
     t, w, v, kv = start
     low, high = 0.0, upper
     negligible = 1e-12 * math.sqrt(control[0])
@@ -155,7 +155,7 @@ def leave(
 def reach_time(
     start: ContactState, h: float, upper: float, t_upper: float, target: float, hammer: Hammer, drive: Drive
 ) -> ContactState:
-    """Return the state at time `target` [s] inside `upper` of a step of `h` in s that ends at `t_upper`."""
+    """Locate time `target` [s] in a step `h` in s whose fraction `upper` ends at time `t_upper` [s]."""
     t, w, v, kv = start
     low, high = 0.0, upper
     fraction = upper * (target - t) / (t_upper - t)
@@ -170,7 +170,7 @@ def reach_time(
         if w1 > 0.0:
             rest = (target - t1) / (2.0 * w1)
             if abs(rest) * (abs(v1) + abs(kv1) * abs(rest)) <= 1e-9 * w1:
-                # Second order in the small remainder: w and t are then exact to rounding.
+                # Close the remainder by a second-order expansion, which makes w and t accurate to rounding.
                 rest += 0.5 * v1 * rest * rest / w1
                 w_end = w1 - v1 * rest - 0.5 * kv1 * rest * rest
                 return target, w_end, v1 + kv1 * rest, kv1
@@ -182,7 +182,7 @@ def reach_time(
 
 @called
 def end_push(start: ContactState, h: float, upper: float, hammer: Hammer, drive: Drive) -> ContactState:
-    """Return the state at which the backstop releases, inside `upper` of a step of `h`, by bisection."""
+    """Locate by bisection where the backstop ceases to push in a step `h`, up to the fraction `upper`."""
     t, w, v, kv = start
     low, high = 0.0, upper
     for _ in range(60):
@@ -207,7 +207,7 @@ def contact_switch(
     drive: Drive,
     control: Control,
 ) -> tuple[int, ContactState]:
-    """Return the first switch in a step of `h` in s that may have left the backstop, and the state there."""
+    """Return the first event in a step `h` in s, and the state there; with `leaves`, w reaches zero."""
     _t, w, v, kv = start
     switch, upper = M.NO_SWITCH, 1.0
     if leaves:
@@ -227,7 +227,7 @@ def contact_switch(
 def electric_in_contact(
     start: ContactState, t: float, hammer: Hammer, drive: Drive
 ) -> tuple[float, Electric]:
-    """Return the s at which a step in the backstop reaches time `t` [s], and the electric state there."""
+    """Return the value of s at time `t` [s] in a backstop step, and the electric state at that time."""
     s = s_at(t, start[0], start[1], start[2], start[3], hammer, drive)
     step = whole_contact_step(start[0], start[1], start[2], start[3], s, hammer, drive, M.ANY_SCALES)
     rest = t - step[0]
@@ -239,13 +239,13 @@ def electric_in_contact(
 def advance_contact(
     start: ContactState, h: float, t_next: float, hammer: Hammer, drive: Drive, control: Control
 ) -> tuple[int, ContactState, float, Electric]:
-    """Take one accepted step in the backstop, at most to `t_next`, ending on the first switch.
+    """Take one accepted step in the backstop that ends at the first switching event or at time `t_next` [s].
 
     Returns
     -------
     tuple
-        The switch (EDGE at `t_next`, NO_SWITCH, FAILED, LEFT_BACKSTOP, PUSH_ENDED or CIRCUIT), the state
-        there, the next step length in s, and the electric state there.
+        The event (EDGE at `t_next`, NO_SWITCH, FAILED, LEFT_BACKSTOP, PUSH_ENDED or CIRCUIT), the state at
+        the end of the step, the proposed length of the next step in s, and the electric state at the end.
     """
     t, w, v, kv = start
     shortest = 1e-14 * math.sqrt(control[0]) / control[1]

@@ -1,9 +1,9 @@
-"""Location, within a step, of a change of the current's path or of the end of a rest.
+"""Event location within a step: change of the coil current's path, or end of a rest of the armature.
 
-The target is the first root of a gap, a smooth function of the state that is positive until the change: see
-`printhammer.kernel.model.circuit.path_gap`. The Bernstein coefficients of the cubic through the gaps and
-slopes at both ends of a step show whether a root lies inside; their deviation from a straight line measures
-the reliability of the cubic. The root is located with the integrator.
+The event is the first root of an event function, called `gap`: a smooth function of the state that is
+positive until the event, see `printhammer.kernel.model.circuit.path_gap`. The Bernstein coefficients of the
+cubic through the gaps and slopes at both ends of a step show whether a root lies inside; their deviation from
+a straight line measures the reliability of the cubic. The root is located with the integrator.
 """
 
 from __future__ import annotations
@@ -28,26 +28,30 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.pulses import Drive
 
 STILL = 1e-12
-"""Motion in one characteristic time that counts as none, as a fraction of the scales."""
+"""Largest velocity change in one characteristic time that counts as rest, as a fraction of the velocity
+scale."""
 
 BEGUN = 1e-9
-"""Gap at the start of a step that counts as zero, for a path just entered."""
+"""Largest value of a gap at the start of a step that counts as zero, as on a path that has just begun."""
 
 SHARE = 1e-5
-"""Fraction of a step over which the slope of a gap is computed."""
+"""Difference step for the time derivative of a gap, as a fraction of the integration step."""
 
 PATH_GAP, REST_GAP = 0, 1
-"""Kind of gap: path of the current, or rest of the armature."""
+"""Codes of the event functions: change of the current path, and end of a rest of the armature."""
 
 
 @compiled
 def closes(g0: float, d0: float, g1: float, d1: float) -> int:
-    """Decide whether a gap closes in a step, from its values and slopes, times the step, at both ends.
+    """Decide whether a gap falls to zero in a step, from its values g and scaled slopes d at both ends.
+
+    The slopes are derivatives with respect to the fraction of the step.
 
     Returns
     -------
     int
-        REACHED_FRONT if it closes once, NO_SWITCH if it does not, UNRESOLVED if the step must be halved.
+        REACHED_FRONT if the gap has one root, NO_SWITCH if it has none, UNRESOLVED if the step must be
+        halved.
     """
     b1, b2 = g0 + d0 / 3.0, g1 - d1 / 3.0
     if g0 <= BEGUN:
@@ -65,7 +69,7 @@ def closes(g0: float, d0: float, g1: float, d1: float) -> int:
 
 @inlined
 def rest_gap(a: float, mode: int, control: Control) -> float:
-    """Return a gap that is positive while the acceleration keeps an armature at rest."""
+    """Return the event function of a rest: positive while an acceleration `a` keeps the armature at rest."""
     unit = control[1] * control[1] / control[0]
     if mode == M.RESTING:
         return -a / unit
@@ -76,7 +80,7 @@ def rest_gap(a: float, mode: int, control: Control) -> float:
 def gap_at(
     which: int, t: float, x: float, v: float, electric: Electric, law: ForceLaw, live: Any, control: Control
 ) -> float:
-    """Return the value of a gap off the backstop."""
+    """Evaluate the event function `which`, PATH_GAP or REST_GAP, at a state off the backstop."""
     mode, memory, hammer, _drive = law
     if which == PATH_GAP:
         return path_gap(x, v, electric, hammer, live)
@@ -97,7 +101,7 @@ def gap_and_change(
     live: Any,
     control: Control,
 ) -> tuple[float, float]:
-    """Return a gap off the backstop, and its slope in time times `h`."""
+    """Evaluate an event function off the backstop, and its time derivative multiplied by `h`."""
     gap = gap_at(which, t, x, v, electric, law, live, control)
     pause = SHARE * h
     rates = electric_rates(t, x, v, electric, law.hammer, live)
@@ -113,7 +117,13 @@ def gap_and_change(
 def land_on_gap(
     which: int, start: Any, h: float, upper: float, law: ForceLaw, control: Control
 ) -> tuple[float, float, float, float, Electric]:
-    """Locate the closing of a gap in the first `upper` of a step of `h`: t, x, v, a, electric state."""
+    """Locate the root of an event function in a step `h`, up to the fraction `upper`.
+
+    Returns
+    -------
+    tuple
+        Time, displacement, velocity, acceleration and electric state at the root.
+    """
     t, x, v, a = start
     live = law.drive[0]
     low, high = 0.0, upper
@@ -131,10 +141,10 @@ def land_on_gap(
                 break
         x1, v1, a1, _ex, _ev, e1, _ee = whole_time_step(t, x, v, a, middle * h, law)
         gap = gap_at(which, t + middle * h, x1, v1, e1, law, live, control)
-        # A rest ends where the armature is driven off, not where the driving force vanishes.
+        # A rest ends where a force drives the armature off, not where the force is zero.
         if gap > 0.0 or (which == REST_GAP and gap == 0.0):
             low, low_gap = middle, gap
-            # Illinois rule: halve the weight of an end that stays.
+            # Illinois rule: halve the function value at an end that is retained twice.
             high_gap *= 0.5 if side == 1 else 1.0
             side = 1
         else:
@@ -152,12 +162,12 @@ def land_on_gap(
 def circuit_switch(
     start: Any, end: Any, electric: Electric, law: ForceLaw, control: Control
 ) -> tuple[int, Any, Electric]:
-    """Search a step off the backstop for a switch of the circuit, or the end of a rest.
+    """Search a step off the backstop for a change of the current path or the end of a rest.
 
     Returns
     -------
     tuple
-        CIRCUIT, REST_ENDED, NO_SWITCH or UNRESOLVED, and the state and electric state there.
+        CIRCUIT, REST_ENDED, NO_SWITCH or UNRESOLVED, and the state and electric state at the event.
     """
     h = end[0] - start[0]
     live = law.drive[0]
@@ -183,7 +193,7 @@ def circuit_switch(
 
 @compiled
 def contact_gap(w: float, v: float, electric: Electric, hammer: Hammer, live: Any) -> float:
-    """Return the gap of the path of the current in the backstop."""
+    """Evaluate the event function of the current path, `path_gap`, at a state in the backstop."""
     return path_gap(hammer[POSITION] - w * w, v, electric, hammer, live)
 
 
@@ -191,7 +201,7 @@ def contact_gap(w: float, v: float, electric: Electric, hammer: Hammer, live: An
 def contact_gap_and_change(
     t: float, w: float, v: float, kv: float, electric: Electric, h: float, hammer: Hammer, live: Any
 ) -> tuple[float, float]:
-    """Return the gap in the backstop, and its slope in s times `h`."""
+    """Evaluate the event function of the current path in the backstop, and its derivative in s times `h`."""
     gap = contact_gap(w, v, electric, hammer, live)
     pause = SHARE * h
     pace = 2.0 * w * pause
@@ -204,7 +214,13 @@ def contact_gap_and_change(
 def land_on_gap_in_contact(
     start: Any, h: float, hammer: Hammer, drive: Drive
 ) -> tuple[float, float, float, float, Electric]:
-    """Return the state at which the gap closes inside a step of `h` in s: t, w, v, dv/ds, electric state."""
+    """Locate a change of the current path in a backstop step `h` in s.
+
+    Returns
+    -------
+    tuple
+        Time, w, velocity, dv/ds and electric state at the change.
+    """
     t, w, v, kv = start
     live = drive[0]
     low, high = 0.0, 1.0

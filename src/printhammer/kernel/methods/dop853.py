@@ -6,7 +6,7 @@ sqrt(delta) and a new independent variable s, dt = 2 w ds, the motion obeys
     dw/ds = -v,    dv/ds = 2 w a,    dt/ds = 2 w,
 
 whose right-hand sides are smooth: the contact force is a polynomial in w, and leaving the backstop is a plain
-crossing of w = 0. Where there is a coil circuit, its electric state is integrated with the motion.
+crossing of w = 0. The electric state of a coil circuit, if any, is integrated together with the motion.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.pulses import Drive
 
 Point = Any
-"""Time, displacement or w, velocity, and the electric state where there is a circuit."""
+"""State vector of a step: time, displacement or w, velocity and, with a coil circuit, the electric state."""
 
 VANISHING = 1e-280
-"""Sum of squares of error estimates below which the estimate of order 5 is used alone."""
+"""Weighted sum of squares of the error estimates below which only the order 5 estimate is used."""
 
 
 @compiled
 def combined_error(e5: float, e3: float) -> float:
-    """Combine the estimates of order 5 and 3 into one of order 7 (Hairer, Norsett, Wanner, II.10)."""
+    """Combine the error estimates of orders 5 and 3 into one of order 7 (Hairer, Norsett, Wanner, II.10)."""
     square = e5 * e5 + 0.01 * e3 * e3
-    # The squares of a decayed 1e-150 underflow; a NaN stays NaN.
+    # Squares of errors below about 1e-150 would underflow; a NaN stays NaN.
     if square < VANISHING:
         return abs(e5)
     return e5 * e5 / math.sqrt(square)
@@ -53,7 +53,7 @@ def combined_error(e5: float, e3: float) -> float:
 
 @inlined
 def plus(total: Point, c: float, k: Point) -> Point:
-    """Add a slope times its weight to a sum of slopes."""
+    """Return `total` + c * k, one term of a weighted sum of slopes."""
     if HAS_CIRCUIT:
         return (
             total[0] + c * k[0],
@@ -68,7 +68,7 @@ def plus(total: Point, c: float, k: Point) -> Point:
 
 @inlined
 def _sum1(c: Numbers, k1: Point) -> Point:
-    """Multiply the first slope by its weight; the functions that follow add up more."""
+    """Return the weighted sum of one slope; `_sum2` to `_sum9` sum more slopes in a fixed order."""
     if HAS_CIRCUIT:
         return c[0] * k1[0], c[0] * k1[1], c[0] * k1[2], c[0] * k1[3], c[0] * k1[4], c[0] * k1[5]
     return c[0] * k1[0], c[0] * k1[1], c[0] * k1[2]
@@ -129,7 +129,7 @@ def _sum9(
 
 @inlined
 def along(y: Point, h: float, slope: Point) -> Point:
-    """Return the state a step of `h` along a slope from `y`."""
+    """Return the state y + h * slope."""
     if HAS_CIRCUIT:
         return (
             y[0] + h * slope[0],
@@ -144,7 +144,7 @@ def along(y: Point, h: float, slope: Point) -> Point:
 
 @inlined
 def point(t: float, place: float, v: float, drive: Drive) -> Point:
-    """Return a state with the electric part of the drive."""
+    """Return the state vector of time, displacement or w, velocity, and the electric state of the drive."""
     if HAS_CIRCUIT:
         electric = drive[1]
         return t, place, v, electric[0], electric[1], electric[2]
@@ -153,16 +153,16 @@ def point(t: float, place: float, v: float, drive: Drive) -> Point:
 
 @inlined
 def electric_of(y: Point) -> Electric:
-    """Return the electric part of a state."""
+    """Return the electric state of a state vector; empty in a kernel without a circuit."""
     if HAS_CIRCUIT:
         return y[3], y[4], y[5]
     return ()
 
 
-# In line at every stage, a coil's circuit would make the machine code seven times as long to compile.
+# Inlined at every stage, the coil circuit would make compilation seven times as long.
 @(called if HAS_CIRCUIT else inlined)
 def time_slope(t: float, y: Point, law: ForceLaw) -> Point:
-    """Return the rates of time, position and velocity; `t` replaces the rounded time in `y`."""
+    """Return the time derivative of the state vector off the backstop, at time `t` [s]."""
     mode, memory, hammer, drive = law
     if HAS_CIRCUIT:
         electric = electric_of(y)
@@ -176,7 +176,7 @@ def time_slope(t: float, y: Point, law: ForceLaw) -> Point:
 
 @(called if HAS_CIRCUIT else inlined)
 def contact_slope(y: Point, hammer: Hammer, drive: Drive) -> Point:
-    """Return the derivatives of time, w and velocity with s."""
+    """Return the derivative of the state vector with respect to s in the backstop."""
     pace = 2.0 * y[1]
     if HAS_CIRCUIT:
         electric, live = electric_of(y), drive[0]
@@ -188,7 +188,7 @@ def contact_slope(y: Point, hammer: Hammer, drive: Drive) -> Point:
 
 @inlined
 def slope_at(y: Point, place_rate: float, rate: float, law: ForceLaw) -> Point:
-    """Return the slopes at the start of a step, with the first three passed."""
+    """Return the time derivative at the start of a step, reusing known rates of position and velocity."""
     if HAS_CIRCUIT:
         rates = electric_rates(y[0], y[1], y[2], electric_of(y), law.hammer, law.drive[0])
         if M.RESTING <= law.mode <= M.HELD_UNLOADING:
@@ -199,7 +199,7 @@ def slope_at(y: Point, place_rate: float, rate: float, law: ForceLaw) -> Point:
 
 @inlined
 def contact_slope_at(y: Point, rate: float, hammer: Hammer, drive: Drive) -> Point:
-    """Return the slopes at the start of a step in the backstop, with the first three passed."""
+    """Return the derivative in s at the start of a backstop step, reusing the known `rate` dv/ds."""
     pace = 2.0 * y[1]
     if HAS_CIRCUIT:
         x = hammer[POSITION] - y[1] * y[1]
@@ -210,7 +210,7 @@ def contact_slope_at(y: Point, rate: float, hammer: Hammer, drive: Drive) -> Poi
 
 @inlined
 def electric_error(e5: Point, e3: Point, h: float, hammer: Hammer) -> float:
-    """Return the error estimate of the electric state in units of its scales."""
+    """Return the error estimate of the electric state, normalised by its scales."""
     if HAS_CIRCUIT:
         linkage = hammer[LINKAGE_SCALE]
         voltage = max(hammer[CHARGED], hammer[RESISTANCE] * hammer[CURRENT_SCALE])
@@ -227,7 +227,7 @@ def electric_error(e5: Point, e3: Point, h: float, hammer: Hammer) -> float:
 def whole_time_step(
     t0: float, x0: float, v0: float, a0: float, h: float, law: ForceLaw
 ) -> tuple[float, float, float, float, float, Electric, float]:
-    """Like `time_step`, with the electric state at the end, and its error in units of its scales."""
+    """Take a step like `time_step`; return also the electric state and its normalised error estimate."""
     y = point(t0, x0, v0, law.drive)
     k1 = slope_at(y, v0, a0, law)
     y2 = along(y, h, _sum1(T.A02, k1))
@@ -265,7 +265,7 @@ def whole_time_step(
 def time_step(
     t0: float, x0: float, v0: float, a0: float, h: float, law: ForceLaw
 ) -> tuple[float, float, float, float, float]:
-    """Advance position and velocity by `h` [s]; for accelerations that depend on the velocity.
+    """Take a DOP853 step of `h` [s] off the backstop, for accelerations that depend on the velocity.
 
     Returns
     -------
@@ -280,7 +280,7 @@ def time_step(
 def whole_contact_step(
     t0: float, w0: float, v0: float, kv0: float, h: float, hammer: Hammer, drive: Drive, scales: Any
 ) -> tuple[float, float, float, float, float, Electric]:
-    """Like `contact_step`, with the electric state, whose error is part of the estimate."""
+    """Take a step like `contact_step`; return also the electric state, whose error is included."""
     y = point(t0, w0, v0, drive)
     k1 = contact_slope_at(y, kv0, hammer, drive)
     k2 = contact_slope(along(y, h, _sum1(T.A02, k1)), hammer, drive)
@@ -307,13 +307,13 @@ def whole_contact_step(
 def contact_step(
     t0: float, w0: float, v0: float, kv0: float, h: float, hammer: Hammer, drive: Drive, scales: Any
 ) -> tuple[float, float, float, float, float]:
-    """Advance time, w and velocity in the backstop by `h` in s, from a state whose dv/ds is `kv0`.
+    """Take a DOP853 step of `h` in s in the backstop, from a state at which dv/ds is `kv0`.
 
     Returns
     -------
     tuple of float
-        Time [s], w [m^0.5], velocity [m/s] and dv/ds at the end, and the error estimate, the sum of those of
-        time, w and velocity in units of `scales`.
+        Time [s], w [m^0.5], velocity [m/s] and dv/ds at the end, and the error estimate: the sum of the
+        errors of time, w and velocity, each normalised by its entry of `scales`.
     """
     t, w, v, kv, error, _electric = whole_contact_step(t0, w0, v0, kv0, h, hammer, drive, scales)
     return t, w, v, kv, error

@@ -1,10 +1,11 @@
 """Coefficients of the explicit Runge-Kutta method DOP853, order 8 with embedded orders 5 and 3.
 
 Source: E. Hairer, S. P. Norsett, G. Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993),
-section II.10; the method is due to Dormand and Prince. Stages are numbered from 1: ``C07`` is the time of the
-seventh, ``A07`` the row of weights of the slopes before it. What is zero is left out: rows 2 to 5 go with the
-slopes (1), (1, 2), (1, 3) and (1, 3, 4), all later ones with 1, 4, 5 and so on. ``B`` are the weights at the
-end, ``E3`` and ``E5`` those of the two error estimates, of the slopes 1 and 6 to 12.
+section II.10; the method is due to Dormand and Prince. Stages are numbered from 1: ``C07`` is the node of
+stage 7, and ``A07`` the row of weights of the earlier slopes. Zero weights are omitted: rows 2 to 5 hold the
+weights of slopes (1), (1, 2), (1, 3) and (1, 3, 4), later rows the weights of slopes 1, 4, 5 and so on. ``B``
+holds the weights of the solution, ``E3`` and ``E5`` the weights of the two error estimates, for slopes 1 and
+6 to 12.
 """
 
 import numpy as np
@@ -13,7 +14,7 @@ _LONGEST = 9
 
 
 def _row(*weights: float) -> tuple[float, ...]:
-    """Pad weights with zeros: sums over rows of equal length are compiled once."""
+    """Return a row of weights padded with zeros, so that row sums are compiled for one length only."""
     return weights + (0.0,) * (_LONGEST - len(weights))
 
 
@@ -111,7 +112,7 @@ E5 = _row(
 
 STAGES = 12
 FULL_A, FULL_B = np.zeros((STAGES, STAGES)), np.zeros(STAGES)
-"""`A` and `B` with their zeros, for loops over stages."""
+"""Complete weight matrix A and vector B, including zero weights, for loops over stages."""
 for _i, _weights in enumerate((A02, A03, A04, A05, A06, A07, A08, A09, A10, A11, A12), start=1):
     _slopes = {1: (0,), 2: (0, 1), 3: (0, 2), 4: (0, 2, 3)}.get(_i, (0, *range(3, _i)))
     FULL_A[_i, _slopes] = _weights[: len(_slopes)]

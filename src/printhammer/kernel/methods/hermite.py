@@ -1,9 +1,9 @@
-"""Crossing of a level by a quintic: the search for switches within a step.
+"""Level crossings of the quintic Hermite interpolant of a step, used to detect switching events.
 
-Position, velocity and acceleration at both ends of a step define the quintic. Its Bernstein coefficients
-bound it (convex hull) and those of its derivative bound the number of its extrema (variation diminishing, G.
-Farin, *Curves and Surfaces for CAGD*, ch. 5), so that six numbers show whether a step could hide two
-crossings. The quintic provides an initial guess; the integrator locates the switch itself.
+Position, velocity and acceleration at both ends of a step define the quintic. The Bernstein coefficients of
+the quintic bound its values (convex hull), and the coefficients of its derivative bound the number of extrema
+(variation diminishing, G. Farin, *Curves and Surfaces for CAGD*, ch. 5). Six numbers therefore show whether a
+step could hide two crossings. The quintic provides an initial guess; the integrator locates the event itself.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from printhammer.kernel.compile.compiling import compiled, inlined
 from printhammer.kernel.model.modes import NEAR_TOUCH, NO_SWITCH, REACHED_FRONT, UNRESOLVED
 
 MARGIN = 1e-3
-"""Distance to a level, in units of the control polygon's length, within which an extremum is located first.
-"""
+"""Distance of an extremum from a level, as a fraction of the control polygon's length, below which the
+extremum is located before deciding whether the quintic crosses the level."""
 
 
 @compiled
 def sign_changes(d0: float, d1: float, d2: float, d3: float, d4: float) -> int:
-    """Count the sign changes in a sequence of five numbers, ignoring zeros."""
+    """Return the number of sign changes in a sequence of five numbers, ignoring zeros."""
     changes = 0
     last = 0.0
     for d in (d0, d1, d2, d3, d4):
@@ -45,14 +45,14 @@ def control_points(
 def rises_through(
     x0: float, v0: float, a0: float, x1: float, v1: float, a1: float, h: float, level: float
 ) -> int:
-    """Decide whether the quintic, at or below `level` at its start, rises through the level.
+    """Decide whether the quintic of a step, which starts at or below `level`, rises through the level.
 
     Returns
     -------
     int
-        REACHED_FRONT if it ends above and has one crossing, NO_SWITCH if it has none, NEAR_TOUCH if it ends
-        below but its only maximum may reach the level, UNRESOLVED if it may have several extrema and the step
-        must be halved.
+        REACHED_FRONT if the quintic ends above the level after one crossing, NO_SWITCH if it has no crossing,
+        NEAR_TOUCH if it ends below but its only maximum may reach the level, UNRESOLVED if it may have
+        several extrema and the step must be halved.
     """
     p1, p2, p3, p4 = control_points(x0, v0, a0, x1, v1, a1, h)
     d0, d1, d2, d3, d4 = p1 - x0, p2 - p1, p3 - p2, p4 - p3, x1 - p4
@@ -72,13 +72,13 @@ def rises_through(
 
 @compiled
 def turns_down(x0: float, v0: float, a0: float, x1: float, v1: float, a1: float, h: float) -> int:
-    """Decide whether the velocity, not negative at the start, becomes negative.
+    """Decide whether the velocity of a step, zero or positive at the start, becomes negative.
 
     Returns
     -------
     int
-        REACHED_FRONT (read: there is one crossing) if it ends at or below zero after one change of sign,
-        NO_SWITCH if it stays positive, UNRESOLVED if it may change its sign more often.
+        REACHED_FRONT, the code for one crossing, if the velocity ends at or below zero after one sign change,
+        NO_SWITCH if it stays positive, UNRESOLVED if it may change sign more than once.
     """
     p1, p2, p3, p4 = control_points(x0, v0, a0, x1, v1, a1, h)
     changes = sign_changes(p1 - x0, p2 - p1, p3 - p2, p4 - p3, x1 - p4)
@@ -99,7 +99,7 @@ def position_root(
         if not (low < s < high):
             s = 0.5 * (low + high)
         r = 1.0 - s
-        # De Casteljau with the last two levels written out: value and slope together.
+        # The last two levels of de Casteljau's algorithm give the value and the slope together.
         r4, s4 = r * r * r * r, s * s * s * s
         left = (
             r4 * x0 + 4.0 * r * r * r * s * p1 + 6.0 * r * r * s * s * p2 + 4.0 * r * s * s * s * p3 + s4 * p4
@@ -125,7 +125,7 @@ def velocity_root(v0: float, a0: float, v1: float, a1: float, h: float) -> float
     """Return the fraction of the step in (0, 1] at which the cubic of the velocity falls to zero."""
     c2 = 3.0 * (v1 - v0) - h * (2.0 * a0 + a1)
     c3 = 2.0 * (v0 - v1) + h * (a0 + a1)
-    # From rest, divide out the root at the start.
+    # If the step starts at rest, divide out the root at the start.
     at_rest = v0 == 0.0
     low, high = 0.0, 1.0
     s = v0 / (v0 - v1) if v0 != v1 else 0.5

@@ -1,8 +1,9 @@
-"""One controlled step off the backstop that ends exactly on the first switch inside it, if any.
+"""Error-controlled step off the backstop that ends exactly at the first switching event inside it, if any.
 
-After a step is accepted, its quintic shows whether a switch lies inside (see the module `hermite`). If so,
-the step is repeated from its start with the length suggested by the quintic, and the exact derivatives close
-the small remainder: the displacement of the switch is exact, its time as accurate as the integrator.
+After a step is accepted, its quintic Hermite interpolant shows whether it contains an event (see
+:mod:`printhammer.kernel.methods.hermite`). If so, the step is repeated from its start with the length that
+the quintic suggests, and a Taylor step closes the small remainder: the displacement at the event is exact,
+and the time has the accuracy of the integrator.
 """
 
 from __future__ import annotations
@@ -34,15 +35,15 @@ if TYPE_CHECKING:
     )
 
 State = Any
-"""Time, position, velocity, acceleration."""
+"""State off the backstop: time [s], position [m], velocity [m/s], acceleration [m/s^2]."""
 
 FAILED = -1
-"""Replaces a switch: no step, however short, has a finite error below the tolerance."""
+"""Code returned in place of an event if no step, however short, has a finite error below the tolerance."""
 
 
 @inlined
 def takes_velocity(mode: int) -> bool:
-    """Whether the force off the backstop depends on the velocity."""
+    """Whether the force off the backstop depends on the velocity in a mode, so that DOP853 is needed."""
     return HAS_DAMPING or HAS_CIRCUIT or (HAS_PACK and not MEMORY and mode == M.LOADING)
 
 
@@ -50,7 +51,7 @@ def takes_velocity(mode: int) -> bool:
 def plain_step(
     t: float, x: float, v: float, a: float, h: float, law: ForceLaw
 ) -> tuple[float, float, float, float, float]:
-    """Take one step of `h` [s] with the method that suits the mode."""
+    """Take a step of `h` [s]: by DOP853 if the force depends on the velocity, else by Runge-Kutta-Nystrom."""
     if takes_velocity(law.mode):
         return time_step(t, x, v, a, h, law)
     return nystrom_step(t, x, v, a, h, law)
@@ -60,7 +61,7 @@ def plain_step(
 def whole_step(
     t: float, x: float, v: float, a: float, h: float, law: ForceLaw
 ) -> tuple[float, float, float, float, float, Electric, float]:
-    """Like `plain_step`, with the electric state at the end, and its error in units of its scales."""
+    """Take a step like `plain_step`; return also the electric state and its normalised error estimate."""
     if HAS_CIRCUIT:
         return whole_time_step(t, x, v, a, h, law)
     x1, v1, a1, error_x, error_v = plain_step(t, x, v, a, h, law)
@@ -69,10 +70,10 @@ def whole_step(
 
 @compiled
 def error_ratio(error_x: float, error_v: float, error_e: float, mode: int, control: Control) -> float:
-    """Return the ratio of a step's error estimate to the allowance; NaN stays NaN.
+    """Return the error estimate of a step as a multiple of the tolerance; NaN stays NaN.
 
-    The error estimate of the electric state is in units of its scales. `control` is (scale of x, scale of v,
-    allowance of the order 6 estimate, allowance of the order 7 estimate).
+    `error_e` is the normalised error estimate of the electric state. `control` holds the scales of x and v
+    and the tolerances of the order 6 and order 7 estimates.
     """
     ratio_x = abs(error_x) / control[0]
     ratio_v = abs(error_v) / control[1]
@@ -86,17 +87,17 @@ def error_ratio(error_x: float, error_v: float, error_e: float, mode: int, contr
     if takes_velocity(mode):
         return worst / control[3]
     if mode in (M.UNLOADING, M.RELOADING):
-        # On the steep branch r^11 the estimate of order 6 is too small by about this factor.
+        # On the steep unloading branch r^11, the order 6 estimate is too small by about this factor.
         worst *= 5.0
     return worst / control[2]
 
 
 @compiled
 def step_factor(ratio: float) -> float:
-    """Return the factor for the next step size after an error `ratio`; NaN or infinity shortens most."""
+    """Return the factor of the next step size for an error `ratio`; NaN gives the smallest factor."""
     if not ratio < 1e6:
         return 0.2
-    # The eighth root as three square roots; a power would cost as much as half a step.
+    # Compute the eighth root by three square roots; a call of pow would cost as much as half a step.
     return min(5.0, max(0.2, 0.85 / math.sqrt(math.sqrt(math.sqrt(max(ratio, 1e-7))))))
 
 
@@ -111,7 +112,7 @@ def land_on_level(
     law: ForceLaw,
     control: Control,
 ) -> State:
-    """Return the state at which sign * x rises through sign * `level`, inside `upper` of a step of `h`."""
+    """Locate where sign * x rises through sign * `level` in a step `h`, up to the fraction `upper`."""
     t, x, v, a = start
     low, high = 0.0, upper
     negligible = 1e-15 * control[0]
@@ -138,7 +139,7 @@ def land_on_level(
 def land_on_reversal(
     start: State, h: float, fraction: float, sign: float, law: ForceLaw, control: Control
 ) -> tuple[float, float, float, float, float]:
-    """Return the state at which sign * v falls to zero inside a step of `h`, and its fraction of the step."""
+    """Locate where sign * v falls to zero in a step `h`; return the state and the fraction of the step."""
     t, x, v, a = start
     low, high = 0.0, 1.0
     negligible = 1e-8 * control[1]
@@ -162,9 +163,10 @@ def land_on_reversal(
 
 @called
 def longest_still_step(start: State, law: ForceLaw, control: Control) -> float:
-    """Return the largest step [s] that is stable for small oscillations about the present position.
+    """Return the largest stable step [s] for small oscillations about the present position.
 
-    Near rest all errors are below the tolerance, including those of an unstable step at first.
+    Near rest, error control does not limit the step: errors are below the tolerance even while an instability
+    begins to grow.
     """
     t, x, v, _a = start
     mode, memory, hammer, drive = law
@@ -189,7 +191,7 @@ def longest_still_step(start: State, law: ForceLaw, control: Control) -> float:
 
 @compiled
 def pushes(x: float, v: float, mode: int, hammer: Hammer) -> float:
-    """Return the sign function of a contact that may release: positive while it pushes."""
+    """Evaluate the sign function of the contact in `mode`: positive where its force law pushes."""
     if mode == M.BACKSTOP_RELEASED:
         return backstop_switch(hammer[BACKSTOP_PART:MAGNET], math.sqrt(max(hammer[POSITION] - x, 0.0)), v)
     return pack_switch(hammer[PACK:BACKSTOP_PART], x, v)
@@ -197,14 +199,14 @@ def pushes(x: float, v: float, mode: int, hammer: Hammer) -> float:
 
 @compiled
 def lets_go_or_takes_hold(x: float, v: float, mode: int, hammer: Hammer) -> bool:
-    """Whether a contact that may release no longer matches its mode."""
+    """Whether a contact has ceased to push, or, if released, has begun to push again."""
     number = pushes(x, v, mode, hammer)
     return number > 0.0 if mode in (M.PACK_RELEASED, M.BACKSTOP_RELEASED) else number < 0.0
 
 
 @called
 def land_on_push(start: State, h: float, upper: float, law: ForceLaw, control: Control) -> State:
-    """Return the state at which the contact begins or ends to push, inside `upper` of a step of `h`."""
+    """Locate by bisection where a contact starts or ceases to push in a step `h`, up to fraction `upper`."""
     t, x, v, a = start
     low, high = 0.0, upper
     while (high - low) * h > 1e-15 * control[0] / control[1]:
@@ -224,7 +226,7 @@ def land_on_push(start: State, h: float, upper: float, law: ForceLaw, control: C
 def level_switch(
     start: State, end: State, h: float, level: float, sign: float, law: ForceLaw, control: Control
 ) -> tuple[int, float, float]:
-    """Search a step for sign * x rising through sign * `level`: a code, the fraction, a bound on it."""
+    """Detect a crossing of `level` in a step; return a code, the step fraction and its upper bound."""
     x0, v0, a0 = sign * start[1], sign * start[2], sign * start[3]
     x1, v1, a1 = sign * end[1], sign * end[2], sign * end[3]
     code = rises_through(x0, v0, a0, x1, v1, a1, h, sign * level)
@@ -245,7 +247,7 @@ def level_switch(
 def first_switch(
     start: State, end: State, h: float, law: ForceLaw, peak: float, control: Control
 ) -> tuple[int, float, float, float, float]:
-    """Find the first switch inside a step: its code, fraction, upper bound, level and direction."""
+    """Return the first event inside a step: code, fraction of the step, upper bound, level and direction."""
     mode, hammer = law.mode, law.hammer
     switch, fraction, upper, level, sign = M.NO_SWITCH, 2.0, 1.0, 0.0, 1.0
     if (
@@ -289,13 +291,13 @@ def first_switch(
 def advance(
     start: State, h: float, t_next: float, law: ForceLaw, peak: float, control: Control
 ) -> tuple[int, State, float, Electric]:
-    """Take one accepted step from `start`, at most to `t_next`, ending on the first switch.
+    """Take one accepted step off the backstop that ends at the first switching event or at time `t_next`.
 
     Returns
     -------
     tuple
-        The switch (EDGE at `t_next`, NO_SWITCH, FAILED, or its name), the state there, the next step length
-        [s], and the electric state there.
+        Code of the event (EDGE at `t_next`, NO_SWITCH if none, FAILED if no step is accurate), the state at
+        the end of the step, the proposed length of the next step [s], and the electric state at the end.
     """
     mode = law.mode
     t, x, v, a = start
@@ -307,7 +309,7 @@ def advance(
         if at_edge:
             h = t_next - t
         x1, v1, a1, error_x, error_v, electric, error_e = whole_step(t, x, v, a, h, law)
-        # Beyond the range of the law the acceleration at the end may be no number, though the errors are.
+        # Outside the range of the law, the acceleration at the end may be NaN although the errors are finite.
         ratio = error_ratio(error_x, error_v, error_e, mode, control) + 0.0 * a1
         if not ratio <= 1.0:
             h *= step_factor(ratio)

@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 def nystrom_step(
     t0: float, x0: float, v0: float, a1: float, h: float, law: ForceLaw
 ) -> tuple[float, float, float, float, float]:
-    """Advance position and velocity by `h` [s] from a state whose acceleration is `a1`.
+    """Take a Runge-Kutta-Nystrom step of `h` [s] from a state whose acceleration is `a1` [m/s^2].
 
     Returns
     -------
     tuple of float
-        Position [m], velocity [m/s] and acceleration [m/s^2] at the end, and the differences of position and
-        velocity to the embedded method of order 6.
+        Position [m], velocity [m/s] and acceleration [m/s^2] at the end, and the error estimates of position
+        and velocity: the differences from the embedded method of order 6.
     """
     mode, memory, hammer, drive = law
     h2 = h * h

@@ -1,10 +1,10 @@
 """Coefficients of the Runge-Kutta-Nystrom pair 8(6) in nine stages, first same as last.
 
-For x'' = f(t, x), the acceleration free of the velocity. Source: J. R. Dormand, M. E. A. El-Mikkawy, P. J.
-Prince, "High-order embedded Runge-Kutta-Nystrom formulae", IMA J. Numer. Anal. 7 (1987) 423-430, pair
-RKN8(6)9FM. Stages are numbered from 1. ``A`` couples positions, ``BX`` and ``BV`` are the weights of position
-and velocity, ``EX`` and ``EV`` the differences to the embedded sixth order. The ninth stage is the first of
-the next step.
+For x'' = f(t, x), where the acceleration does not depend on the velocity. Source: J. R. Dormand, M. E. A.
+El-Mikkawy, P. J. Prince, "High-order embedded Runge-Kutta-Nystrom formulae", IMA J. Numer. Anal. 7 (1987)
+423-430, pair RKN8(6)9FM. Stages are numbered from 1. ``A`` holds the stage weights, ``BX`` and ``BV`` the
+weights of position and velocity at the end, ``EX`` and ``EV`` the differences from the embedded method of
+order 6. The ninth stage is also the first stage of the next step.
 """
 
 C2 = 1 / 20

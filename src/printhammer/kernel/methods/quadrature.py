@@ -1,7 +1,8 @@
 """Integrals of power along a recorded run: the terms of the energy ledger, each by its own quadrature.
 
-Gauss-Legendre quadrature with eight points in each step, the state at each point by a shortened step of the
-integrator. In the backstop the variable is s, in which the power is smooth at touch and leave.
+Each integration step is integrated by eight-point Gauss-Legendre quadrature; the state at each point is
+computed by a shortened step of the integrator. In the backstop, the integration variable is s, in which the
+power is smooth at touch and at separation.
 """
 
 from __future__ import annotations
@@ -71,7 +72,7 @@ WEIGHTS = (
 def powers(
     t: float, x: float, v: float, w: float, mode: int, memory: float, hammer: Hammer, drive: Drive
 ) -> tuple[float, float, float, float, float]:
-    """Return the powers [W] of coil and drive force, and those dissipated by pack, backstop and damping."""
+    """Return the powers supplied by coil and drive force and dissipated by pack, backstop and damping [W]."""
     value = value_at(t, x, hammer, drive)
     coil = 0.0
     force = 0.0
@@ -90,9 +91,9 @@ def powers(
 
 @compiled
 def electric_powers(t: float, x: float, hammer: Hammer, drive: Drive) -> tuple[float, float, float, float]:
-    """Return the powers [W] of the supply, and those dissipated by coil, driver and shorted turn.
+    """Return the powers supplied by the supply and dissipated by coil, driver and shorted turn [W].
 
-    The internal resistance of the supply and the diodes belong to the driver.
+    Losses in the supply's internal resistance and in the diodes are counted as driver losses.
     """
     live, electric = drive
     current = coil_current(x, electric, hammer, live)
@@ -102,7 +103,7 @@ def electric_powers(t: float, x: float, hammer: Hammer, drive: Drive) -> tuple[f
         turn = hammer[TURN_RESISTANCE] * around * around
     supply, driver = 0.0, 0.0
     if hammer[CAPACITANCE] > 0.0:
-        # Of a reservoir shared by several coils, the share of one coil.
+        # Count the share of one coil in a reservoir that several coils share.
         charging = (hammer[CHARGED] - electric[2]) / hammer[CHARGING]
         supply += hammer[CHARGED] * charging / hammer[COILS]
         driver += hammer[CHARGING] * charging * charging / hammer[COILS]
@@ -123,7 +124,7 @@ def electric_powers(t: float, x: float, hammer: Hammer, drive: Drive) -> tuple[f
 
 @compiled
 def energy_behind(x: float, hammer: Hammer) -> float:
-    """Return the energy [J] stored in the backstop at displacement `x`."""
+    """Return the elastic energy [J] stored in the backstop at displacement `x` [m]; 0 off the backstop."""
     return backstop_energy(hammer[BACKSTOP_PART:MAGNET], math.sqrt(max(hammer[POSITION] - x, 0.0)))
 
 
@@ -137,16 +138,18 @@ def quadratures(
     hammer: Hammer,
     out: Any,
 ) -> None:
-    """Fill `out`, shape (n, 5): work of coil and drive force, losses in pack, backstop and damping [J].
+    """Integrate the powers over n intervals of a run; write work and losses [J] to the rows of `out`.
 
-    With a coil circuit (n, 9): work of the supply, losses in coil, driver and shorted turn.
+    The columns of `out`, shape (n, 5), are the work of the coil, the work of the drive force, and the losses
+    in pack, backstop and damping. With a coil circuit, shape (n, 9), there follow the work of the supply and
+    the losses in coil, driver and shorted turn.
 
     Parameters
     ----------
     steps : int64 array, shape (n,)
-        Number of the node at which the step begins; ascending.
+        Index of the node at which the step of each interval begins; ascending.
     starts, ends : float64 array, shape (n,)
-        Times [s] between which to integrate, inside that step.
+        Start and end time of each interval [s], inside its step.
     nodes, train, hammer
         As in :func:`printhammer.kernel.single.resample.resample`.
     """
@@ -161,7 +164,7 @@ def quadratures(
         for j in range(out.shape[1]):
             out[row, j] = 0.0
         if i + 1 < nodes.shape[0] and nodes[i + 1, 0] == t0 and nodes[i + 1, 1] == x0:
-            # An impact on a rigid backstop.
+            # Two nodes at the same time and place are the two sides of an impact on a rigid backstop.
             lost = 0.5 * (v0 * v0 - nodes[i + 1, 2] * nodes[i + 1, 2]) / hammer[INVERSE_MASS]
             out[row, 3] = lost if mode != M.BACKSTOP and x0 != hammer[FRONT] else 0.0
             continue
@@ -200,7 +203,7 @@ def quadratures(
                 for k in range(4):
                     out[row, 5 + k] += share * terms[k]
         if mode == M.BACKSTOP_RELEASED:
-            # The energy still stored in a released backstop is lost as it recovers.
+            # The energy still stored in a released backstop is dissipated while the backstop recovers.
             first_x, _v, _w = state_in_step(low, t0, x0, v0, mode, kept, hammer, start)
             last_x, _v, _w = state_in_step(high, t0, x0, v0, mode, kept, hammer, start)
             out[row, 3] = energy_behind(first_x, hammer) - energy_behind(last_x, hammer)

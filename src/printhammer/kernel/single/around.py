@@ -1,4 +1,4 @@
-"""Checks of the run loop before and after a step: modes, step sizes, limits of the range."""
+"""Checks of the run loop before and after a step: initial mode, step size, range of the displacement."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 @compiled
 def first_mode(x: float, v: float, a: float, hammer: Hammer) -> int:
-    """Return the mode of an initial state; a state in the pack meets fresh paper at its own depth."""
+    """Return the mode of an initial state; in the pack, the displacement is taken as the local maximum."""
     if HAS_BACKSTOP:
         b = hammer[POSITION]
         if x < b and not RIGID:
@@ -59,7 +59,7 @@ def first_mode(x: float, v: float, a: float, hammer: Hammer) -> int:
 
 @compiled
 def time_to_level(distance: float, v: float, a: float) -> float:
-    """Return the time [s] in which a constant acceleration covers `distance` >= 0, or infinity."""
+    """Return the time [s] to cover `distance` >= 0 [m] at constant acceleration; infinity if never."""
     if v <= 0.0 and a <= 0.0:
         return math.inf
     under_root = v * v + 2.0 * a * distance
@@ -73,7 +73,7 @@ def time_to_level(distance: float, v: float, a: float) -> float:
 
 @compiled
 def sensible_step(h: float, x: float, v: float, a: float, mode: int, hammer: Hammer) -> float:
-    """Shorten a step that would overshoot the backstop or the pack front considerably."""
+    """Shorten the step `h` [s] if it would overshoot the backstop or the pack front by more than 2 %."""
     if HAS_BACKSTOP and mode == M.FREE:
         height = x - hammer[POSITION]
         if height > 0.0:
@@ -87,7 +87,7 @@ def sensible_step(h: float, x: float, v: float, a: float, mode: int, hammer: Ham
 
 @compiled
 def out_of_bounds(x: float, bounds: Any) -> int:
-    """Return the status of a displacement: `bounds` is (lowest, highest, origin, far)."""
+    """Return OK, RANGE_LEFT or RUNAWAY for a displacement; `bounds` is (lowest, highest, origin, far)."""
     if not (bounds[0] <= x <= bounds[1]):
         return M.RANGE_LEFT
     if abs(x - bounds[2]) > bounds[3]:
@@ -97,12 +97,12 @@ def out_of_bounds(x: float, bounds: Any) -> int:
 
 @compiled
 def left_range(start: State, end: State, law: ForceLaw, control: Control, bounds: Any) -> tuple[bool, State]:
-    """Whether a step from `start` to `end` leaves the range, even briefly, and the state there."""
+    """Return whether a step leaves the range of displacement, even briefly, and the state at the bound."""
     h = end[0] - start[0]
     for side in range(2):
         bound = bounds[side]
         sign = 1.0 if side == 1 else -1.0
-        # A backstop inside the range keeps the armature off its lower end.
+        # A backstop inside the range keeps the armature away from the lower bound.
         if math.isinf(bound) or h <= 0.0 or (HAS_BACKSTOP and side == 0 and law.mode == M.FREE):
             continue
         if start[1] == bound and sign * end[1] > sign * bound:
@@ -115,7 +115,7 @@ def left_range(start: State, end: State, law: ForceLaw, control: Control, bounds
 
 @compiled
 def failure(x: float, v: float, bounds: Any, control: Control) -> int:
-    """Return the status of a run whose step became too short."""
+    """Return the status after a step became too short: RANGE_LEFT near a bound, else STEP_UNDERFLOW."""
     near = 0.05 * control[0]
     if (x - bounds[0] < near and v <= 0.0) or (bounds[1] - x < near and v >= 0.0):
         return M.RANGE_LEFT
@@ -126,7 +126,7 @@ def failure(x: float, v: float, bounds: Any, control: Control) -> int:
 def reversed_mode(
     t: float, x: float, mode: int, peak: float, memory: float, hammer: Hammer, drive: Drive
 ) -> tuple[int, float, float]:
-    """Return mode, peak and memory after the velocity became zero inside the pack."""
+    """Return mode, local maximum [m] and memory after the velocity has become zero inside the pack."""
     if mode == M.LOADING:
         if acceleration(t, x, 0.0, M.LOADING, memory, hammer, drive) > 0.0:
             return M.LOADING, peak, memory
@@ -136,8 +136,8 @@ def reversed_mode(
     if RELOAD_ALONG_UNLOADING:
         again = acceleration(t, x, 0.0, M.UNLOADING, memory, hammer, drive) > 0.0
         return (M.RELOADING if again else M.UNLOADING), peak, memory
-    # As printed, the loading branch is the stronger one below the peak: the wire goes in again only if the
-    # other forces overcome it; otherwise this point is a new local maximum.
+    # As printed in the paper, the loading branch is the stronger branch below the peak. The armature moves in
+    # again only if the other forces overcome the loading force; otherwise this point is a new local maximum.
     if acceleration(t, x, 0.0, M.LOADING, memory, hammer, drive) > 0.0:
         return M.LOADING, peak, memory
     return M.UNLOADING, x, pack_memory(hammer[PACK:BACKSTOP_PART], x)
@@ -145,9 +145,9 @@ def reversed_mode(
 
 @compiled
 def kick_into_backstop(t: float, a: float, t_next: float, control: Control) -> tuple[float, float, float]:
-    """Return time, w and velocity shortly after a touch without velocity, with negligible contact force.
+    """Return time, w and velocity shortly after a touch with zero velocity, neglecting the contact force.
 
-    The regularised equations are stationary at w = v = 0.
+    The integrator cannot start from w = v = 0, where the regularised equations are stationary.
     """
     depth = 1e-15 * control[0]
     pause = min(math.sqrt(2.0 * depth / -a), t_next - t)
@@ -156,6 +156,6 @@ def kick_into_backstop(t: float, a: float, t_next: float, control: Control) -> t
 
 @compiled
 def contact_unit(v: float, control: Control) -> float:
-    """Return the scale of s for a touch with velocity `v`; a Hertz contact lasts |v|^-0.6 in s."""
+    """Return the scale of s for a touch at velocity `v`, proportional to |v|^-0.6 as in a Hertz contact."""
     speed = max(abs(v), 1e-6 * control[1])
     return float(math.sqrt(control[0]) / (control[1] ** 0.4 * speed**0.6))

@@ -1,13 +1,13 @@
-"""State of a run: one array of numbers with named places, shared by every phase of the run.
+"""State of a run: one array with named indices, shared by all functions of the run loop.
 
 A run that pauses leaves its complete state in the array; the next call with the same array and drive
 continues exactly as without the pause.
 
-For a run that begins the caller sets `TIME`, `POSITION_NOW`, `VELOCITY`; `STATE` to `FRESH`, or to
-`ON_BRANCH` for one that begins inside the pack on the branch `MODE` with the latest local maximum at `PEAK`
-[m]; `PAUSE_AFTER` to the number of nodes after which to pause outside the pack; and `WITH_CURRENT` to 1 for a
-run with a coil circuit that does not begin without current: the three numbers from `ELECTRIC` on are then the
-currents in the coil and in the shorted turn [A], and the voltage of the reservoir [V], NaN for a full one.
+Before the first call of a run, the caller sets `TIME`, `POSITION_NOW` and `VELOCITY`; `STATE`, to `FRESH`, or
+to `ON_BRANCH` if the run begins inside the pack on the branch `MODE` with the latest local maximum `PEAK`
+[m]; `PAUSE_AFTER`, the number of nodes after which the run pauses once outside the pack; and `WITH_CURRENT`,
+to 1 if a coil circuit begins with a current. The three elements from `ELECTRIC` on are then the currents in
+coil and shorted turn [A] and the reservoir voltage [V], where NaN denotes a full reservoir.
 """
 
 from typing import Any, NamedTuple
@@ -16,36 +16,37 @@ STATE = 0
 PAUSE_AFTER = 1
 MODE = 2
 PEAK = 3
-"""Displacement of the latest local maximum in the pack [m]."""
+"""Index of the displacement at the latest local maximum in the pack [m]."""
 TIME = 4
 POSITION_NOW = 5
 VELOCITY = 6
 ACCELERATION = 7
 ROOT = 8
-"""w = sqrt(b - x) in the backstop."""
+"""Index of w = sqrt(b - x) in the backstop [m^0.5]."""
 ROOT_RATE = 9
-"""dv/ds in the backstop."""
+"""Index of dv/ds, the derivative of the velocity in the regularised variables of the backstop."""
 MEMORY_NOW = 10
-"""Memory of the pack law for the latest local maximum."""
+"""Index of the memory value of the pack law for the latest local maximum."""
 STEP = 11
-"""Length of the next step [s], in the backstop in s of the regularised variables."""
+"""Index of the next step size: in seconds, or in the variable s in the backstop."""
 FREE_STEP = 12
 PACK_STEP = 13
 CONTACT_STEP = 14
-"""Lengths of the first steps in free flight, in the pack and in the backstop."""
+"""Indices of the initial step sizes in free flight [s], in the pack [s] and in the backstop (scaled s)."""
 STARTED = 15
-"""Mode of the latest step."""
+"""Index of the mode of the latest step."""
 ENTERED = 16
-"""Whether the rate in the backstop has to be recomputed."""
+"""Index of the flag that `ROOT_RATE` must be recomputed."""
 WAIT = 17
-"""Waiting time before an armature at rest is checked again [s]."""
+"""Index of the time after which the forces on an armature at rest are checked again [s]."""
 STUCK = 18
-"""Number of consecutive steps that did not advance time."""
+"""Index of the number of consecutive steps that did not advance the time."""
 TIME_BEFORE = 19
 FIRST = 20
 LAST = 21
 EDGE = 22
-"""First and last active firing, time of the next edge of the drive [s]."""
+"""Indices of the first active firing, the firing after the last fired one, and the time of the next edge
+[s]."""
 STEPS = 23
 ELECTRIC = 24
 PATH = 27
@@ -53,11 +54,11 @@ UNTIL = 28
 WITH_CURRENT = 29
 USED = 30
 TOUCHED = 31
-"""Numbers of nodes and contacts of the record of this call."""
+"""Indices of the numbers of nodes and contacts that the present call has recorded."""
 SIZE = 32
 
 SHORTEST_WAIT = 0.005
-"""Shortest wait, in characteristic times, before an armature at rest is checked again; arbitrary."""
+"""Shortest interval between checks of an armature at rest, in characteristic times; arbitrary."""
 
 FRESH = 0.0
 GOES_ON = 1.0
@@ -65,20 +66,20 @@ ON_BRANCH = 2.0
 
 
 class Setup(NamedTuple):
-    """Data that stay constant during a run.
+    """Data that do not change during a run.
 
     Attributes
     ----------
     train : Train
-        See :class:`printhammer.kernel.model.layout.Train`.
+        Pulse train, see :class:`printhammer.kernel.model.layout.Train`.
     hammer : float64 array
-        See :mod:`printhammer.kernel.model.layout`.
+        Parameter array, see :mod:`printhammer.kernel.model.layout`.
     control : tuple of float
-        Scales of displacement and velocity, allowances of the two error estimates.
+        Scales of displacement [m] and velocity [m/s], tolerances of the order 6 and order 7 error estimates.
     bounds : tuple of float
-        Lowest and highest displacement, origin and farthest distance from it [m].
+        Lowest and highest displacement, origin, and largest distance from the origin [m].
     max_steps : int
-        Largest number of steps.
+        Maximum number of steps of the run.
     """
 
     train: Any

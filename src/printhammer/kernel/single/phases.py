@@ -1,4 +1,4 @@
-"""Functions shared by the phases of a run: components of its state, forces, and record."""
+"""Functions shared by the modules of the run loop: access to the run state, forces, and record."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ State = Any
 
 @inlined
 def electric_of(state: State) -> Electric:
-    """Return the electric state, the empty tuple in a kernel without a circuit."""
+    """Return the electric state of a run; empty in a kernel without a circuit."""
     if HAS_CIRCUIT:
         return state[C.ELECTRIC], state[C.ELECTRIC + 1], state[C.ELECTRIC + 2]
     return ()
@@ -40,7 +40,7 @@ def electric_of(state: State) -> Electric:
 
 @inlined
 def keep_electric(electric: Electric, state: State) -> None:
-    """Store an electric state in the state of the run."""
+    """Store an electric state in the state array of the run."""
     if HAS_CIRCUIT:
         for j in range(3):
             state[C.ELECTRIC + j] = electric[j]
@@ -48,7 +48,7 @@ def keep_electric(electric: Electric, state: State) -> None:
 
 @inlined
 def electric_at_start(x: float, hammer: Hammer, state: State, live: Any) -> Electric:
-    """Return the electric state at the start or continuation of a run, with the current on its path."""
+    """Return the electric state at the start or continuation of a run, and restore the current path."""
     if HAS_CIRCUIT:
         if state[C.STATE] == C.GOES_ON:
             take_path(live, state[C.PATH], state[C.UNTIL])
@@ -64,7 +64,7 @@ def electric_at_start(x: float, hammer: Hammer, state: State, live: Any) -> Elec
 
 @inlined
 def keep_path(state: State, live: Any) -> None:
-    """Store the path of the current for the continuation of the run."""
+    """Store the path of the coil current in the run state, for the continuation of the run."""
     if HAS_CIRCUIT:
         state[C.PATH] = path_of(live)
         state[C.UNTIL] = live[live.size - UNTIL]
@@ -72,27 +72,27 @@ def keep_path(state: State, live: Any) -> None:
 
 @inlined
 def acceleration_in(mode: int, v: float, state: State, setup: Setup) -> float:
-    """Return the acceleration [m/s2] under the force law of a mode at a velocity `v` [m/s]."""
+    """Return the acceleration [m/s^2] at the present position for a mode and a velocity `v` [m/s]."""
     t, x, memory = state[C.TIME], state[C.POSITION_NOW], state[C.MEMORY_NOW]
     return acceleration(t, x, v, mode, memory, setup.hammer, driven(setup.train.live, electric_of(state)))
 
 
 @inlined
 def accelerate(state: State, setup: Setup) -> None:
-    """Compute the acceleration under the force law of the present mode."""
+    """Update the acceleration in the run state, with the force law of the present mode."""
     state[C.ACCELERATION] = acceleration_in(int(state[C.MODE]), state[C.VELOCITY], state, setup)
 
 
 @inlined
 def rate_in_backstop(state: State, setup: Setup) -> None:
-    """Compute the rate of the velocity in the regularised variables."""
+    """Update dv/ds, the derivative of the velocity in the regularised variables, in the run state."""
     drive = driven(setup.train.live, electric_of(state))
     state[C.ROOT_RATE] = contact_rate(state[C.ROOT], state[C.VELOCITY], state[C.TIME], setup.hammer, drive)
 
 
 @inlined
 def pass_edge(state: State, setup: Setup) -> None:
-    """Update the drive at an edge: pieces that begin or end now."""
+    """Start and end the waveform pieces whose edge is at the present time; update the current path."""
     train = setup.train
     first, last, edge = pass_edges(state[C.TIME], train, int(state[C.FIRST]), int(state[C.LAST]))
     state[C.FIRST], state[C.LAST], state[C.EDGE] = first, last, edge
@@ -104,14 +104,14 @@ def pass_edge(state: State, setup: Setup) -> None:
 
 @inlined
 def note_path(state: State, setup: Setup, nodes: Any) -> None:
-    """Write the electric state to the latest node."""
+    """Write the electric state and the current path to the latest node of the record."""
     if HAS_CIRCUIT:
         note_circuit(nodes, int(state[C.USED]), electric_of(state), path_of(setup.train.live))
 
 
 @inlined
 def note_node(mode: int, kept: float, state: State, setup: Setup, nodes: Any) -> None:
-    """Append a node to the record, from which `mode` is valid."""
+    """Append a node to the record: the present state, and the mode and memory valid from here on."""
     state[C.USED] = add_node(
         nodes, int(state[C.USED]), state[C.TIME], state[C.POSITION_NOW], state[C.VELOCITY], mode, kept
     )
@@ -120,7 +120,7 @@ def note_node(mode: int, kept: float, state: State, setup: Setup, nodes: Any) ->
 
 @inlined
 def note_state(state: State, setup: Setup, nodes: Any) -> None:
-    """Append a node to the record, with the memory of its mode."""
+    """Append the present state to the record as a node, with the present mode and its memory."""
     mode = int(state[C.MODE])
     kept = 0.0
     if mode == M.BACKSTOP:

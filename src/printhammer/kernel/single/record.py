@@ -1,14 +1,15 @@
-"""Record of a run: nodes at the ends of all steps, and contacts.
+"""Record of a run: nodes, i.e. the states at the ends of all steps, and contacts.
 
-A node is ``[time, position, velocity, mode, memory]``: the mode and memory hold from this node to the next;
-memory is the displacement of the latest local maximum in the pack, w = sqrt(b - x) in the backstop, else
-zero. Where there is a coil circuit, its electric state and the path of the current follow, see
+A node is ``[time, position, velocity, mode, memory]``. Mode and memory are valid from this node to the next;
+the memory is the displacement at the latest local maximum in the pack, w = sqrt(b - x) in the backstop, and
+zero elsewhere. With a coil circuit, the electric state and the path of the current follow, see
 `printhammer.kernel.model.circuit`. A contact is ``[surface, time in, velocity in, time out, velocity out,
-last node before it, open at the start]``; the time out of a contact that is open at the end is NaN.
+index of the last node before the contact, open at the start]``; the time out of a contact that is still open
+at the end of the run is NaN.
 
-The arrays are the caller's. Rows beyond their length are counted but not kept, all but the last: a caller
-that wants them all repeats the run with longer arrays, one that wants only the final state gives an array of
-one row.
+The caller allocates the arrays. If an array is too short, further rows overwrite its last row but are still
+counted: a caller that needs all rows repeats the run with longer arrays, and a caller that needs only the
+final state passes an array of one row.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ Rows = Any
 
 @compiled
 def add_node(nodes: Rows, used: int, t: float, x: float, v: float, mode: int, memory: float) -> int:
-    """Write a node at row `used`, or at the last row if all are in use; return the number of nodes so far."""
+    """Write a node to row `used`, or to the last row if the array is full; return the number of nodes."""
     i = min(used, nodes.shape[0] - 1)
     nodes[i, 0] = t
     nodes[i, 1] = x
@@ -38,7 +39,7 @@ def add_node(nodes: Rows, used: int, t: float, x: float, v: float, mode: int, me
 
 @compiled
 def note_circuit(nodes: Rows, used: int, electric: Any, path: float) -> None:
-    """Write the electric state and the path of the current to the latest node."""
+    """Write the electric state and the path of the coil current to the latest node."""
     i = min(used, nodes.shape[0]) - 1
     for j in range(3):
         nodes[i, ELECTRIC + j] = electric[j]
@@ -47,7 +48,7 @@ def note_circuit(nodes: Rows, used: int, electric: Any, path: float) -> None:
 
 @compiled
 def relabel_node(nodes: Rows, used: int, mode: int) -> None:
-    """Change the mode of the latest node, which is valid until the next."""
+    """Change the mode of the latest node, i.e. the mode from this node to the next."""
     nodes[min(used, nodes.shape[0]) - 1, 3] = mode
 
 
@@ -55,7 +56,7 @@ def relabel_node(nodes: Rows, used: int, mode: int) -> None:
 def open_contact(
     contacts: Rows, used: int, surface: int, t: float, v: float, node: int, initial: bool
 ) -> int:
-    """Write a contact that begins at time `t` with velocity `v`; return the number of contacts so far."""
+    """Record the start of a contact at time `t` with velocity `v`; return the number of contacts so far."""
     i = min(used, contacts.shape[0] - 1)
     contacts[i, 0] = surface
     contacts[i, 1] = t
@@ -69,7 +70,7 @@ def open_contact(
 
 @compiled
 def close_contact(contacts: Rows, used: int, t: float, v: float) -> None:
-    """End the latest contact at time `t` with velocity `v`."""
+    """Record the end of the latest contact at time `t` with velocity `v`."""
     i = min(used, contacts.shape[0]) - 1
     contacts[i, 3] = t
     contacts[i, 4] = v
@@ -77,7 +78,7 @@ def close_contact(contacts: Rows, used: int, t: float, v: float) -> None:
 
 @compiled
 def carry_contact(contacts: Rows, mode: int) -> int:
-    """Move the contact that continues after a pause in `mode` to row 0; return the number of contacts."""
+    """Prepare the contact array after a pause: a contact still open stays in row 0; return their number."""
     if mode == FREE:
         return 0
     contacts[0, 5] = -1.0

@@ -1,7 +1,7 @@
 """States and forces at arbitrary times of a recorded run.
 
-The state inside a step is one shortened step of the same method from the preceding node: there is no
-interpolation formula, and no dependence on the output grid.
+The state inside a step is computed by one shortened step of the integrator from the preceding node. No
+interpolation is needed, and the result does not depend on the output grid.
 """
 
 from __future__ import annotations
@@ -56,12 +56,12 @@ if TYPE_CHECKING:
 
 GOLDEN = 0.3819660112501051
 SAMPLES = 4
-"""Samples in each step of a contact in the search for its largest depth and force; arbitrary."""
+"""Number of samples per step in the search for the largest depth and force of a contact; arbitrary."""
 
 
 @compiled
 def memory_of(mode: int, kept: float, hammer: Hammer) -> float:
-    """Return the memory of the pack law for the local maximum `kept` of a node."""
+    """Return the memory value of the pack law for the local maximum `kept` [m] stored in a node."""
     if HAS_PACK and MEMORY and mode in (M.UNLOADING, M.RELOADING, M.HELD_UNLOADING):
         return pack_memory(hammer[PACK:BACKSTOP_PART], kept)
     return 0.0
@@ -69,7 +69,7 @@ def memory_of(mode: int, kept: float, hammer: Hammer) -> float:
 
 @compiled
 def branch_of(mode: int) -> int:
-    """Return the mode whose force acts in `mode`, which may be a mode of rest."""
+    """Return the mode whose force law applies in `mode`; differs from `mode` only at rest."""
     if mode == M.HELD:
         return M.BACKSTOP
     if mode == M.HELD_LOADING:
@@ -81,7 +81,7 @@ def branch_of(mode: int) -> int:
 def state_in_step(
     t: float, t0: float, x0: float, v0: float, mode: int, kept: float, hammer: Hammer, drive: Drive
 ) -> tuple[float, float, float]:
-    """Return displacement, velocity and w at time `t` [s] in the step that begins at a node."""
+    """Return displacement [m], velocity [m/s] and w [m^0.5] at time `t` [s] in the step after a node."""
     if mode in (M.RESTING, M.HELD, M.HELD_LOADING, M.HELD_UNLOADING) or t <= t0:
         return x0, v0, kept if mode in (M.BACKSTOP, M.HELD) else 0.0
     if mode == M.BACKSTOP:
@@ -100,7 +100,7 @@ def state_in_step(
 
 @compiled
 def drive_at(node: Any, live: Any) -> Drive:
-    """Return the drive argument of the force functions at a node, with its pieces in `live`."""
+    """Return the drive argument of the force functions at a node: `live`, or `live` and electric state."""
     if HAS_CIRCUIT:
         take_path(live, node[ELECTRIC + 3], math.inf)
         return live, (node[ELECTRIC], node[ELECTRIC + 1], node[ELECTRIC + 2])
@@ -109,7 +109,7 @@ def drive_at(node: Any, live: Any) -> Drive:
 
 @compiled
 def electric_in_step(t: float, node: Any, hammer: Hammer, drive: Drive) -> Electric:
-    """Return the electric state at time `t` [s] in the step that begins at a node."""
+    """Return the electric state at time `t` [s] in the step that begins at `node`."""
     t0, x0, v0, mode, kept = node[0], node[1], node[2], int(node[3]), node[4]
     live, electric = drive
     if t <= t0:
@@ -126,7 +126,7 @@ def electric_in_step(t: float, node: Any, hammer: Hammer, drive: Drive) -> Elect
 
 @compiled
 def drive_in_step(t: float, node: Any, hammer: Hammer, drive: Drive) -> Drive:
-    """Return the drive argument of the force functions at time `t` [s] in the step that begins at a node."""
+    """Return the drive argument of the force functions at time `t` [s] in the step that begins at `node`."""
     if HAS_CIRCUIT:
         return drive[0], electric_in_step(t, node, hammer, drive)
     return drive
@@ -140,19 +140,20 @@ def resample(
     hammer: Hammer,
     out: Any,
 ) -> None:
-    """Fill `out` with states and forces at `times`.
+    """Write states and forces at the requested times of a recorded run to the rows of `out`.
 
     Parameters
     ----------
     times : float64 array, shape (n,)
-        Ascending, inside the run [s].
+        Output times, ascending, within the run [s].
     nodes, train, hammer
-        As recorded by, and passed to, :func:`printhammer.kernel.single.run.run`.
+        Nodes recorded by :func:`printhammer.kernel.single.run.run`, and the pulse train and parameter array
+        that were passed to it.
     out : float64 array, shape (n, 10), with a coil circuit (n, 15)
-        Displacement, velocity, drive (current or force), magnet, spring, pack, elastic and viscous force of
-        the backstop, damping force, mode; then coil current, voltage across the coil, flux linkage, voltage
-        of the reservoir, current in the shorted turn. At the time of an impact or a switch: the state after
-        it.
+        Columns: displacement [m], velocity [m/s], drive [A or N], forces of magnet, spring, pack, backstop
+        (elastic), backstop (viscous) and damping [N], mode; with a circuit also coil current [A], voltage
+        across the coil [V], flux linkage [Wb], reservoir voltage [V], current in the shorted turn [A]. At
+        the time of an impact or a switching event, the state after the event.
     """
     train = Train(*train)
     first, last, _edge = edges_at(nodes[0, 0], train)
@@ -198,7 +199,7 @@ def resample(
 
 @compiled
 def depth_and_force(t: float, node: Any, surface: int, hammer: Hammer, live: Any) -> tuple[float, float]:
-    """Return depth [m] and contact force [N] at time `t` in the step that begins at `node`."""
+    """Return indentation [m] and contact force [N] at time `t` [s] in the step that begins at `node`."""
     mode = int(node[3])
     drive = drive_at(node, live)
     x, v, w = state_in_step(t, node[0], node[1], node[2], mode, node[4], hammer, drive)
@@ -215,7 +216,7 @@ def depth_and_force(t: float, node: Any, surface: int, hammer: Hammer, live: Any
 def refined(
     which: int, low: float, high: float, node: Any, surface: int, hammer: Hammer, live: Any
 ) -> tuple[float, float]:
-    """Return time and value of the largest depth (`which` 0) or force (1) between two times."""
+    """Return time [s] and value of the largest depth (`which` 0) or force (`which` 1) between two times."""
     t1 = low + GOLDEN * (high - low)
     t2 = high - GOLDEN * (high - low)
     f1 = depth_and_force(t1, node, surface, hammer, live)[which]
@@ -239,10 +240,7 @@ def peaks_of(
     train: Train,
     hammer: Hammer,
 ) -> tuple[float, float, float]:
-    """Return time [s] of the largest depth, that depth [m] and the peak force [N] of a contact.
-
-    Its steps begin at its node and end at the first node not before its end.
-    """
+    """Return the time of the largest depth [s], the largest depth [m] and the peak force [N] of a contact."""
     surface = int(contact[0])
     begin = int(contact[5])
     end = begin
@@ -267,7 +265,7 @@ def peaks_of(
         peak_time += (nodes[best[0] + 1, 0] - nodes[best[0], 0]) * best[1] / SAMPLES
     for which in range(2):
         i, j = best if which == 0 else strongest
-        # The extremum lies next to the best sample, possibly in an adjacent step.
+        # The extremum lies near the best sample, possibly in an adjacent step.
         for beside in range(-1, 2):
             k = i + beside
             if k < begin or k >= end or (beside < 0 and j > 0) or (beside > 0 and j < SAMPLES):
@@ -296,7 +294,7 @@ def peaks(
     hammer: Hammer,
     out: Any,
 ) -> None:
-    """Fill `out`, shape (m, 3), with `peaks_of` for all recorded contacts."""
+    """Write time of largest depth, largest depth and peak force of m contacts to `out`, shape (m, 3)."""
     train = Train(*train)
     for row in range(contacts.shape[0]):
         out[row, 0], out[row, 1], out[row, 2] = peaks_of(contacts[row], nodes, train, hammer)

@@ -1,4 +1,4 @@
-"""Armature at rest, on a rigid backstop or inside the pack: the time at which the forces end the rest."""
+"""Armature at rest on a rigid backstop or inside the pack: the time at which the forces end the rest."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def rest_ends(
     Returns
     -------
     tuple
-        Whether it does, and the time [s] from `t` to then, or `pause`.
+        Whether the acceleration leaves the range, and the time from `t` until it does [s], else `pause`.
     """
     mode, memory, hammer, drive = law
     low = 0.0
@@ -45,5 +45,5 @@ def rest_ends(
 
 @compiled
 def goes_on_in(a: float, mode: int) -> bool:
-    """Whether an armature at rest inside the pack continues along the branch of its mode."""
+    """Whether the acceleration `a` moves an armature at rest in the pack along the branch of its mode."""
     return (mode == UNLOADING and a < 0.0) or (mode == RELOADING and a > 0.0)

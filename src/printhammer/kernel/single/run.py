@@ -1,4 +1,4 @@
-"""One run of one hammer: the loop over steps, switches and edges of the drive."""
+"""Run of one hammer: the loop over steps, switching events and edges of the drive."""
 
 from __future__ import annotations
 
@@ -40,15 +40,15 @@ if TYPE_CHECKING:
     from printhammer.kernel.single.switches import after_step
 
 COINCIDENT = 1e-15
-"""Difference of edges, as a fraction of their time, up to which they coincide."""
+"""Relative time difference up to which two edges of the drive are treated as simultaneous."""
 
 STUCK = 1000
-"""Number of consecutive steps without progress in time after which a run stops; arbitrary."""
+"""Maximum number of consecutive steps that do not advance the time; arbitrary."""
 
 
 @inlined
 def begin(state: State, setup: Setup, contacts: Any) -> None:
-    """Complete the state of a run that begins: mode, first steps, edges of the drive, an open contact."""
+    """Initialise a run: set mode, initial step sizes, first edge of the drive and any open contact."""
     train, hammer = setup.train, setup.hammer
     time_scale = setup.control[0] / setup.control[1]
     t, x, v = state[C.TIME], state[C.POSITION_NOW], state[C.VELOCITY]
@@ -80,7 +80,7 @@ def begin(state: State, setup: Setup, contacts: Any) -> None:
 
 @inlined
 def count_step(state: State, setup: Setup) -> int:
-    """Count a step that is about to be taken; return the status, `OK` where it may be."""
+    """Count a step before it is taken; return `OK`, or the status of an exceeded step or progress limit."""
     time_scale = setup.control[0] / setup.control[1]
     t, before = state[C.TIME], state[C.TIME_BEFORE]
     state[C.STEPS] += 1.0
@@ -96,28 +96,28 @@ def count_step(state: State, setup: Setup) -> int:
 
 @entry
 def run(posed: Any, t_end: float, nodes: Any, contacts: Any, state: Any) -> tuple[int, int, int, int]:
-    """Integrate to time `t_end`, from the start or from where the run paused.
+    """Integrate the motion to time `t_end` [s], from the initial state or from the latest pause.
 
     Parameters
     ----------
     posed : tuple
-        A plain tuple of the fields of :class:`printhammer.kernel.single.carry.Setup`, the first of them one
-        of those of :class:`printhammer.kernel.model.layout.Train`.
+        The fields of :class:`printhammer.kernel.single.carry.Setup` as a plain tuple, with the fields of
+        :class:`printhammer.kernel.model.layout.Train` as its first element.
     t_end : float
         End of the run [s].
     nodes : float64 array, shape (any, 5), with a coil circuit (any, 9)
     contacts : float64 array, shape (any, 7)
-        Filled with the record, see `printhammer.kernel.single.record`. The first node of a run that goes on
-        is the last one before the pause; a contact that was open then is the first contact and keeps its row,
-        its number of the node before it is negative.
+        Filled with the record, see `printhammer.kernel.single.record`. After a pause, the first node is the
+        last node before the pause; a contact that was open at the pause stays in row 0, with a negative
+        node index.
     state : float64 array, shape (32,)
-        See :mod:`printhammer.kernel.single.carry`.
+        State of the run, see :mod:`printhammer.kernel.single.carry`.
 
     Returns
     -------
     tuple
-        Status, and the numbers of nodes, contacts and steps; nodes and contacts may exceed the arrays'
-        lengths.
+        Status, and the numbers of nodes, contacts and steps; the numbers of nodes and contacts may exceed
+        the lengths of the arrays.
     """
     setup = Setup(Train(*posed[0]), posed[1], posed[2], posed[3], posed[4])
     live = setup.train.live
@@ -138,7 +138,8 @@ def run(posed: Any, t_end: float, nodes: Any, contacts: Any, state: Any) -> tupl
         if HAS_CIRCUIT:
             t_next = min(t_next, live[live.size - UNTIL])
         if 0.0 < t_next - state[C.TIME] <= COINCIDENT * t_next:
-            # Nothing moves between edges that differ by rounding; the drive changes at the later one.
+            # No step is taken between edges that differ only by rounding; the drive changes at the later
+            # edge.
             state[C.TIME] = t_next
             after_step(M.EDGE, state, setup, nodes, contacts)
             note_state(state, setup, nodes)

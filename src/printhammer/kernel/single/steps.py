@@ -36,20 +36,20 @@ if TYPE_CHECKING:
     from printhammer.kernel.single.rest import goes_on_in, rest_ends
 
 BRANCHES = (M.UNLOADING, M.LOADING, M.RELOADING)
-"""Modes inside the pack in which an armature may rest."""
+"""Modes inside the pack in which an armature can come to rest."""
 
 
 @inlined
 def stillness(control: Any) -> float:
-    """Return the acceleration [m/s2] below which an armature without velocity stays at rest."""
+    """Return the acceleration [m/s^2] below which an armature with zero velocity stays at rest."""
     return float(STILL * control[1] / (control[0] / control[1]))
 
 
 @inlined
 def take_step(state: State, setup: Setup, t_next: float, nodes: Any) -> tuple[int, int]:
-    """Take a step that ends at `t_next` [s] or before.
+    """Take one step, which ends at `t_next` [s] at the latest, with the method for the present mode.
 
-    Returns the switch in which it ends, or `HOLDS`, and the status that it brings about.
+    Returns the switching event that ends the step, or `HOLDS`, and the status of the run.
     """
     mode, control = int(state[C.MODE]), setup.control
     still = stillness(control)
@@ -67,7 +67,7 @@ def take_step(state: State, setup: Setup, t_next: float, nodes: Any) -> tuple[in
 
 @inlined
 def circuit_is_quiet(state: State, setup: Setup) -> bool:
-    """Whether the circuit of an armature at rest remains unchanged until the next edge."""
+    """Whether the electric state of an armature at rest stays constant until the next edge of the drive."""
     if HAS_CIRCUIT:
         control = setup.control
         return is_quiet(
@@ -83,7 +83,7 @@ def circuit_is_quiet(state: State, setup: Setup) -> bool:
 
 @inlined
 def backstop_step(state: State, setup: Setup, t_next: float, still: float, nodes: Any) -> int:
-    """Take a step in the backstop, in the regularised variables; return the switch in which it ends."""
+    """Take a step in the backstop in regularised variables; return the switching event that ends it."""
     hammer, control, live = setup.hammer, setup.control, setup.train.live
     if state[C.ENTERED] != 0.0:
         rate_in_backstop(state, setup)
@@ -133,7 +133,7 @@ def backstop_step(state: State, setup: Setup, t_next: float, still: float, nodes
 
 @inlined
 def reverse(state: State, setup: Setup) -> None:
-    """Select the mode that follows when the velocity is zero inside the pack."""
+    """Update mode, local maximum and memory when the velocity has become zero inside the pack."""
     mode, peak, memory = reversed_mode(
         state[C.TIME],
         state[C.POSITION_NOW],
@@ -148,7 +148,7 @@ def reverse(state: State, setup: Setup) -> None:
 
 @inlined
 def wait(state: State, setup: Setup, t_next: float, still: float, nodes: Any) -> int:
-    """Keep an armature at rest while the forces allow it; return the switch, or `HOLDS`."""
+    """Advance the time of an armature at rest while the forces keep it there; return the event or `HOLDS`."""
     mode, t, x = int(state[C.MODE]), state[C.TIME], state[C.POSITION_NOW]
     time_scale = setup.control[0] / setup.control[1]
     pause = t_next - t
@@ -176,7 +176,7 @@ def wait(state: State, setup: Setup, t_next: float, still: float, nodes: Any) ->
 
 @inlined
 def step_at_rest(state: State, setup: Setup, t_next: float, nodes: Any) -> int:
-    """Take a step of the circuit with the armature at rest, while its current changes."""
+    """Integrate the coil circuit for one step with the armature at rest; return the event that ends it."""
     mode, x = int(state[C.MODE]), state[C.POSITION_NOW]
     held = mode
     if mode != M.RESTING:
@@ -198,7 +198,7 @@ def step_at_rest(state: State, setup: Setup, t_next: float, nodes: Any) -> int:
 
 @inlined
 def smooth_step(state: State, setup: Setup, t_next: float) -> tuple[int, int]:
-    """Take a step off the backstop; return the switch in which it ends, and the status."""
+    """Take a step off the backstop; return the switching event that ends it, and the status of the run."""
     hammer, control, bounds = setup.hammer, setup.control, setup.bounds
     mode, h = int(state[C.MODE]), state[C.STEP]
     fresh = int(state[C.STARTED]) != mode

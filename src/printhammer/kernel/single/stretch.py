@@ -1,7 +1,8 @@
-"""Results of one stretch of a run: dots, strobes and samples, extracted from its record.
+"""Dots, strobes and samples of one segment of a run, extracted from the record of the segment.
 
-A strobe is the whole state at an instant: displacement [m], velocity [m/s], mode, and the memory of the mode,
-the latest local maximum in the pack [m].
+A strobe is the complete state at a requested time: displacement [m], velocity [m/s], mode, and the memory of
+the mode, i.e. the latest local maximum in the pack [m]. A sample is a displacement at a time of the output
+grid.
 """
 
 from __future__ import annotations
@@ -29,10 +30,11 @@ if TYPE_CHECKING:
     )
 
 STROBE_WIDTH = 4
-"""Columns of a strobe: displacement, velocity, mode, memory; with a coil circuit `ELECTRIC_WIDTH` more."""
+"""Number of columns of a strobe: displacement, velocity, mode and memory. A coil circuit adds
+`ELECTRIC_WIDTH` columns."""
 
 ELECTRIC_WIDTH = 3
-"""Columns of an electric state: currents in coil and shorted turn [A], voltage of the reservoir [V]."""
+"""Number of electric columns of a strobe: currents in coil and shorted turn [A], reservoir voltage [V]."""
 
 
 firing_before = compiled(D.firing_before)
@@ -41,7 +43,7 @@ contact_number = compiled(D.contact_number)
 
 @compiled
 def clear_dots(dots: Any) -> None:
-    """Mark all dots as lost, without extra contacts."""
+    """Initialise the rows of dots: no contacts counted, all other columns NaN, which marks a lost dot."""
     for i in range(dots.shape[0]):
         dots[i, D.CONTACTS] = 0.0
         for j in range(D.CONTACTS + 1, D.DOT_WIDTH):
@@ -52,13 +54,13 @@ def clear_dots(dots: Any) -> None:
 def open_dot(
     dots: Any, extra: int, surface: int, initial: bool, t: float, v: float, firings: Any
 ) -> tuple[int, int]:
-    """Count a contact that begins at time `t` with velocity `v` for its firing, and write its row.
+    """Assign a contact that begins at time `t` with velocity `v` to its firing, and write its row.
 
     Returns
     -------
     tuple
-        Index of the row, -1 if the contact belongs to no firing or there is no row left for it; and the
-        updated number of extra contacts, `extra` before.
+        Index of the row, or -1 if the contact belongs to no firing or the array is full; and the number of
+        extra contacts, `extra` or `extra` + 1.
     """
     fired = firing_before(t, firings)
     earlier = int(dots[fired, D.CONTACTS]) if fired >= 0 else 0
@@ -80,7 +82,7 @@ def open_dot(
 
 @compiled
 def deepen_dot(dots: Any, row: int, x: float, hammer: Hammer) -> None:
-    """Record a reversal at displacement `x` [m] in a row if it is the deepest so far."""
+    """Update depth and force in a row of dots if a reversal at displacement `x` [m] is the deepest so far."""
     if not dots[row, D.DEPTH] >= x - hammer[FRONT]:
         dots[row, D.DEPTH] = x - hammer[FRONT]
         dots[row, D.FORCE] = -pack_force(x, 0.0, LOADING, 0.0, hammer)
@@ -88,7 +90,7 @@ def deepen_dot(dots: Any, row: int, x: float, hammer: Hammer) -> None:
 
 @compiled
 def deepest_node(contact: Any, nodes: Any, hammer: Hammer) -> tuple[float, float]:
-    """Return largest depth [m] and force [N] of a contact with a pack whose reversals are nodes."""
+    """Return largest depth [m] and peak force [N] of a contact with a pack whose law has memory."""
     i = int(contact[5])
     highest = nodes[i, 1]
     while i + 1 < nodes.shape[0] and not nodes[i, 0] >= contact[3]:
@@ -106,9 +108,9 @@ def note_dots(
     train: Train,
     hammer: Hammer,
 ) -> int:
-    """Write the pack contacts of a stretch to the rows of its member.
+    """Write the pack contacts of one segment of a run to the rows of dots of a member.
 
-    Returns the updated number of its extra contacts, `extra` before.
+    Returns the number of extra contacts of the member so far; `extra` is the number before this segment.
     """
     for number in range(contacts.shape[0]):
         contact = contacts[number]
@@ -140,10 +142,10 @@ def note_states(
     train: Train,
     hammer: Hammer,
 ) -> tuple[int, int]:
-    """Fill strobes and samples from the indices `strobe` and `sample` on, up to the end of a stretch.
+    """Compute strobes and samples from the indices `strobe` and `sample` on, up to the end of a segment.
 
-    An instant at which a stretch ends belongs to the next stretch, if there is one. Returns the indices of
-    the first remaining strobe and sample.
+    A time at the end of a segment belongs to the next segment, unless this one is `final`. Returns the
+    indices of the first strobe and the first sample that remain.
     """
     n = nodes.shape[0]
     first, last, _edge = edges_at(nodes[0, 0], train)
@@ -187,7 +189,7 @@ def note_states(
 
 @compiled
 def blank_states(strobes: Any, strobe: int, strobe_end: int, x: Any, sample: int, sample_end: int) -> None:
-    """Fill with NaN after an early end of the run."""
+    """Fill the remaining strobes and samples with NaN after an early end of the run."""
     for i in range(strobe, strobe_end):
         for j in range(strobes.shape[1]):
             strobes[i, j] = np.nan

@@ -1,4 +1,4 @@
-"""Handling of the switch that ends a step: an edge of the drive, another path, another mode."""
+"""Handling of the event that ends a step: edge of the drive, change of current path, change of mode."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @inlined
 def after_step(switch: int, state: State, setup: Setup, nodes: Any, contacts: Any) -> None:
-    """Continue after the switch in which a step ended."""
+    """Update the run state after the switching event that ended a step; record contacts that begin or end."""
     if switch == M.EDGE:
         pass_edge(state, setup)
         accelerate(state, setup)
@@ -69,13 +69,13 @@ def after_step(switch: int, state: State, setup: Setup, nodes: Any, contacts: An
 
 @inlined
 def follow(switch: int, state: State) -> None:
-    """Select the mode that follows a switch."""
+    """Set the next mode after a switching event, from the table of transitions."""
     state[C.MODE] = FOLLOWING[int(state[C.MODE]), switch]
 
 
 @inlined
 def open_now(surface: int, state: State, contacts: Any) -> None:
-    """Record the start of a contact."""
+    """Record the start of a contact with a surface at the present time."""
     state[C.TOUCHED] = open_contact(
         contacts,
         int(state[C.TOUCHED]),
@@ -89,13 +89,13 @@ def open_now(surface: int, state: State, contacts: Any) -> None:
 
 @inlined
 def close_now(state: State, contacts: Any) -> None:
-    """Record the end of the latest contact."""
+    """Record the end of the latest contact at the present time."""
     close_contact(contacts, int(state[C.TOUCHED]), state[C.TIME], state[C.VELOCITY])
 
 
 @inlined
 def reach_backstop(state: State, setup: Setup, nodes: Any, contacts: Any) -> None:
-    """Continue after a touch of the backstop; a rigid one reverses the armature at once, or it rests."""
+    """Update the run state at a touch of the backstop: contact, or rebound or rest if it is rigid."""
     open_now(M.BACKSTOP_SURFACE, state, contacts)
     if RIGID:
         hammer = setup.hammer
@@ -115,10 +115,10 @@ def reach_backstop(state: State, setup: Setup, nodes: Any, contacts: Any) -> Non
 
 @inlined
 def reach_front(state: State, setup: Setup, contacts: Any) -> None:
-    """Continue after the armature has reached the front of the pack."""
+    """Update the run state when the armature reaches the pack front; begin a contact if it moves inward."""
     v = max(state[C.VELOCITY], 0.0)
     state[C.VELOCITY] = v
-    # A touch without velocity opens a contact only if the forces push the armature on.
+    # A touch with zero velocity begins a contact only if the forces push the armature into the pack.
     if v > 0.0 or acceleration_in(M.FREE, v, state, setup) > 0.0:
         open_now(M.PACK_SURFACE, state, contacts)
         follow(M.REACHED_FRONT, state)
@@ -126,7 +126,7 @@ def reach_front(state: State, setup: Setup, contacts: Any) -> None:
 
 @inlined
 def leave(switch: int, state: State, setup: Setup, contacts: Any) -> None:
-    """Continue after the armature has left a surface, at the exact position."""
+    """Update the run state when the armature leaves a surface; set the displacement to the surface."""
     hammer = setup.hammer
     close_now(state, contacts)
     state[C.POSITION_NOW] = hammer[POSITION] if switch == M.LEFT_BACKSTOP else hammer[FRONT]
