@@ -1,9 +1,9 @@
 """Parts of a hammer, one law per file.
 
 Every module of this package and its folders whose name does not start with an underscore is imported and
-registers its part; a part from elsewhere enters with `register`. A module holds, for its role, plain scalar
-functions (floats in, float out, `c` the float64 array of `Part.packed`), written so that numba compiles them;
-they call nothing but `math`:
+registers its part; a part defined elsewhere is added with `register`. A module holds, for its role, plain
+scalar functions (floats in, float out, `c` the float64 array of `Part.packed`), written so that numba
+compiles them; they call nothing but `math`:
 
 ========  ===================================================================================================
 role      functions
@@ -21,24 +21,25 @@ damping   ``damping_force(c, v)``
 ========  ===================================================================================================
 
 ============  ===============================================================================================
-argument      what it is
+argument      meaning
 ============  ===============================================================================================
 ``c``         packed constants, a float64 array, in the order that the module states
 ``x``, ``v``  displacement, m, and velocity, m/s
 ``current``   current of the coil, A
-``linkage``   flux linkage of the coil, Wb, of which ``inductance``, H, times the current is not the magnet's
+``linkage``   flux linkage of the coil, Wb, including that of a constant series ``inductance``, H
 ``peak``      displacement of the latest local maximum inside this contact of the pack, m
-``q``         what ``pack_memory`` returned of it
+``q``         result of ``pack_memory`` for this peak
 ``w``         sqrt(b - x), root of the compression of the backstop, m^0.5
 ``v_in``      velocity before an impact, m/s, negative
 ============  ===============================================================================================
 
-Forces are in N, positive toward the paper. Minus the slope of an energy, J, is the force, of the magnet at
+Forces are in N, positive toward the paper. The force is minus the slope of the energy, J; for the magnet, at
 zero current. Force and flux linkage of a magnet are slopes of one coenergy: ``magnet_emf`` is the slope of
 the linkage along x and that of the force along the current, ``magnet_inductance`` the slope of the linkage
-along the current, and ``magnet_current`` its inverse. What a module leaves out comes from
-`printhammer.parts.absent`, the part that is not there. A ``..._switch`` function changes sign where a law has
-a kink inside a contact (an option that forbids a surface to pull), so that an integrator can locate it.
+along the current, and ``magnet_current`` its inverse. Functions that a module omits are taken from
+`printhammer.parts.absent`, the absent part. A ``..._switch`` function changes sign where a law has a kink
+inside a contact (such as the force cut-off of a surface that may not pull), so that an integrator can locate
+the kink.
 """
 
 from importlib import import_module

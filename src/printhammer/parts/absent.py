@@ -1,6 +1,6 @@
 """Absent part: no force, no energy, no memory.
 
-These functions also replace those that the module of a part omits.
+These functions also stand in for functions that the module of a part omits.
 """
 
 from __future__ import annotations
@@ -12,90 +12,90 @@ RIGID = False
 
 
 def magnet_force(c: Any, x: float, current: float) -> float:
-    """Return the force of no magnet, 0 N."""
+    """Return 0 N, the magnetic force: the hammer has no magnet."""
     return 0.0
 
 
 def magnet_energy(c: Any, x: float) -> float:
-    """Return the potential energy of no magnet, 0 J."""
+    """Return 0 J, the magnetic energy: the hammer has no magnet."""
     return 0.0
 
 
 def magnet_linkage(c: Any, x: float, current: float) -> float:
-    """Return the flux linkage of no magnet, 0 Wb."""
+    """Return 0 Wb, the flux linkage of the magnet: the hammer has no magnet."""
     return 0.0
 
 
 def magnet_emf(c: Any, x: float, current: float) -> float:
-    """Return the slope of the flux linkage of no magnet with displacement, 0 Wb/m."""
+    """Return 0 Wb/m, the derivative of the flux linkage with respect to displacement: no magnet."""
     return 0.0
 
 
 def magnet_inductance(c: Any, x: float, current: float) -> float:
-    """Return the slope of the flux linkage of no magnet with current, 0 H."""
+    """Return 0 H, the derivative of the magnet's flux linkage with respect to current: no magnet."""
     return 0.0
 
 
 def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float:
-    """Return the current of a coil without a magnet, linkage / inductance in A."""
+    """Return the current of a coil without a magnet, linkage / inductance, A."""
     return linkage / inductance
 
 
 def spring_force(c: Any, x: float) -> float:
-    """Return the force of no spring, 0 N."""
+    """Return 0 N, the spring force: the hammer has no spring."""
     return 0.0
 
 
 def spring_energy(c: Any, x: float) -> float:
-    """Return the potential energy of no spring, 0 J."""
+    """Return 0 J, the spring energy: the hammer has no spring."""
     return 0.0
 
 
 def pack_loading(c: Any, x: float, v: float) -> float:
-    """Return the force of no pack, 0 N."""
+    """Return 0 N, the loading force: the hammer has no pack."""
     return 0.0
 
 
 def pack_memory(c: Any, peak: float) -> float:
-    """Return the memory of a pack without memory, 0."""
+    """Return 0: a pack without memory stores no state at a local maximum."""
     return 0.0
 
 
 def pack_unloading(c: Any, x: float, v: float, q: float) -> float:
-    """Return the force of no pack, 0 N."""
+    """Return 0 N, the unloading force: the hammer has no pack."""
     return 0.0
 
 
 def pack_switch(c: Any, x: float, v: float) -> float:
-    """Return 1: the law has no kink inside a contact."""
+    """Return 1, without a sign change: the pack law has no kink inside a contact."""
     return 1.0
 
 
 def damping_force(c: Any, v: float) -> float:
-    """Return the force of no damping, 0 N."""
+    """Return 0 N, the damping force: the hammer has no damping."""
     return 0.0
 
 
 def backstop_elastic(c: Any, w: float) -> float:
-    """Return the elastic force of no backstop, 0 N."""
+    """Return 0 N, the elastic force: the hammer has no backstop."""
     return 0.0
 
 
 def backstop_viscous(c: Any, w: float, v: float) -> float:
-    """Return the viscoelastic force of no backstop, 0 N."""
+    """Return 0 N, the viscous force of the backstop: the hammer has no backstop."""
     return 0.0
 
 
 def backstop_energy(c: Any, w: float) -> float:
-    """Return the elastic energy of no backstop, 0 J."""
+    """Return 0 J, the elastic energy: the hammer has no backstop."""
     return 0.0
 
 
 def backstop_switch(c: Any, w: float, v: float) -> float:
-    """Return 1: the law has no kink inside a contact."""
+    """Return 1, without a sign change: the backstop law has no kink inside a contact."""
     return 1.0
 
 
 def backstop_rebound(c: Any, v_in: float) -> float:
-    """Return the rebound velocity of a perfectly elastic surface, -v_in in m/s."""
+    """Return the rebound velocity of a perfectly elastic surface, -v_in, m/s."""
     return -v_in

@@ -1,8 +1,8 @@
 """Base classes of parts: a frozen set of SI constants, a law, and an entry in the registry.
 
-A part is one file. It holds the law as plain scalar functions of the module (see `printhammer.parts`), and a
-`Part` subclass with the constants, decorated with `register`. The kernel compiles the functions and passes
-them the floats of `packed` as one float64 array `c`.
+Each part is one file, which holds the law as plain scalar functions of the module (see `printhammer.parts`)
+and a `Part` subclass with the constants, decorated with `register`. The kernel compiles the functions and
+passes them the floats of `packed` as one float64 array `c`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ ROLES: tuple[str, ...] = ("magnet", "coil", "spring", "pack", "backstop", "dampi
 class Part(BaseModel):
     """Replaceable part of a hammer: constants in SI, and the module with its law.
 
-    Its `role` is one of `ROLES`, `law` the name of the law in hammer files.
+    The class attribute `role` is one of `ROLES`, and `law` is the name of the law in hammer files.
 
     Raises
     ------
@@ -52,12 +52,12 @@ class Part(BaseModel):
     def packed(self, origin: float) -> tuple[float, ...]:
         """Return the constants, SI, that the law functions read from `c`, in the order stated by the module.
 
-        The origin is the position of the backstop, b of equation (4), or 0 without a backstop; m.
+        `origin` is the position of the backstop, b of equation (4), or 0 without a backstop, m.
         """
         raise NotImplementedError
 
     def content(self) -> Mapping[str, Any]:
-        """Return the numbers read from a file that belong to the identity of the part."""
+        """Return the numbers read from a further file, such as a table, that identify the part."""
         return {}
 
     @property
@@ -67,13 +67,13 @@ class Part(BaseModel):
 
 
 class MagnetPart(Part):
-    """A magnet: `magnet_force(c, x, current)` and `magnet_energy(c, x)`."""
+    """Base class of magnets, with the law `magnet_force(c, x, current)` and `magnet_energy(c, x)`."""
 
     role: ClassVar[str] = "magnet"
 
     @property
     def domain(self) -> tuple[float, float]:
-        """Range of displacements of the law, `(x_min, x_max)` in m."""
+        """Range of displacements in which the law is valid, `(x_min, x_max)`, m."""
         return (-math.inf, math.inf)
 
     @property
@@ -85,22 +85,22 @@ class MagnetPart(Part):
 class CoilPart(Part):
     """Coil circuit of the magnet, with the law of `printhammer.kernel.model.circuit`.
 
-    Its constants are in the order of the kernel's parameter array, see `printhammer.kernel.model.layout`.
+    The constants are in the order of the kernel's parameter array, see `printhammer.kernel.model.layout`.
     """
 
     role: ClassVar[str] = "coil"
 
 
 class SpringPart(Part):
-    """A spring: `spring_force(c, x)` and `spring_energy(c, x)`."""
+    """Base class of springs, with the law `spring_force(c, x)` and `spring_energy(c, x)`."""
 
     role: ClassVar[str] = "spring"
 
 
 class PackPart(Part):
-    """Ribbon and paper on the platen: `pack_loading`, `pack_memory`, `pack_unloading` and `MEMORY`.
+    """Base class of ribbon and paper packs: `pack_loading`, `pack_memory`, `pack_unloading` and `MEMORY`.
 
-    A subclass has the constant `front`, the displacement of first touch in m.
+    A subclass has the constant `front`, the displacement at which the armature first touches the pack, m.
     """
 
     role: ClassVar[str] = "pack"
@@ -109,9 +109,10 @@ class PackPart(Part):
 
 
 class BackstopPart(Part):
-    """A backstop: `RIGID` and `backstop_rebound`, or `backstop_elastic`, `_viscous` and `_energy`.
+    """Base class of backstops: `RIGID` and `backstop_rebound`, or `backstop_elastic`, `_viscous`, `_energy`.
 
-    A subclass has the constant `position`, the displacement of first touch in m.
+    A subclass has the constant `position`, the displacement at which the armature first touches the backstop,
+    m.
     """
 
     role: ClassVar[str] = "backstop"
@@ -120,7 +121,7 @@ class BackstopPart(Part):
 
 
 class DampingPart(Part):
-    """Damping of the armature at every displacement: `damping_force(c, v)`, smooth in the velocity."""
+    """Base class of the armature's damping at every displacement: `damping_force(c, v)`, smooth in v."""
 
     role: ClassVar[str] = "damping"
 
@@ -131,12 +132,12 @@ _P = TypeVar("_P", bound=type[Part])
 
 
 def register(part: _P) -> _P:
-    """Register a part class under its role and law; a class decorator.
+    """Class decorator that registers a part class under its role and law.
 
     Raises
     ------
     ValueError
-        If the role is unknown or another class has taken the law's name.
+        If the role is unknown or another class has the same law name.
     """
     if part.role not in ROLES:
         known = ", ".join(ROLES)
@@ -150,5 +151,5 @@ def register(part: _P) -> _P:
 
 
 def laws(role: str) -> tuple[str, ...]:
-    """List the registered laws of a role, sorted."""
+    """List the names of the registered laws of a role, sorted."""
     return tuple(sorted(law for known, law in PARTS if known == role))

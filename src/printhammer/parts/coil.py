@@ -2,16 +2,16 @@
 
     d lambda / dt = u - R i,    lambda = lambda_m(x, i) + L i,    R = R20 (1 + 0.00393 (T - 20 degC))
 
-The flux linkage lambda_m is that of the magnet, of the same coenergy as its force; the voltage u is positive
-where it drives a positive current, and a moving armature induces -v d lambda / dx. With a shorted turn, of
-resistance Re and leakage Ls referred to the coil,
+The flux linkage lambda_m belongs to the magnet and follows from the same coenergy as the magnet's force; the
+voltage u is positive where it drives a positive current, and a moving armature induces -v d lambda / dx. With
+a shorted turn, of resistance Re and leakage Ls referred to the coil,
 
     lambda = lambda_1 + Ls i,    d lambda_1 / dt = -Re ie,    lambda_1 = lambda_m(x, i + ie) + L (i + ie).
 
 Source: H. H. Woodson and J. R. Melcher, *Electromechanical Dynamics* (1968), ch. 3; the temperature
 coefficient of copper, IEC 60028. Validity: currents that do not crowd in the wire. Weakness: one shorted turn
-stands for eddy currents that spread in the iron; the iron has no hysteresis. It has a circuit only where the
-drive is a voltage; a current is taken as it is.
+stands for eddy currents that spread in the iron; the iron has no hysteresis. The circuit is solved only if
+the drive is a voltage; a current drive is imposed directly.
 
 Packed constants: c = [resistance, inductance, turn_resistance, leakage, back_emf].
 """
@@ -29,12 +29,12 @@ COPPER: Final = 3.93e-3
 """Temperature coefficient of the resistance of copper at 20 degC, 1/K."""
 
 REFERENCE: Final = 20.0
-"""Temperature at which the resistance is stated, degC."""
+"""Temperature at which the resistance of the winding is stated, degC."""
 
 
 @register
 class Winding(CoilPart):
-    """Constants of the winding."""
+    """Constants of the winding: resistance, inductance, shorted turn and temperature."""
 
     law: ClassVar[str] = "winding"
 
@@ -62,10 +62,10 @@ class Winding(CoilPart):
 
     @property
     def warm_resistance(self) -> float:
-        """Resistance at the temperature of the winding, ohm; 0 if none is stated."""
+        """Resistance at the winding temperature, ohm; 0 if no resistance is stated."""
         return (self.resistance or 0.0) * (1.0 + COPPER * (self.temperature - REFERENCE))
 
     def packed(self, origin: float) -> tuple[float, ...]:
-        """Return the packed constants, with the resistance at the temperature of the winding."""
+        """Return the packed constants, with the resistance at the winding temperature."""
         turn, leakage = self.turn_resistance or 0.0, self.leakage or 0.0
         return (self.warm_resistance, self.inductance, turn, leakage, float(self.back_emf))

@@ -2,7 +2,7 @@
 
     Fv = -c v
 
-Source: the textbook oscillator; S. W. Shaw and P. J. Holmes, J. Sound Vib. 90 (1983) 129, have it in the
+Source: the textbook oscillator; S. W. Shaw and P. J. Holmes, J. Sound Vib. 90 (1983) 129, use it in the
 impact oscillator. Hendriks (1983) has no damping in flight. Validity: slow motion in a fluid, bearings with
 an oil film, eddy currents in a uniform field. Weakness: air at high speed resists with the square of the
 speed, dry bearings with a constant force.
@@ -19,7 +19,7 @@ from printhammer.support.constants import quantity
 
 
 def damping_force(c: Any, v: float) -> float:
-    """Return the force of the damping, N."""
+    """Return the damping force, N."""
     return float(-c[0] * v)
 
 
@@ -32,5 +32,5 @@ class ViscousDamping(DampingPart):
     coefficient: float = quantity("N s/m", "c", "viscous damping of the armature", ge=0)
 
     def packed(self, origin: float) -> tuple[float, ...]:
-        """Return (coefficient,)."""
+        """Return the packed constants (coefficient,)."""
         return (self.coefficient,)

@@ -1,4 +1,4 @@
-"""Signatures of the law functions: those of the absent part, by the prefix of the role."""
+"""Signatures of the law functions, taken from the functions of the absent part, by role."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _FORCES: Final = {
     "backstop": ("backstop_elastic", "backstop_rebound"),
     "damping": ("damping_force",),
 }
-"""Functions of each role, of which a complete law defines at least one."""
+"""Force functions of each role; a complete law defines at least one of them."""
 
 
 @cache
@@ -32,7 +32,7 @@ def check_functions(part: Any, *, complete: bool = False) -> None:
     ------
     InputError
         A function has other arguments, is not callable or prints, a force is missing, or the law is defined
-        at a prompt or in a cell of a notebook; the message names the module.
+        at an interactive prompt or in a notebook cell; the message names the module.
     """
     module = sys.modules.get(part.__module__)
     where = getattr(module, "__file__", None)

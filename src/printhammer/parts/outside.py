@@ -1,4 +1,4 @@
-"""Registration of further parts: from a Python file, or from entry points "printhammer.parts".
+"""Registration of additional parts: from a Python file, or from entry points "printhammer.parts".
 
 A file is imported under its own name, and its folder is added to the Python path, so that worker processes
 find the module as well.
@@ -19,7 +19,7 @@ from printhammer.parts.base import PARTS, Part
 from printhammer.parts.functions import check_functions
 
 GROUP: Final = "printhammer.parts"
-"""Entry points whose modules register parts."""
+"""Entry-point group of installed packages whose modules register parts."""
 
 
 def load_parts(path: str | Path) -> list[type[Part]]:
@@ -45,7 +45,7 @@ def load_parts(path: str | Path) -> list[type[Part]]:
     known = find_spec(name)
     if known is None or known.origin is None or Path(known.origin).resolve() != source:
         raise InputError(
-            f"{path}: a module of the name {name!r} is there already",
+            f"{path}: another module has the name {name!r} already",
             file=path,
             key="module",
             expected="another name",
@@ -67,7 +67,7 @@ def load_parts(path: str | Path) -> list[type[Part]]:
 
 @cache
 def load_installed() -> None:
-    """Import the parts of installed packages, once per process."""
+    """Import the parts that installed packages register, once per process."""
     for entry in entry_points(group=GROUP):
         try:
             entry.load()

@@ -1,4 +1,4 @@
-"""Constants of the Hertz backstop from measurable quantities: two bodies, and one rebound."""
+"""Constants of the Hertz backstop from measurable quantities: two bodies, and one restitution."""
 
 from __future__ import annotations
 

@@ -3,12 +3,12 @@
     F = k (delta^1.5 + (3/2) A delta^0.5 d(delta)/dt),    delta = b - x > 0
 
 Source: G. Kuwabara and K. Kono, Jpn. J. Appl. Phys. 26 (1987) 1230; N. V. Brilliantov, F. Spahn, J.-M.
-Hertzsch and T. Poeschel, Phys. Rev. E 53 (1996) 5382. A is the relaxation time of the material.
+Hertzsch and T. Poeschel, Phys. Rev. E 53 (1996) 5382. A is the relaxation time of the elastomer.
 Sensible values: the paper describes deformations of about 25 um at forces of a few pounds, that is k = 10 N /
 (25 um)^1.5 = 8e7 N/m^1.5; few rebounds, so A of the order of the contact time, 10 to 100 us.
 Validity: slow compared with the speed of sound in the elastomer, small strain. Weakness: near the end of a
-contact the law would pull for A v > (2/3) delta; `pull = false` (the default) cuts the force off at zero
-there.
+contact the force would be attractive for A v > (2/3) delta; `pull = false` (the default) cuts the force off
+at zero there.
 
 Packed constants: c = [k, 1.5 k A, 1 if it may pull else 0].
 """
@@ -51,7 +51,7 @@ def backstop_switch(c: Any, w: float, v: float) -> float:
 
 @register
 class ElastomerBackstop(BackstopPart):
-    """Constants of the viscoelastic Hertz contact."""
+    """Constants of the viscoelastic Hertz contact: stiffness k and relaxation time A."""
 
     law: ClassVar[str] = "elastomer"
 
@@ -61,5 +61,5 @@ class ElastomerBackstop(BackstopPart):
     pull: bool = False
 
     def packed(self, origin: float) -> tuple[float, ...]:
-        """Return (k, 1.5 k A, pull)."""
+        """Return the packed constants (k, 1.5 k A, pull)."""
         return (self.stiffness, 1.5 * self.stiffness * self.relaxation_time, 1.0 if self.pull else 0.0)

@@ -72,7 +72,9 @@ class HertzBackstop(BackstopPart):
     position: float = quantity("m", "b", "position of the backstop")
     stiffness: float | None = quantity("N/m^1.5", "k", "Hertz stiffness", gt=0, default=None)
     radius1: float | None = quantity("m", "R1", "radius of the armature's contact face", gt=0, default=None)
-    radius2: float | None = quantity("m", "R2", "radius of the backstop, a flat without", gt=0, default=None)
+    radius2: float | None = quantity(
+        "m", "R2", "radius of the backstop; a flat if omitted", gt=0, default=None
+    )
     youngs_modulus1: float | None = quantity(
         "Pa", "E1", "Young's modulus of the armature", gt=0, default=None
     )
@@ -88,7 +90,7 @@ class HertzBackstop(BackstopPart):
     damping: float | None = quantity("N s/m^2.5", "l", "damping of the backstop", ge=0, default=None)
     restitution: float | None = quantity("1", "e", "restitution of a free rebound", gt=0, le=1, default=None)
     restitution_speed: float | None = quantity(
-        "m/s", "v_e", "approach speed of that rebound", gt=0, default=None
+        "m/s", "v_e", "impact speed of the free rebound", gt=0, default=None
     )
     pull: bool = True
 
@@ -108,7 +110,7 @@ class HertzBackstop(BackstopPart):
 
     @property
     def k(self) -> float:
-        """Hertz stiffness of equation (6), N/m^1.5, as given or from the two bodies."""
+        """Hertz stiffness of equation (6), N/m^1.5, stated or computed from the two bodies."""
         if self.stiffness is not None:
             return self.stiffness
         r1, e1, e2 = self.radius1, self.youngs_modulus1, self.youngs_modulus2
@@ -119,7 +121,7 @@ class HertzBackstop(BackstopPart):
 
     @property
     def l(self) -> float:  # noqa: E743
-        """Damping of equation (7), N s/m^2.5, as given or from the restitution."""
+        """Damping of equation (7), N s/m^2.5, stated or computed from the restitution."""
         if self.damping is not None:
             return self.damping
         if self.restitution is None or self.restitution_speed is None:
@@ -127,5 +129,5 @@ class HertzBackstop(BackstopPart):
         return damping_from_restitution(self.k, self.restitution, self.restitution_speed)
 
     def packed(self, origin: float) -> tuple[float, ...]:
-        """Return (k, l, pull)."""
+        """Return the packed constants (k, l, pull)."""
         return (self.k, self.l, 1.0 if self.pull else 0.0)

@@ -3,8 +3,8 @@
     v_out = -e v_in
 
 Source: Newton's law of restitution, which the paper mentions as the usual way to describe hard backstops.
-Validity: a contact much shorter than everything else. Weakness: no contact time, no force; pressed against
-the stop, the armature comes to rest after infinitely many bounces in finite time.
+Validity: a contact much shorter than all other time scales. Weakness: no contact time, no force; pressed
+against the stop, the armature comes to rest after infinitely many bounces in finite time.
 
 Packed constants: c = [e].
 """
@@ -34,5 +34,5 @@ class RigidBackstop(BackstopPart):
     restitution: float = quantity("1", "e", "coefficient of restitution", ge=0, le=1)
 
     def packed(self, origin: float) -> tuple[float, ...]:
-        """Return (e,)."""
+        """Return the packed constants (e,)."""
         return (self.restitution,)

@@ -1,4 +1,4 @@
-"""Cell search in the knots of a packed table, for laws that are splines."""
+"""Binary search for the cell of a packed table, for laws that are splines."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 
 def cell_of(c: Any, first: int, knots: int, at: float) -> int:
-    """Return the index of the cell that holds `at`; the knots are c[first:first + knots]."""
+    """Return the index of the cell that contains `at`; the knots are c[first:first + knots]."""
     low = 0
     high = knots - 1
     while high - low > 1:

@@ -1,4 +1,4 @@
-"""Tables over displacement and current: validation, reading from CSV, bicubic spline, and the part."""
+"""Tables over displacement and current: validation, reading from CSV, bicubic spline, and base class."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
 
 UNITS: Final = {"force": "N", "linkage": "Wb"}
-"""SI units of the quantities of a table."""
+"""SI unit of each quantity that a table may hold."""
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Values of one quantity on a complete grid, SI."""
+    """Values of one quantity on a complete grid of displacements and currents, SI."""
 
     x: tuple[float, ...]
     """Displacements, ascending, m."""
     current: tuple[float, ...]
-    """Currents, ascending, 0 within their range, A."""
+    """Currents, ascending, with 0 A inside their range, A."""
     values: tuple[tuple[float, ...], ...]
     """`values[i][j]` at `x[i]` and `current[j]`."""
 
@@ -37,13 +37,13 @@ class Grid:
 def gather(rows: Iterable[tuple[float, float, float]], what: str, quantity: str) -> Grid:
     """Collect points in any order into a complete grid: displacement, m, current, A, and the quantity.
 
-    Messages begin with `what`.
+    Error messages begin with `what`.
 
     Raises
     ------
     InputError
         A point is not finite, repeated or missing, there are fewer than two displacements or currents, or 0 A
-        lies outside the currents.
+        lies outside the range of currents.
     """
     points: dict[tuple[float, float], float] = {}
     for x, current, value in rows:
@@ -109,7 +109,7 @@ def read_csv(path: Path, quantity: str) -> Grid:
 
 
 def bicubic(table: Grid) -> FloatArray:
-    """Return the bicubic spline of a table, coefficients by x cell, I cell, power of x, power of I.
+    """Return the bicubic spline of a table; coefficients by x cell, I cell, power of x, power of I.
 
     Cubic splines with not-a-knot ends along x, then along the current (with two or three points in a
     direction: the line or the parabola through them), so that values, slopes and curvatures are continuous;
@@ -135,10 +135,10 @@ def cell_at_zero(table: Grid) -> tuple[int, float]:
 
 
 class GridMagnet(MagnetPart):
-    """Magnet whose law is a spline through a table from a CSV file."""
+    """Base class of magnets whose law is a spline through a table from a CSV file."""
 
     quantity: ClassVar[str]
-    """Quantity of the table, a key of `UNITS`."""
+    """Quantity of the table: a key of `UNITS`, such as "force"."""
 
     file: str = Field(description="CSV file of the table, relative to the file that names it")
     _table: Grid = PrivateAttr()
@@ -160,13 +160,13 @@ class GridMagnet(MagnetPart):
 
     @classmethod
     def check(cls, table: Grid, where: str) -> None:
-        """Raise InputError for a table that the law cannot use; messages begin with `where`."""
+        """Raise InputError for a table that the law cannot use; error messages begin with `where`."""
 
     @classmethod
     def from_arrays(
         cls, x: Sequence[float], current: Sequence[float], values: Sequence[Sequence[float]], file: str = ""
     ) -> Self:
-        """Create the part from arrays.
+        """Create the magnet from arrays instead of a CSV file.
 
         Parameters
         ----------
@@ -175,7 +175,7 @@ class GridMagnet(MagnetPart):
         values : sequence of sequence of float
             Forces, N, or flux linkages, Wb, shape (len(x), len(current)).
         file : str, optional
-            File name, stored only.
+            Name of a CSV file, stored but not read.
         """
         what = f"{cls.quantity} table"
         if len(values) != len(x) or any(len(line) != len(current) for line in values):
@@ -196,7 +196,7 @@ class GridMagnet(MagnetPart):
 
     @property
     def table(self) -> Grid:
-        """The measured points."""
+        """Table of the measured points."""
         return self._table
 
     @property

@@ -8,10 +8,10 @@ currents. The same coenergy, W' = F0 x - 2 (Am - Bm I)^2 sqrt(x), links the flux
     lambda = dW'/dI = 4 Bm (Am - Bm I) sqrt(x),
 
 whose slope with the current is negative: a coil on it has a constant inductance above 4 Bm^2 sqrt(x).
-Validity: the measured range of x and I, which the paper does not print; give it as `range_min` and
-`range_max`.
+Validity: the measured range of x and I, which the paper does not print; state the range of x as `range_min`
+and `range_max`.
 Weakness: singular at x = 0, where the origin is arbitrary (the backstop sits at 0.002 in); the pull grows
-again once Bm I exceeds Am; no eddy currents, no back-EMF.
+again if Bm I exceeds Am; no eddy currents, no back-EMF.
 
 Packed constants: c = [F0, Am, Bm].
 """
@@ -47,30 +47,30 @@ def magnet_energy(c: Any, x: float) -> float:
 
 
 def magnet_linkage(c: Any, x: float, current: float) -> float:
-    """Return the flux linkage, Wb; NaN for x < 0."""
+    """Return the flux linkage 4 Bm (Am - Bm I) sqrt(x), Wb; NaN for x < 0."""
     if x < 0.0:
         return math.nan
     return float(4.0 * c[2] * (c[1] - c[2] * current) * math.sqrt(x))
 
 
 def magnet_emf(c: Any, x: float, current: float) -> float:
-    """Return the slope of the flux linkage with displacement, Wb/m; NaN for x <= 0."""
+    """Return the derivative of the flux linkage with respect to displacement, Wb/m; NaN for x <= 0."""
     if x <= 0.0:
         return math.nan
     return float(2.0 * c[2] * (c[1] - c[2] * current) / math.sqrt(x))
 
 
 def magnet_inductance(c: Any, x: float, current: float) -> float:
-    """Return the slope of the flux linkage with current, H; NaN for x < 0."""
+    """Return the derivative of the flux linkage with respect to current, H; NaN for x < 0."""
     if x < 0.0:
         return math.nan
     return float(-4.0 * c[2] * c[2] * math.sqrt(x))
 
 
 def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float:
-    """Return the current at which the flux linkage and a constant inductance make `linkage`, A.
+    """Return the current at which the magnet plus a constant series inductance reach a flux linkage, A.
 
-    NaN where the sum does not rise with the current.
+    NaN where the total linkage does not increase with the current.
     """
     if x < 0.0:
         return math.nan
@@ -83,7 +83,7 @@ def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float
 
 @register
 class InverseRootMagnet(MagnetPart):
-    """Constants of equation (3)."""
+    """Constants of equation (3): F0, Am and Bm."""
 
     law: ClassVar[str] = "inverse-root"
 
@@ -101,12 +101,12 @@ class InverseRootMagnet(MagnetPart):
 
     @property
     def domain(self) -> tuple[float, float]:
-        """Range of displacements of the law, `(x_min, x_max)` in m; open at 0."""
+        """Range of displacements in which the law is valid, `(x_min, x_max)`, m; open at 0."""
         return (
             0.0 if self.range_min is None else self.range_min,
             math.inf if self.range_max is None else self.range_max,
         )
 
     def packed(self, origin: float) -> tuple[float, ...]:
-        """Return (F0, Am, Bm)."""
+        """Return the packed constants (F0, Am, Bm)."""
         return (self.F0, self.Am, self.Bm)

@@ -2,18 +2,19 @@
 
     lambda = S(x, I),    Fm = integral of dS/dx from 0 A to I
 
-S is the bicubic spline through the table, as of the flux that a coil links at a held armature: the integral
-of u - R I after a voltage step. The force is what the linkage asks for (one coenergy); what it lacks is a
-force without current.
+S is the bicubic spline through the table. The flux linkage of a coil is measured with the armature held, as
+the integral of u - R I after a voltage step. The force follows from the linkage (same coenergy), so there is
+no force without current.
 
     [magnet]
     law = "linkage-table"
     file = "linkages.csv"
 
-Source: the measurement or field computation named in the file, a CSV with one line a point and units in its
-heading (`displacement [mm],current [A],linkage [mWb]`), a complete grid in any order, 0 A within its
-currents. Validity: the displacements and currents of the table; outside it the functions return NaN, which a
-run reports as the range left. A linkage that does not rise with the current is refused: no coenergy has it.
+Source: the measurement or field computation named in the file, a CSV file with one point per line and units
+in the heading (`displacement [mm],current [A],linkage [mWb]`), a complete grid in any order, with 0 A inside
+the range of currents. Validity: the displacements and currents of the table; outside it the functions return
+NaN, which a run reports as the range left. A linkage that does not increase with the current is rejected,
+because it contradicts any coenergy.
 Weakness: the force is the slope of a spline through measured points and follows their noise; no hysteresis.
 
 Packed constants: c = [nx, ni, x[nx], current[ni], coefficients[nx - 1][ni - 1][4][4], force[nx - 1][ni -
@@ -39,7 +40,7 @@ def _inside(c: Any, x: float, current: float) -> bool:
 
 
 def _along_current(c: Any, x: float, j: int) -> tuple[float, float, float, float]:
-    """Return the linkage at x in a current cell, as a polynomial: coefficients of powers 0 to 3."""
+    """Return the linkage at x within a current cell as a polynomial in I: coefficients of powers 0 to 3."""
     nx = int(c[0])
     i = cell_of(c, 2, nx, x)
     dx = x - c[2 + i]
@@ -53,7 +54,7 @@ def _along_current(c: Any, x: float, j: int) -> tuple[float, float, float, float
 
 
 def _slope_along_current(c: Any, x: float, j: int) -> tuple[float, float, float, float]:
-    """Return the slope of the linkage along x in a current cell, as coefficients of powers 0 to 3."""
+    """Return d(linkage)/dx within a current cell as a polynomial in I: coefficients of powers 0 to 3."""
     nx = int(c[0])
     i = cell_of(c, 2, nx, x)
     dx = x - c[2 + i]
@@ -67,7 +68,7 @@ def _slope_along_current(c: Any, x: float, j: int) -> tuple[float, float, float,
 
 
 def magnet_force(c: Any, x: float, current: float) -> float:
-    """Return the force that follows from the linkage, N, 0 without current; NaN outside the table."""
+    """Return the magnetic force derived from the linkage, N, 0 at zero current; NaN outside the table."""
     if not _inside(c, x, current):
         return math.nan
     nx = int(c[0])
@@ -84,12 +85,12 @@ def magnet_force(c: Any, x: float, current: float) -> float:
 
 
 def magnet_energy(c: Any, x: float) -> float:
-    """Return 0 J, the energy without current; NaN outside the table."""
+    """Return 0 J, since there is no force at zero current; NaN outside the table."""
     return 0.0 if c[2] <= x <= c[1 + int(c[0])] else math.nan
 
 
 def magnet_linkage(c: Any, x: float, current: float) -> float:
-    """Return the linkage of the table, Wb; NaN outside it."""
+    """Return the flux linkage interpolated in the table, Wb; NaN outside the table."""
     if not _inside(c, x, current):
         return math.nan
     nx = int(c[0])
@@ -100,7 +101,7 @@ def magnet_linkage(c: Any, x: float, current: float) -> float:
 
 
 def magnet_emf(c: Any, x: float, current: float) -> float:
-    """Return the slope of the linkage along x, Wb/m; NaN outside the table."""
+    """Return the derivative of the linkage with respect to x, Wb/m; NaN outside the table."""
     if not _inside(c, x, current):
         return math.nan
     nx = int(c[0])
@@ -111,7 +112,7 @@ def magnet_emf(c: Any, x: float, current: float) -> float:
 
 
 def magnet_inductance(c: Any, x: float, current: float) -> float:
-    """Return the differential inductance, H; NaN outside the table."""
+    """Return the differential inductance d(linkage)/dI, H; NaN outside the table."""
     if not _inside(c, x, current):
         return math.nan
     nx = int(c[0])
@@ -122,9 +123,9 @@ def magnet_inductance(c: Any, x: float, current: float) -> float:
 
 
 def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float:
-    """Return the current of a linkage with a constant inductance in series, A; NaN outside the table.
+    """Return the current for a flux linkage, with a constant inductance in series, A; NaN outside the table.
 
-    A current that rounding places beyond the table is clipped to its end.
+    A current beyond the table by a rounding error is clipped to the end of the table.
     """
     nx = int(c[0])
     ni = int(c[1])
@@ -170,7 +171,7 @@ def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float
 
 @register
 class LinkageTableMagnet(GridMagnet):
-    """Linkage table read from a CSV file.
+    """Magnet given by a table of flux linkages from a CSV file.
 
     Raises
     ------
@@ -183,7 +184,7 @@ class LinkageTableMagnet(GridMagnet):
 
     @classmethod
     def check(cls, table: Grid, where: str) -> None:
-        """Raise InputError for a table, or a spline through it, that does not increase with the current."""
+        """Raise InputError unless the linkage and its spline increase with the current."""
         import numpy as np
 
         ending = "expected one that rises with the current, or there is no coenergy"
@@ -234,5 +235,5 @@ class LinkageTableMagnet(GridMagnet):
         return (float(len(x)), float(len(current)), *np.concatenate(parts).tolist())
 
     def packed(self, origin: float) -> tuple[float, ...]:
-        """Return the spline as the module states."""
+        """Return the packed table and spline, in the order stated by the module."""
         return self._packed

@@ -10,9 +10,9 @@ linkage come from the coenergy W' = k x i.
     constant = { value = 4.2, unit = "N/A", status = "stated", source = "data sheet of the voice coil" }
 
 Source: the force on a current across a field, F = B l i, and Faraday's law.
-Validity: the travel over which the field is constant. Weakness: k falls toward the ends of the travel, and
-the current's own field (reluctance force) is left out. A coil that a voltage drives needs an inductance:
-linkage alone does not tell the current.
+Validity: the range of travel over which the field is constant. Weakness: k falls toward the ends of the
+travel, and the field of the current itself (reluctance force) is neglected. A voltage-driven coil must have
+an inductance: the linkage alone does not determine the current.
 
 Packed constants: c = [k].
 """
@@ -32,17 +32,17 @@ def magnet_force(c: Any, x: float, current: float) -> float:
 
 
 def magnet_energy(c: Any, x: float) -> float:
-    """Return 0 J, the energy without current."""
+    """Return 0 J: there is no magnetic force at zero current."""
     return 0.0
 
 
 def magnet_linkage(c: Any, x: float, current: float) -> float:
-    """Return the linkage k x of the permanent field, Wb."""
+    """Return the flux linkage k x of the permanent field, Wb."""
     return float(c[0] * x)
 
 
 def magnet_emf(c: Any, x: float, current: float) -> float:
-    """Return the back-EMF per speed, k, N/A."""
+    """Return the back-EMF divided by the speed, k, V s/m."""
     return float(c[0])
 
 
@@ -52,18 +52,18 @@ def magnet_inductance(c: Any, x: float, current: float) -> float:
 
 
 def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float:
-    """Return the current of a linkage, A; NaN for a coil without inductance."""
+    """Return the current for a flux linkage, A; NaN for a coil without inductance."""
     return float((linkage - c[0] * x) / inductance) if inductance > 0.0 else math.nan
 
 
 @register
 class MovingCoilMagnet(MagnetPart):
-    """Force constant of a moving coil."""
+    """Force constant k of a moving coil."""
 
     law: ClassVar[str] = "moving-coil"
 
     constant: float = quantity("N/A", "k", "force per current, and back-EMF per speed")
 
     def packed(self, origin: float) -> tuple[float, ...]:
-        """Return (k,)."""
+        """Return the packed constants (k,)."""
         return (self.constant,)

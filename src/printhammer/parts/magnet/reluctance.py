@@ -1,13 +1,13 @@
-"""Solenoid or pot magnet as a magnetic circuit: gap with fringes, core that saturates, leakage.
+"""Solenoid or pot magnet as a magnetic circuit: gap with fringing, core that saturates, leakage.
 
     N i = Phi / P(g) + Rc Phi / (1 - Phi / Phi_s),    P = mu0 [A / (g + g0) + (U / pi) ln(1 + 2 h / (g + g0))]
     lambda = N Phi + Ls (1 - g / gs) i,               g = closed_at - x, or x - closed_at
 
-The flux Phi of N turns crosses the gap g and, in series, the residual gap g0 and the core. Beside the pole
-face of area A runs the fringe of half annuli between flanks of perimeter U and height h. The core follows
-Froehlich and Kennelly: reluctance Rc at first, no more than the flux Phi_s. The leakage Ls links the coil but
-passes the core; it falls with the gap, as that of a plunger that leaves the coil, and ends at gs. Force,
-linkage and their slopes come from one coenergy, with the Phi that makes it largest:
+The flux Phi of N turns crosses the gap g and, in series, the residual gap g0 and the core. The fringing field
+beside the pole face of area A runs in half annuli between flanks of perimeter U and height h. The core
+follows Froehlich and Kennelly: reluctance Rc at small flux, saturation at the flux Phi_s. The leakage Ls
+links the coil but bypasses the core; it decreases with the gap, as for a plunger that leaves the coil, and
+vanishes at gs. Force, linkage and their slopes come from one coenergy, maximised over Phi:
 
     W' = N i Phi - Phi^2 / (2 P) + Rc Phi_s^2 [Phi / Phi_s + ln(1 - Phi / Phi_s)] + Ls (1 - g / gs) i^2 / 2
 
@@ -26,8 +26,8 @@ solved without cancellation.
 Source: H. C. Roters, Electromagnetic Devices (1941), chapters 5 (permeances) and 8 (plungers);
 A. E. Kennelly, Trans. AIEE 8 (1891) 485 (core).
 Validity: quasi-static flux, gaps above -g0 and below gs. Weakness: one core of one cross section; hysteresis,
-remanence, the low permeability of iron at small fields, and eddy currents are left out (for these the coil
-may have a shorted turn).
+remanence, the low permeability of iron at small fields, and eddy currents are neglected (a shorted turn of
+the coil can represent eddy currents).
 
 Packed constants: c = [dg/dx, closed_at, mu0 N^2 A, g0, mu0 N^2 U / pi, 2 h, Ls, Ls / gs, Rc / N^2,
 1 / (N Phi_s)].
@@ -48,7 +48,7 @@ MU0: Final = 4e-7 * math.pi
 
 
 def _gap_inductance(c: Any, x: float) -> float:
-    """Return N^2 P, H; NaN outside the range of the law."""
+    """Return N^2 P, the inductance of the gap, H; NaN outside the range of the law."""
     g = c[0] * (x - c[1])
     s = g + c[3]
     if not (s > 0.0 and c[6] - c[7] * g >= 0.0):
@@ -57,13 +57,13 @@ def _gap_inductance(c: Any, x: float) -> float:
 
 
 def _gap_slope(c: Any, x: float) -> float:
-    """Return N^2 dP/dg, H/m."""
+    """Return N^2 dP/dg, the derivative of the gap inductance with respect to the gap, H/m."""
     s = c[0] * (x - c[1]) + c[3]
     return float(-(c[2] / s + c[4] * c[5] / (s + c[5])) / s)
 
 
 def _unsaturated(p: float, q: float, y: float) -> float:
-    """Return the v in [0, 1] that solves p (1 - v) + q (1 - v) / v = y, for p > 0, q >= 0, y >= 0."""
+    """Solve p (1 - v) + q (1 - v) / v = y for v in [0, 1]; p > 0, q >= 0, y >= 0."""
     d = p - q - y
     root = math.sqrt(d * d + 4.0 * p * q)
     if d > 0.0:
@@ -72,7 +72,7 @@ def _unsaturated(p: float, q: float, y: float) -> float:
 
 
 def magnet_force(c: Any, x: float, current: float) -> float:
-    """Return the force, N; NaN outside the range of the law."""
+    """Return the magnetic force, N; NaN outside the range of the law."""
     length = _gap_inductance(c, x)
     if not length > 0.0:
         return math.nan
@@ -82,7 +82,7 @@ def magnet_force(c: Any, x: float, current: float) -> float:
 
 
 def magnet_energy(c: Any, x: float) -> float:
-    """Return 0 J, the energy without current; NaN outside the range of the law."""
+    """Return 0 J: there is no magnetic force at zero current; NaN outside the range of the law."""
     return 0.0 * _gap_inductance(c, x)
 
 
@@ -97,7 +97,7 @@ def magnet_linkage(c: Any, x: float, current: float) -> float:
 
 
 def magnet_emf(c: Any, x: float, current: float) -> float:
-    """Return the slope of the linkage along x, Wb/m; NaN outside the range of the law."""
+    """Return the derivative of the linkage with respect to x, Wb/m; NaN outside the range of the law."""
     length = _gap_inductance(c, x)
     if not length > 0.0:
         return math.nan
@@ -108,7 +108,7 @@ def magnet_emf(c: Any, x: float, current: float) -> float:
 
 
 def magnet_inductance(c: Any, x: float, current: float) -> float:
-    """Return the differential inductance, H; NaN outside the range of the law."""
+    """Return the differential inductance d(linkage)/dI, H; NaN outside the range of the law."""
     length = _gap_inductance(c, x)
     if not length > 0.0:
         return math.nan
@@ -118,9 +118,9 @@ def magnet_inductance(c: Any, x: float, current: float) -> float:
 
 
 def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float:
-    """Return the current of a linkage with a constant inductance in series, A.
+    """Return the current for a flux linkage, with a constant inductance in series, A.
 
-    NaN outside the range of the law, and without any leakage at the saturation flux and beyond.
+    NaN outside the range of the law, and, if there is no leakage, at or above the saturation flux.
     """
     length = _gap_inductance(c, x)
     if not length > 0.0:
@@ -143,16 +143,14 @@ class ReluctanceMagnet(MagnetPart):
     turns: float = quantity("1", "N", "turns of the coil", gt=0)
     pole_area: float = quantity("m^2", "A", "area of the pole face", gt=0)
     closed_at: float = quantity("m", "x_c", "displacement at which the gap is closed")
-    residual_gap: float = quantity("m", "g0", "air that stays in series with the gap", ge=0, default=0.0)
-    fringe_perimeter: float = quantity("m", "U", "perimeter of the pole that fringes", ge=0, default=0.0)
-    fringe_height: float = quantity("m", "h", "height of the flanks that fringe", ge=0, default=0.0)
+    residual_gap: float = quantity("m", "g0", "residual air gap in series with the gap", ge=0, default=0.0)
+    fringe_perimeter: float = quantity("m", "U", "perimeter of the fringing flanks", ge=0, default=0.0)
+    fringe_height: float = quantity("m", "h", "height of the fringing flanks", ge=0, default=0.0)
     core_reluctance: float = quantity("A/Wb", "Rc", "reluctance of the core at small flux", ge=0, default=0.0)
-    saturation_flux: float | None = quantity(
-        "Wb", "Phi_s", "flux that the core cannot exceed", gt=0, default=None
-    )
+    saturation_flux: float | None = quantity("Wb", "Phi_s", "saturation flux of the core", gt=0, default=None)
     leakage: float = quantity("H", "Ls", "leakage of the coil at the closed gap", ge=0, default=0.0)
-    leakage_reach: float | None = quantity("m", "gs", "gap at which the leakage ends", gt=0, default=None)
-    pull: Literal["paper", "backstop"] = Field("paper", description="toward what the magnet pulls")
+    leakage_reach: float | None = quantity("m", "gs", "gap at which the leakage vanishes", gt=0, default=None)
+    pull: Literal["paper", "backstop"] = Field("paper", description="surface toward which the magnet pulls")
 
     @model_validator(mode="after")
     def _constants_belong_together(self) -> ReluctanceMagnet:
@@ -166,7 +164,7 @@ class ReluctanceMagnet(MagnetPart):
 
     @property
     def domain(self) -> tuple[float, float]:
-        """Range of displacements of the law, m; open where the gap is -g0."""
+        """Range of displacements in which the law is valid, m; open where the gap is -g0."""
         reach = math.inf if self.leakage_reach is None else self.leakage_reach
         if self.pull == "paper":
             return (self.closed_at - reach, self.closed_at + self.residual_gap)

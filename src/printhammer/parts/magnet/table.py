@@ -2,19 +2,20 @@
 
     Fm = S(x, I),    lambda = integral of dS/dI from the smallest displacement to x
 
-S is the bicubic spline through the table. The linkage is what the force asks for (one coenergy); what it
-lacks is its part at the smallest displacement, taken as the inductance of the coil there, a constant.
+S is the bicubic spline through the table. The linkage follows from the force (same coenergy), except for the
+linkage at the smallest displacement, which the constant inductance of the coil represents.
 
     [magnet]
     law = "table"
     file = "forces.csv"
 
 Source: the measurement named in the file; equation (3) of the paper is one fit to such a table. The file is a
-CSV with one line a point and units in its heading (`displacement [mm],current [A],force [N]`), a complete
-grid in any order, 0 A within its currents. Validity: the displacements and currents of the table. Outside it
-the functions return NaN rather than extrapolate, which a run reports as the range left. Weakness: a spline
-through measured points also follows their noise, and its third derivative jumps between cells; the linkage
-follows the noise of its slope along the current.
+CSV file with one point per line and units in the heading (`displacement [mm],current [A],force [N]`), a
+complete grid in any order, with 0 A inside the range of currents. Validity: the displacements and currents of
+the table. Outside the table the functions return NaN rather than extrapolate, which a run reports as the
+range left.
+Weakness: a spline through measured points also follows their noise, and its third derivative jumps between
+cells; the linkage follows the noise of its slope along the current.
 
 Packed constants: c = [nx, ni, x[nx], current[ni], coefficients[nx - 1][ni - 1][4][4], energy[nx - 1][5],
 linkage[nx - 1][ni - 1][3]]; within a cell F = sum over p, q of coefficients[p][q] (x - x[i])^p (I -
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
 
 
 def magnet_force(c: Any, x: float, current: float) -> float:
-    """Return the force of the table, N; NaN outside it."""
+    """Return the magnetic force interpolated in the table, N; NaN outside the table."""
     nx = int(c[0])
     ni = int(c[1])
     if not (c[2] <= x <= c[1 + nx] and c[2 + nx] <= current <= c[1 + nx + ni]):
@@ -56,7 +57,7 @@ def magnet_force(c: Any, x: float, current: float) -> float:
 def magnet_energy(c: Any, x: float) -> float:
     """Return the potential energy at zero current, J; NaN outside the table.
 
-    It is zero at the smallest displacement of the table.
+    The energy is zero at the smallest displacement of the table.
     """
     nx = int(c[0])
     ni = int(c[1])
@@ -69,7 +70,7 @@ def magnet_energy(c: Any, x: float) -> float:
 
 
 def _linkage(c: Any, x: float, j: int) -> tuple[float, float, float]:
-    """Return the linkage at x in a current cell, as coefficients of powers 0 to 2."""
+    """Return the linkage at x within a current cell as a polynomial in I: coefficients of powers 0 to 2."""
     nx = int(c[0])
     ni = int(c[1])
     i = cell_of(c, 2, nx, x)
@@ -88,7 +89,7 @@ def _linkage(c: Any, x: float, j: int) -> tuple[float, float, float]:
 
 
 def magnet_linkage(c: Any, x: float, current: float) -> float:
-    """Return the flux linkage, Wb, without its part at the smallest displacement; NaN outside the table."""
+    """Return the flux linkage relative to the smallest displacement, Wb; NaN outside the table."""
     nx = int(c[0])
     ni = int(c[1])
     if not (c[2] <= x <= c[1 + nx] and c[2 + nx] <= current <= c[1 + nx + ni]):
@@ -100,7 +101,7 @@ def magnet_linkage(c: Any, x: float, current: float) -> float:
 
 
 def magnet_emf(c: Any, x: float, current: float) -> float:
-    """Return the slope of the force along the current, N/A, equal to that of the linkage along x."""
+    """Return the derivative of the force, dF/dI, N/A, which equals d(linkage)/dx; NaN outside the table."""
     nx = int(c[0])
     ni = int(c[1])
     if not (c[2] <= x <= c[1 + nx] and c[2 + nx] <= current <= c[1 + nx + ni]):
@@ -118,7 +119,7 @@ def magnet_emf(c: Any, x: float, current: float) -> float:
 
 
 def magnet_inductance(c: Any, x: float, current: float) -> float:
-    """Return the differential inductance relative to the smallest displacement, H; NaN outside."""
+    """Return the differential inductance relative to the smallest displacement, H; NaN outside the table."""
     nx = int(c[0])
     ni = int(c[1])
     if not (c[2] <= x <= c[1 + nx] and c[2 + nx] <= current <= c[1 + nx + ni]):
@@ -129,9 +130,9 @@ def magnet_inductance(c: Any, x: float, current: float) -> float:
 
 
 def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float:
-    """Return the current of a linkage with a constant inductance in series, A; NaN outside the table.
+    """Return the current for a flux linkage, with a constant inductance in series, A; NaN outside the table.
 
-    A current that rounding places beyond the table is clipped to its end.
+    A current beyond the table by a rounding error is clipped to the end of the table.
     """
     nx = int(c[0])
     ni = int(c[1])
@@ -162,7 +163,7 @@ def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float
 
 @register
 class TableMagnet(GridMagnet):
-    """Force table read from a CSV file."""
+    """Magnet given by a table of forces from a CSV file."""
 
     law: ClassVar[str] = "table"
     quantity: ClassVar[str] = "force"
@@ -172,12 +173,12 @@ class TableMagnet(GridMagnet):
         return _packed_spline(self._table)
 
     def packed(self, origin: float) -> tuple[float, ...]:
-        """Return the spline as the module states."""
+        """Return the packed table and splines, in the order stated by the module."""
         return self._packed
 
 
 def _packed_spline(table: Grid) -> tuple[float, ...]:
-    """Return the spline of the forces and its integrals along x: of the force, and of its slope along I."""
+    """Return the force spline and its integrals along x: of the force, and of the derivative along I."""
     import numpy as np
 
     x, current = np.array(table.x), np.array(table.current)

@@ -3,9 +3,9 @@
     Fp = -(K (x - xp) + C v)      for x > xp
 
 Source: the Kelvin-Voigt solid; the contact of the textbook impact oscillator.
-Validity: small indentations of a pack that recovers fully. Weakness: the dashpot acts at once at first touch,
-so the force jumps there, and near the end of a contact it would pull; `pull = false` (the default) cuts the
-force off at zero.
+Validity: small indentations of a pack that recovers fully. Weakness: the dashpot acts from first touch, so
+the force jumps there, and near the end of a contact the force would be attractive; `pull = false` (the
+default) cuts the force off at zero.
 
 Packed constants: c = [K, C, xp, 1 if it may pull else 0].
 """
@@ -43,7 +43,7 @@ def pack_unloading(c: Any, x: float, v: float, q: float) -> float:
 
 
 def pack_switch(c: Any, x: float, v: float) -> float:
-    """Return the push, N, whose sign changes where the force is cut off; 1 if the pack may pull."""
+    """Return the contact force, N, whose sign changes where the force is cut off; 1 if the pack may pull."""
     if c[3] != 0.0:
         return 1.0
     return float(c[0] * (x - c[2]) + c[1] * v)
@@ -61,5 +61,5 @@ class DashpotPack(PackPart):
     pull: bool = False
 
     def packed(self, origin: float) -> tuple[float, ...]:
-        """Return (K, C, xp, pull)."""
+        """Return the packed constants (K, C, xp, pull)."""
         return (self.stiffness, self.damping, self.front, 1.0 if self.pull else 0.0)

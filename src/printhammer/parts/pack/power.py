@@ -6,7 +6,7 @@
 Source: F. Hendriks, IBM J. Res. Develop. 27 (1983), equation (5), after Wang and Hall. The printed x_max/d is
 read as rmax = (x_max - xp)/d, so that both branches meet at the turning point (11 - 8.3 = 2.7).
 Validity: paper that has not been indented before, no mechanical failure; no humidity, no plastic memory. Each
-contact meets fresh paper; a new local maximum inside a contact sets rmax anew. Reloading inside a contact
+contact meets fresh paper; a new local maximum inside a contact resets rmax. Reloading inside a contact
 follows the loading branch, as printed, or the unloading curve up to rmax, as a measured pack shows
 (`reloading`).
 Weakness: as printed, the force jumps where reloading begins; the pack never pulls and keeps no permanent set.
@@ -36,7 +36,7 @@ def pack_loading(c: Any, x: float, v: float) -> float:
 def pack_memory(c: Any, peak: float) -> float:
     """Return q = S rmax^-8.3 of a local maximum, N, which the unloading branch needs.
 
-    It is 0 for an indentation below 1e-30 d, whose force would be below 1e-81 S.
+    The result is 0 for an indentation below 1e-30 d, whose force would be below 1e-81 S.
     """
     r = (peak - c[1]) * c[2]
     if r <= 1e-30:
@@ -56,7 +56,7 @@ def pack_unloading(c: Any, x: float, v: float, q: float) -> float:
 
 @register
 class PowerPack(PackPart):
-    """Constants of equation (5)."""
+    """Constants of equation (5): stiffness S, front xp and thickness d."""
 
     law: ClassVar[str] = "power"
 
@@ -66,5 +66,5 @@ class PowerPack(PackPart):
     reloading: Literal["loading-branch", "unloading-curve"] = "loading-branch"
 
     def packed(self, origin: float) -> tuple[float, ...]:
-        """Return (S, xp, 1/d)."""
+        """Return the packed constants (S, xp, 1/d)."""
         return (self.stiffness, self.front, 1.0 / self.thickness)

@@ -2,10 +2,10 @@
 
     Fs = -K (x - x0) - D (x - x0)^3
 
-Source: G. Duffing, Erzwungene Schwingungen bei veränderlicher Eigenfrequenz (Vieweg, 1918); with a negative K
-and a positive D two wells, P. Holmes, Phil. Trans. R. Soc. Lond. A 292 (1979) 419. Validity: deflections for
-which higher terms are small. Weakness: symmetric about x0, neither mass nor damping of its own; with a
-negative D it pushes away without bound beyond sqrt(-K / D).
+Source: G. Duffing, Erzwungene Schwingungen bei veränderlicher Eigenfrequenz (Vieweg, 1918); for a negative K
+and a positive D (two wells), P. Holmes, Phil. Trans. R. Soc. Lond. A 292 (1979) 419. Validity: deflections
+for which higher terms are small. Weakness: symmetric about x0, neither mass nor damping of its own; with a
+negative D the force is repulsive without bound beyond sqrt(-K / D).
 
 Packed constants: c = [K, D, x0].
 """
@@ -19,13 +19,13 @@ from printhammer.support.constants import quantity
 
 
 def spring_force(c: Any, x: float) -> float:
-    """Return the force of the spring, N."""
+    """Return the spring force, N."""
     travel = x - c[2]
     return float(-(c[0] + c[1] * travel * travel) * travel)
 
 
 def spring_energy(c: Any, x: float) -> float:
-    """Return the potential energy of the spring, J, zero at the relaxed position."""
+    """Return the potential energy of the spring, J; zero at the relaxed position."""
     square = (x - c[2]) * (x - c[2])
     return float((0.5 * c[0] + 0.25 * c[1] * square) * square)
 
@@ -36,10 +36,10 @@ class CubicSpring(SpringPart):
 
     law: ClassVar[str] = "cubic"
 
-    stiffness: float = quantity("N/m", "K", "stiffness at the relaxed place, negative between two wells")
+    stiffness: float = quantity("N/m", "K", "stiffness at the relaxed position, negative between two wells")
     cubic: float = quantity("N/m^3", "D", "coefficient of the cubic term")
     center: float = quantity("m", "x0", "position at which the spring is relaxed")
 
     def packed(self, origin: float) -> tuple[float, ...]:
-        """Return (K, D, x0)."""
+        """Return the packed constants (K, D, x0)."""
         return (self.stiffness, self.cubic, self.center)

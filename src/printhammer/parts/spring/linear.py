@@ -3,10 +3,10 @@
     Fs = Bs - (Bs / As)(x - b)  =  preload - stiffness (x - b)
 
 Source: F. Hendriks, IBM J. Res. Develop. 27 (1983), equation (4), and Hooke's law; b is the position of the
-backstop (0 without one). Bs, the preload, is the force at the backstop, As the travel over which it falls to
-zero. Preload and stiffness may have any sign: a negative stiffness describes the pull of a magnet linearised
-about a point, or a buckled spring; a preload of zero with b = 0 is the spring of the textbook impact
-oscillator.
+backstop (0 without one). Bs, the preload, is the force at the backstop, and As the travel over which the
+force falls to zero. Preload and stiffness may have any sign: a negative stiffness describes the pull of a
+magnet linearised about a point, or a buckled spring; a preload of zero with b = 0 is the spring of the
+textbook impact oscillator.
 Validity: the linear range of the spring. Weakness: neither mass nor damping of its own.
 
 Packed constants: c = [preload, stiffness, b].
@@ -21,19 +21,19 @@ from printhammer.support.constants import quantity
 
 
 def spring_force(c: Any, x: float) -> float:
-    """Return the force of the spring, N."""
+    """Return the spring force, N."""
     return float(c[0] - c[1] * (x - c[2]))
 
 
 def spring_energy(c: Any, x: float) -> float:
-    """Return the potential energy of the spring, J, zero at the backstop."""
+    """Return the potential energy of the spring, J; zero at the backstop."""
     travel = x - c[2]
     return float((0.5 * c[1] * travel - c[0]) * travel)
 
 
 @register
 class LinearSpring(SpringPart):
-    """Constants of equation (4)."""
+    """Constants of equation (4): Bs and As."""
 
     law: ClassVar[str] = "linear"
 
@@ -41,13 +41,13 @@ class LinearSpring(SpringPart):
     As: float = quantity("m", "As", "travel from the backstop to zero spring force", gt=0)
 
     def packed(self, origin: float) -> tuple[float, ...]:
-        """Return (Bs, Bs / As, b)."""
+        """Return the packed constants (Bs, Bs / As, b)."""
         return (self.Bs, self.Bs / self.As, origin)
 
 
 @register
 class PreloadSpring(SpringPart):
-    """Preload and stiffness of a spring."""
+    """Preload and stiffness of a linear spring."""
 
     law: ClassVar[str] = "preload"
 
@@ -55,5 +55,5 @@ class PreloadSpring(SpringPart):
     stiffness: float = quantity("N/m", "K", "spring stiffness, negative for an unstable spring")
 
     def packed(self, origin: float) -> tuple[float, ...]:
-        """Return (preload, stiffness, b)."""
+        """Return the packed constants (preload, stiffness, b)."""
         return (self.preload, self.stiffness, origin)
