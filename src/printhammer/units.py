@@ -59,7 +59,7 @@ DIMENSIONS: dict[str, str] = {
 """Names of the dimensions that the program uses, by their SI unit; for messages."""
 
 _ZEROS = {"degF": 32, "fahrenheit": 32}
-"""Number in each unit at which the quantity is 0 in SI; 0 for units not listed."""
+"""Zero offset of a unit: number in the unit that corresponds to 0 in SI; 0 for units not listed."""
 
 _UNKNOWN = "the unit {!r} is not known: expected one such as 'us', 'lbf' or 'N s/m^2.5'"
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(.*)", re.DOTALL)

@@ -198,7 +198,7 @@ class Result:
         """Summarise the result; by default the range and meaning of each declared column.
 
         The terminal, `print` and the notebook show the summary. Classes override the method and write "dot";
-        what they return names the `strike` of the hammer.
+        the noun is then replaced by the `strike` of the hammer.
         """
         rows = []
         for name, note in self.COLUMNS.items():

@@ -15,11 +15,11 @@ from printhammer.errors import InputError
 F = TypeVar("F", bound=Callable[..., Any])
 
 _KINDS: Final = {
-    "Hammer": "a hammer, as load('hendriks-1983') gives one",
+    "Hammer": "a hammer, such as load('hendriks-1983')",
     "Regime": "a regime",
     "Drive": "a drive, such as PulseTrain(hammer.waveform, rate='1 kHz', pulses=9)",
     "Waveform": "a waveform",
-    "CompensationTable": "a compensation table, as tune or load_table gives one",
+    "CompensationTable": "a compensation table, such as a result of tune or load_table",
     "Branch": "a branch of orbits",
     "Orbit": "an orbit",
 }

@@ -113,9 +113,10 @@ def _print_messages(sentences: SimpleQueue[str | None]) -> Iterator[None]:
 def warm(job: Job, hammer: Hammer = opt.FIRED) -> Answer:
     """Compile the machine code of a hammer ahead of time, on two cores.
 
-    Hammers with the same laws share the code. It is stored beside the program, or in NUMBA_CACHE_DIR, which
-    may be copied to a machine with the same processor and versions, and may be read-only there. If the code
-    does not fit, the program says why and compiles again.
+    Hammers with the same laws share the code. The code is stored beside the program, or in the folder
+    NUMBA_CACHE_DIR, which may be copied to a machine with the same processor and versions, and may be
+    read-only there. If stored code does not fit the machine, the program states the reason and compiles
+    again.
     """
     from concurrent.futures import ProcessPoolExecutor, as_completed
     from multiprocessing import get_context
