@@ -172,6 +172,12 @@ def hammer_fingerprint(name: str) -> str:
     return ph.load(name).fingerprint
 
 
+@cache
+def open_loop_rate(hammer: ph.Hammer) -> float:
+    """Return the open-loop safe rate of a hammer, Hz, to whose multiples scripts measure drives."""
+    return float(ph.safe_rate(hammer).rate)
+
+
 def code_fingerprint(rooms: tuple[str, ...] | list[str]) -> str:
     """Return the code fingerprint of rooms, which are folders or modules."""
     found = sorted(statement for room in rooms for statement in _statements(room))
