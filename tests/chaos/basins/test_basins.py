@@ -1,6 +1,7 @@
 import dataclasses
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -153,6 +154,41 @@ def test_orbits_are_known_again_whatever_their_phase(hammer: "ph.Hammer") -> Non
     assert attractors.judge(columns_of(trains)).tolist() == [0, 0, 1, 0]
     assert attractors.found[0].states[0].tolist() == [1.0, 0.0]
     assert [attractor.period for attractor in attractors.found] == [3, 3]
+
+
+def slow_and_chaotic(begin: np.ndarray, firings: int, transient: int) -> Columns:
+    """Trains of the logistic map beside a coordinate that forgets its start in 2,000 firings."""
+    x, v, points = begin[:, 0].copy(), begin[:, 1].copy(), []
+    for firing in range(firings):
+        if firing >= transient:
+            points.append(np.stack([x, v], axis=1))
+        x, v = 3.9 * x * (1.0 - x), 0.9995 * v + 1e-5 * (x - 0.6)
+    columns = columns_of(np.stack(points, axis=1))
+    columns.last[:, :2] = np.stack([x, v], axis=1)
+    return columns
+
+
+def test_a_strange_attractor_that_is_approached_slowly_is_one(
+    hammer: "ph.Hammer", monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A thousand firings after its start each of twelve trains is still far from all others."""
+
+    def run(
+        regimes: list[Regime], states: np.ndarray, firings: int, transient: int, _effort: object
+    ) -> Columns:
+        return slow_and_chaotic(states, firings, transient)
+
+    positive = SimpleNamespace(ok=True, smooth=True, value=0.5, standard_error=0.01)
+    monkeypatch.setattr(attractors, "run_columns", run)
+    monkeypatch.setattr(attractors, "exponents_onward", lambda *_: [positive])
+    known = Attractors(Regime.of(hammer, period=1e-3), np.ones(4), 1e-9)
+    starts = np.column_stack([np.linspace(0.2, 0.3, 12), np.arange(1.0, 13.0)])
+    early = slow_and_chaotic(starts, 200, 100)
+    # Where one train has led to a known attractor, the others are waited for.
+    assert known.judge(early).tolist() == [0, 0] + 10 * [-1]
+    assert [each.name for each in known.found] == ["strange"]
+    assert (known.judge(slow_and_chaotic(early.last, 40_000, 39_900)) == 0).all()
+    assert len(known.found) == 1
 
 
 def test_the_entropy_of_one_colour_is_zero() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -24,7 +24,11 @@ CLOUD: Final = 2000
 """Number of points that represent a strange attractor."""
 
 SETTLING: Final = 1000
-"""Number of firings discarded before the points of a strange attractor, so that they lie on it."""
+"""Number of firings discarded before the points of a strange attractor; doubled until two successive sets of
+points agree."""
+
+LONGEST: Final = 16_000
+"""Largest number of discarded firings; a train that still drifts then is not followed further; arbitrary."""
 
 REACH: Final = 0.99
 """Quantile of the nearest-neighbour distances of a strange attractor's points that defines its reach."""
@@ -33,7 +37,7 @@ INSIDE: Final = 0.95
 """Fraction of a train's points that have to lie within reach of a strange attractor for a match."""
 
 ATTEMPTS: Final = 12
-"""Maximum number of aperiodic trains followed for 3000 firings in the search for strange attractors."""
+"""Maximum number of aperiodic trains followed in the search for strange attractors."""
 
 POLISHED: Final = 12
 """Maximum number of unsettled trains per batch whose orbits are located by Newton's method."""
@@ -54,6 +58,29 @@ class Attractor(Declared):
     standard_error: float = part("standard error of the exponent", default=math.nan)
 
 
+class Cloud(NamedTuple):
+    """Points of a strange attractor, and the distance within which further points lie on it."""
+
+    tree: cKDTree  # Of points (n, 2)
+    reach: float
+
+    @classmethod
+    def of(cls, points: FloatArray) -> Cloud:
+        """Build the cloud of successive points (n, 2); its reach is that of one half to the other."""
+        half = len(points) // 2
+        apart, _ = cKDTree(points[:half]).query(points[half:])
+        return cls(cKDTree(points), float(np.quantile(apart, REACH)))
+
+    def holds(self, points: FloatArray) -> BoolArray:
+        """Whether trains, shape (..., n, 2), lie on the attractor, shape (...)."""
+        apart, _ = self.tree.query(points, distance_upper_bound=self.reach)
+        return np.asarray(np.isfinite(apart).mean(axis=-1) >= INSIDE)
+
+    def equals(self, other: Cloud) -> bool:
+        """Whether each of two clouds lies on the other."""
+        return bool(self.holds(other.tree.data) and other.holds(self.tree.data))
+
+
 class Attractors:
     """Attractors found so far, in order of discovery.
 
@@ -64,14 +91,14 @@ class Attractors:
         self.regime, self.scales = regime, scales
         self.effort = Effort(tolerance, threads=1)
         self.found: list[Attractor] = []
-        self._trees: dict[int, tuple[cKDTree, float]] = {}
+        self._clouds: dict[int, Cloud] = {}
         self._attempts = 0
         self._noise: dict[int, float] = {}
 
     def at(self, tolerance: float) -> Attractors:
         """Return a copy of the known attractors for trains at another tolerance."""
         other = Attractors(self.regime, self.scales, tolerance)
-        other.found, other._trees, other._noise = list(self.found), dict(self._trees), dict(self._noise)
+        other.found, other._clouds, other._noise = list(self.found), dict(self._clouds), dict(self._noise)
         other._attempts = ATTEMPTS
         return other
 
@@ -145,55 +172,63 @@ class Attractors:
         """Match aperiodic trains to the strange attractors; identify new ones from the unmatched trains."""
         points = self._scaled(columns.x, columns.v)
         left = rows
-        for place in self._trees:
+        for place in self._clouds:
             left = self._within(points, left, place, places)
         while left.size and self._attempts < ATTEMPTS:
             self._attempts += 1
-            row = int(left[0])
+            row, known = int(left[0]), len(self.found)
             followed = self._follow(columns, row)
             left = left[1:]
             if followed is None:
                 continue
             places[row] = followed
-            # After a long transient to a periodic orbit the remaining trains are tested again.
-            if followed in self._trees:
+            if followed in self._clouds:
                 left = self._within(points, left, followed, places)
+                if followed < known:
+                    # The other trains may converge to it too: they are continued for a round first.
+                    break
 
     def _within(self, points: FloatArray, rows: IntArray, place: int, places: IntArray) -> IntArray:
         """Assign the trains whose points lie on a strange attractor; return the rows of the other trains."""
         if not rows.size:
             return rows
-        tree, reach = self._trees[place]
-        apart, _ = tree.query(points[rows].reshape(-1, 2), distance_upper_bound=reach)
-        share = np.isfinite(apart).reshape(len(rows), -1).mean(axis=1)
-        places[rows[share >= INSIDE]] = place
-        return np.asarray(rows[share < INSIDE])
+        lies = self._clouds[place].holds(points[rows])
+        places[rows[lies]] = place
+        return np.asarray(rows[~lies])
 
     def _follow(self, columns: Columns, row: int) -> int | None:
-        """Continue one train for 3000 firings; return the index of its attractor, None if undecided."""
-        begin = columns.last[row : row + 1]
-        if math.isnan(begin[0, 0]):
-            return None
-        longer = run_columns([self.regime], begin, SETTLING + CLOUD, SETTLING, self.effort)
-        if longer.status[0] != OK:
-            return None
-        cycles, _ = self._cycles(longer)
-        q = int(cycles[0])
-        if q:
-            points = self._scaled(longer.x, longer.v)
-            return int(
-                (self._periodic(points[:, -q:]) if shown(points, q)[0] else self._settling(points, q))[0]
-            )
+        """Continue one train to its attractor; return the index of the attractor, None if undecided.
+
+        The train is continued until its points lie on a known strange attractor, or until two successive sets
+        of points agree. Otherwise every train that converges slowly would define an attractor of its own.
+        """
+        begin, before, settling = columns.last[row : row + 1], None, SETTLING
+        while True:
+            if math.isnan(begin[0, 0]):
+                return None
+            longer = run_columns([self.regime], begin, settling + CLOUD, settling, self.effort)
+            if longer.status[0] != OK:
+                return None
+            cycles, _ = self._cycles(longer)
+            q, points = int(cycles[0]), self._scaled(longer.x, longer.v)
+            if q:
+                orbit = self._periodic(points[:, -q:]) if shown(points, q)[0] else self._settling(points, q)
+                return int(orbit[0])
+            cloud = Cloud.of(points[0])
+            late = points[0, CLOUD // 2 :]
+            for place, other in self._clouds.items():
+                if other.holds(late):
+                    return place
+            if settling >= LONGEST or (before is not None and cloud.equals(before)):
+                break
+            begin, before, settling = longer.last, cloud, 2 * settling
         x, v, branch, *_ = longer.last[0].tolist()
         if branch >= 0.0:
             return None
         (exponent,) = exponents_onward([(self.regime, (x, v))], CLOUD, self.effort)
         if not is_positive(exponent):
             return None
-        cloud = self._scaled(longer.x[0], longer.v[0])
-        half = CLOUD // 2
-        apart, _ = cKDTree(cloud[:half]).query(cloud[half:])
-        self._trees[len(self.found)] = (cKDTree(cloud), float(np.quantile(apart, REACH)))
+        self._clouds[len(self.found)] = cloud
         states = np.column_stack([longer.x[0], longer.v[0]])
         self.found.append(Attractor("strange", None, states, exponent.value, exponent.standard_error))
         return len(self.found) - 1
