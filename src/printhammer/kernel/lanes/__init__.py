@@ -1,1 +1,1 @@
-"""Ensembles of runs: vector code in lanes, and the scalar loop over members."""
+"""Kernels for ensembles of runs: vector lanes that step many members together, and a scalar loop."""

@@ -1,4 +1,4 @@
-"""Members of an ensemble as arrays: hammers, drives, starts and ends, and requested results."""
+"""Members of an ensemble as arrays: hammers, drives, initial states, end times and requested results."""
 
 from __future__ import annotations
 
@@ -6,31 +6,34 @@ from typing import Any, NamedTuple
 
 
 class Batch(NamedTuple):
-    """Inputs of M members.
+    """Inputs of an ensemble: hammers, drives, initial states and end times of M members.
 
     Attributes
     ----------
     hammer_of, waveform_of : int64 array, shape (M,)
-        Row of `hammers`, `controls` and `bounds`, and set of waveforms, of each member.
+        Row of `hammers`, `controls` and `bounds` for each member, and index of the waveform set for each
+        member.
     hammers, controls, bounds : float64 array, shape (H, any), (H, 4), (H, 4)
-        As in :class:`printhammer.kernel.single.carry.Setup`.
+        Parameter array, step-size control and bounds of each hammer, as in
+        :class:`printhammer.kernel.single.carry.Setup`.
     piece_starts, pieces
-        Concatenated pieces of all sets of waveforms, and the index of the first piece of each set.
+        Index of the first piece of each waveform set, and the concatenated pieces of all sets.
     rates : float64 array, shape (W, 3)
-        Rates of the two exponentials and angular frequency of the sine in the waveforms of each set; for
-        lanes.
+        Rates of the two exponentials [1/s] and angular frequency of the sine [rad/s] in the waveforms of
+        each set; used by lanes only.
     firing_starts, firings, begins
-        Concatenated firing times [s] and first pieces of all members, and the start index of each member;
-        pieces are counted within the member's set.
+        Start index of each member, and the concatenated firing times [s] and first pieces of all members.
+        The index of a first piece counts from the start of the member's waveform set.
     replace : bool
-        Whether a firing cuts off the pulses before it.
+        Whether a firing ends all earlier pulses.
     states : float64 array, shape (M, 8)
-        Time, displacement, velocity, mode (negative: as follows from the state), memory, currents in coil
-        and shorted turn [A] and voltage of the reservoir [V] (NaN for a full one) at the start.
+        Initial states: time [s], displacement [m], velocity [m/s], mode (negative: to be derived from the
+        state), memory [m], currents in coil and shorted turn [A], reservoir voltage [V] (NaN if
+        full).
     ends : float64 array, shape (M,)
-        Ends of the runs [s].
+        End times of the runs [s].
     max_steps : int
-        Largest number of steps of a member.
+        Maximum number of steps of each member.
     """
 
     hammer_of: Any
@@ -51,27 +54,28 @@ class Batch(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """Requested results of M members, and their arrays; NaN after an early end of a run.
+    """Output arrays of an ensemble of M members, with the requested times; NaN after an early end of a run.
 
     Attributes
     ----------
     strobe_starts, strobe_times
-        Concatenated ascending times [s] of all members, and the start index of each member.
+        Start index of each member, and the concatenated, ascending strobe times [s] of all members.
     grid : float64 array, shape (T,)
-        Times of the pictures, ascending [s]; may be empty.
+        Ascending output times of the displacement [s]; may be empty.
     want_dots : bool
         Whether to fill `dots`.
     status, reached, steps : array, shape (M,)
-        Status code (int64), time reached [s], number of steps (int64).
+        Status code (int64), time reached [s] and number of steps (int64) of each member.
     extra : int64 array, shape (M,)
-        Number of extra contacts.
+        Number of extra contacts of each member.
     dot_starts, dots
-        Concatenated rows of :mod:`printhammer.kernel.model.dots` of all members, and the start index of each
-        member: the firings of the member, then its extra contacts as far as there is room.
+        Start index of each member, and the concatenated rows of dot data of all members, see
+        :mod:`printhammer.kernel.model.dots`: a row for each firing, then extra contacts up to the
+        capacity.
     strobes : float64 array, shape (strobe times, 4), with a coil circuit (strobe times, 7)
-        See :mod:`printhammer.kernel.single.stretch`.
+        States at the strobe times, see :mod:`printhammer.kernel.single.stretch`.
     x : float32 array, shape (M, T)
-        Displacement [m].
+        Displacement [m] of each member at the times `grid`.
     """
 
     strobe_starts: Any

@@ -1,7 +1,7 @@
-"""Drive between two of its edges as one closed formula: cubic, two exponentials and a sine.
+"""Drive between two edges as one closed formula: the sum of a cubic, two exponentials and a sine.
 
-Exponentials of equal rate and sines of equal frequency are combined, so that the number of active pulses does
-not matter.
+Exponentials of equal rate and sines of equal frequency are combined, so that the cost of an evaluation does
+not depend on the number of active pulses.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @inlined
 def drive_value(t: float, drive: Any) -> float:
-    """Return the sum of all active pulses at time `t` [s]: amperes or newtons."""
+    """Evaluate the combined formula of all active pulses at time `t` [s]; return amperes or newtons."""
     s = t - drive[0]
     value = drive[1]
     if EXPONENTIALS > 0:
@@ -37,7 +37,7 @@ def drive_value(t: float, drive: Any) -> float:
 def add_up(t: float, live: Any, rates: Any, pool: Any, lane: int) -> None:
     """Combine the active pulses at time `t` [s] into one formula in the drive rows of a lane.
 
-    `rates` are the rates of the two exponentials and the angular frequency of the sine of the waveform.
+    `rates` holds the rates of the two exponentials [1/s] and the angular frequency of the sine [rad/s].
     """
     c0, c1, c2, c3 = 0.0, 0.0, 0.0, 0.0
     first, second, along, across = 0.0, 0.0, 0.0, 0.0

@@ -1,8 +1,9 @@
-"""Events of a member between two steps of its lane: switches, edges of the drive, samples.
+"""Events of a member between two steps of its lane: mode changes, edges of the drive, samples, strobes.
 
-Scalar code for one lane at a time. A member has a row of numbers `slot` besides its lane, for data that steps
-do not need. Rare events (a touch without velocity, rest, a range left, a reloading) remove the member from
-the lanes: :func:`printhammer.kernel.lanes.members.members` then runs it from its beginning.
+The functions are scalar code for one lane at a time. Data of a member that the steps do not need are stored
+in a row `slot` outside its lane. Rare events (a touch with zero velocity, a rest, a departure from the range,
+a reloading) remove the member from the lanes: :func:`printhammer.kernel.lanes.members.members` then repeats
+its run from the beginning.
 """
 
 from __future__ import annotations
@@ -32,31 +33,31 @@ if TYPE_CHECKING:
     from printhammer.kernel.single.stretch import deepen_dot, open_dot
 
 MODE_OF = (M.FREE, M.LOADING, M.UNLOADING, M.BACKSTOP)
-"""Mode of the members in each pool."""
+"""Mode of all members of a pool, indexed by pool."""
 
 STAYS = -1
 LEAVES = -2
-"""Replaces a pool: the member returns to the plain kernel."""
+"""Code returned in place of a pool: the member leaves the lanes, and the plain kernel repeats its run."""
 DONE = -3
 
 
 @inlined
 def place(lane: int) -> int:
-    """Return the index at which the rows of a lane begin in its pool."""
+    """Return the index of the first row of a lane in the array of its pool; rows follow at stride `BLOCK`."""
     return (lane // R.BLOCK) * R.BLOCK_SIZE + lane % R.BLOCK
 
 
 @compiled
 def copy_lane(source: Any, i: int, target: Any, j: int, rows: int) -> None:
-    """Copy the first rows of a lane at index `i` to another pool or index."""
+    """Copy the first `rows` rows of the lane at index `i` of one pool to index `j` of another pool."""
     for row in range(rows):
         target[row * R.BLOCK + j] = source[row * R.BLOCK + i]
 
 
 @compiled
 def quintic(part: float, h: float, x0: float, v0: float, a0: float, x1: float, v1: float, a1: float) -> float:
-    """Evaluate the quintic through displacements, velocities, accelerations at a fraction of a step."""
-    # Remainder relative to the cubic Taylor polynomial at the start.
+    """Evaluate the quintic Hermite interpolant of a step of length `h` at the fraction `part` of the step."""
+    # Remainders relative to the quadratic Taylor polynomial at the start of the step.
     b0 = h * v0
     c0 = 0.5 * h * h * a0
     d = x1 - (x0 + b0 + c0)
@@ -70,9 +71,9 @@ def quintic(part: float, h: float, x0: float, v0: float, a0: float, x1: float, v
 
 @compiled
 def sixth_term(pool: Any, i: int, which: int) -> float:
-    """Return the coefficient k of the correction k u^3 (u - 1)^3 of the quintic of the latest step.
+    """Return the coefficient k of a correction k u^3 (u - 1)^3 to the quintic interpolant of the latest step.
 
-    The correction makes the acceleration in the middle of the step, u = 1/2, agree with the force there.
+    The correction matches the acceleration at the middle of the step, u = 1/2, to the force there.
     """
     h = pool[R.LENGTH * R.BLOCK + i]
     x0, x1 = pool[R.OLD_X * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
@@ -84,27 +85,27 @@ def sixth_term(pool: Any, i: int, which: int) -> float:
     if HAS_DAMPING:
         v = 1.875 * (x1 - x0) / h - 0.4375 * (v0 + v1) + 0.03125 * h * (a1 - a0)
     a = lane_acceleration(pool, i, t, middle, v, MODE_OF[which], memory)
-    # The second derivative of the quintic in the middle, in the same unit.
+    # Second derivative of the quintic with respect to u at the middle of the step.
     bend = 1.5 * h * (v1 - v0) - 0.25 * h * h * (a0 + a1)
     return float((a * h * h - bend) / 0.375)
 
 
 @compiled
 def position_in_step(pool: Any, i: int, which: int, time: float, b: float, sixth: float, fine: bool) -> float:
-    """Return the displacement [m] at a time inside the step that a lane took last."""
+    """Return the displacement [m] at a time [s] inside the latest step of a lane, by interpolation."""
     x0, x1 = pool[R.OLD_X * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
     v0, v1 = pool[R.OLD_V * R.BLOCK + i], pool[R.NEW_V * R.BLOCK + i]
     a0, a1 = pool[R.OLD_A * R.BLOCK + i], pool[R.NEW_A * R.BLOCK + i]
     h = pool[R.LENGTH * R.BLOCK + i]
     if not time > pool[R.OLD_T * R.BLOCK + i]:
-        # A run may end where a step begins.
+        # The requested time may coincide with the start of the step.
         return float(b - x0 * x0 if which == R.CONTACT_POOL else x0)
     if which != R.CONTACT_POOL:
         u = (time - pool[R.OLD_T * R.BLOCK + i]) / h
         bump = u * (u - 1.0)
         return float(quintic(u, h, x0, v0, a0, x1, v1, a1) + sixth * bump * bump * bump)
     if not fine and x1 > 0.5 * x0 and x0 > 0.5 * x1:
-        # Away from the end of the contact the displacement is smooth in time as well.
+        # Away from the ends of a contact, the displacement is also a smooth function of time.
         t0 = pool[R.OLD_T * R.BLOCK + i]
         h = pool[R.NEW_T * R.BLOCK + i] - t0
         a0, a1 = 0.5 * a0 / x0, 0.5 * a1 / x1
@@ -116,14 +117,14 @@ def position_in_step(pool: Any, i: int, which: int, time: float, b: float, sixth
 
 @compiled
 def part_at(pool: Any, i: int, time: float) -> float:
-    """Return the fraction of its latest step in s at which a lane of the contact pool was at a time."""
+    """Return the fraction of a contact lane's latest step in s that corresponds to the time `time` [s]."""
     t0, t1 = pool[R.OLD_T * R.BLOCK + i], pool[R.NEW_T * R.BLOCK + i]
     w0, w1 = pool[R.OLD_X * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
     v0, v1 = pool[R.OLD_V * R.BLOCK + i], pool[R.NEW_V * R.BLOCK + i]
     a0, a1 = pool[R.OLD_A * R.BLOCK + i], pool[R.NEW_A * R.BLOCK + i]
     h = pool[R.LENGTH * R.BLOCK + i]
     low, high = 0.0, 1.0
-    # The step may extend beyond the end of the contact, where w < 0 and time runs backward.
+    # The step may extend beyond the end of the contact, where w < 0 and the time decreases.
     part = (time - t0) / (t1 - t0) if time < t1 and w1 > 0.0 else 0.5
     for _ in range(60):
         # dt/ds = 2 w, d2t/ds2 = -2 v
@@ -155,9 +156,9 @@ def note_samples(
     x: Any,
     b: float,
 ) -> None:
-    """Store the samples of a lane's latest step up to the time `until`, which is included only if `last`.
+    """Store the samples in a lane's latest step before time `until` [s], or up to `until` if `last`.
 
-    With `fine`, one more force evaluation raises the order of the samples by one.
+    With `fine`, an additional force evaluation raises the order of the interpolation by one.
     """
     m = int(slot[R.MEMBER])
     sample = int(slot[R.NEXT_SAMPLE])
@@ -185,9 +186,9 @@ def note_strobes(
     train: Train,
     hammer: Hammer,
 ) -> None:
-    """Store the strobes of a lane's latest step up to the time `until`, which is included only if `last`.
+    """Store the strobes in a lane's latest step before time `until` [s], or up to `until` if `last`.
 
-    A strobe at a node waits for the node's mode, which the next step has.
+    A strobe at the end of a step is stored with the next step, which determines its mode.
     """
     strobe = int(slot[R.NEXT_STROBE])
     t0 = pool[R.OLD_T * R.BLOCK + i]
@@ -214,7 +215,7 @@ def note_strobes(
 
 @compiled
 def enter_contact(pool: Any, i: int, v: float, slot: Any, control: Any) -> int:
-    """Start a backstop contact at w = 0 with velocity `v`."""
+    """Start a backstop contact at w = 0 with velocity `v` [m/s]; return the contact pool."""
     unit = contact_unit(v, control)
     slot[R.UNIT] = unit
     pool[R.X * R.BLOCK + i] = 0.0
@@ -227,7 +228,7 @@ def enter_contact(pool: Any, i: int, v: float, slot: Any, control: Any) -> int:
 
 @compiled
 def enter(pool: Any, i: int, t: float, x: float, v: float, mode: int, h: float, memory: float) -> None:
-    """Start a mode off the backstop."""
+    """Write the state of a lane at the start of a mode off the backstop, with the initial step size `h`."""
     pool[R.X * R.BLOCK + i] = x
     pool[R.V * R.BLOCK + i] = v
     pool[R.A * R.BLOCK + i] = lane_acceleration(pool, i, t, x, v, mode, memory)
@@ -238,7 +239,7 @@ def enter(pool: Any, i: int, t: float, x: float, v: float, mode: int, h: float, 
 
 @compiled
 def remember_step(pool: Any, i: int, which: int, slot: Any) -> None:
-    """Store the initial step size of this mode for the next time."""
+    """Store the step size that suited the start of the present mode, for the next start of the same mode."""
     first = pool[R.FIRST * R.BLOCK + i]
     if first > 0.0:
         if which == R.FREE_POOL:
@@ -261,12 +262,12 @@ def turn_in_pack(
     hammer: Hammer,
     control: Any,
 ) -> int:
-    """Continue after the velocity became zero inside the pack at displacement `x`.
+    """Select the next mode after the velocity has become zero inside the pack at displacement `x`.
 
-    The rule is `printhammer.kernel.single.around.reversed_mode`; an armature that would rest leaves the
-    lanes.
+    The rule is the one of :func:`printhammer.kernel.single.around.reversed_mode`. A member whose armature
+    would rest leaves the lanes.
     """
-    # As in the plain kernel: swings too small to distinguish from rest would never end.
+    # As in the plain kernel, oscillations too small to distinguish from rest would never end.
     still = R.STILL * control[1] * control[1] / control[0]
     inward = lane_acceleration(pool, i, t, x, 0.0, M.LOADING, 0.0) > 0.0
     if (inward and which == R.LOADING_POOL) or (RELOAD_ALONG_UNLOADING and which == R.UNLOADING_POOL):
@@ -298,7 +299,7 @@ def after_switch(
     hammer: Hammer,
     control: Any,
 ) -> int:
-    """Continue after a switch; return the new pool, or that the member leaves the lanes."""
+    """Update a member after a switching event; return its new pool, or LEAVES if it leaves the lanes."""
     remember_step(pool, i, which, slot)
     pool[R.T * R.BLOCK + i] = t
     if switch == M.REVERSAL:
@@ -340,7 +341,7 @@ def new_edge(
     train: Train,
     rates: Any,
 ) -> None:
-    """Update the drive at the time of a lane."""
+    """Update the drive of a lane at an edge: active pulses, time of the next edge, and acceleration."""
     t = pool[R.T * R.BLOCK + i]
     _first, _last, edge = edges_at(t, train)
     add_up(t, train.live, rates, pool, i)
@@ -355,7 +356,7 @@ def new_edge(
 
 @compiled
 def close_member(pool: Any, i: int, which: int, slot: Any, dots: Any, hammer: Hammer) -> None:
-    """Record the deepest point so far of a pack contact that is open at the end."""
+    """Record the largest depth so far of a pack contact that is still open at the end of a run."""
     dot = int(slot[R.DOT])
     if which == R.LOADING_POOL and dot >= 0:
         deepen_dot(dots, dot, pool[R.X * R.BLOCK + i], hammer)
@@ -365,9 +366,10 @@ def close_member(pool: Any, i: int, which: int, slot: Any, dots: Any, hammer: Ha
 def locate(
     pool: Any, i: int, which: int, hammer: Hammer, live: Drive, control: Control
 ) -> tuple[int, float, float, float]:
-    """Locate the switch in the latest step with the plain kernel: code, time, displacement, velocity.
+    """Locate the event in a lane's latest step with the plain kernel; return code, time, position, velocity.
 
-    In the contact pool w instead of the displacement; NO_SWITCH or UNRESOLVED instead of a name.
+    In the contact pool, w replaces the position. The code is NO_SWITCH if the step contains no event,
+    UNRESOLVED if the step must be halved.
     """
     start = (pool[i], pool[R.X * R.BLOCK + i], pool[R.V * R.BLOCK + i], pool[R.A * R.BLOCK + i])
     h = pool[R.LENGTH * R.BLOCK + i]

@@ -1,8 +1,8 @@
-"""Ending the step of a lane on a switch: guess the position, step there, close the remainder.
+"""Event location in lanes: estimate the event, step to the estimate, and close the remainder.
 
-The guess comes from the quintic of the step that contained the switch; the next step is an ordinary one of
-the lane. The derivatives at its end close the remainder; if that is not accurate enough, the plain kernel
-locates the switch.
+The quintic interpolant of the step that contains the event gives the estimate. The next step of the lane ends
+at the estimate, and a Taylor expansion closes the remainder. If that is not accurate enough, the plain kernel
+locates the event.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.forces import Hammer
 
 CLOSE = 1e-3
-"""Largest remainder, as a fraction of the step, that the derivatives may close."""
+"""Largest remainder, as a fraction of the step, that the Taylor expansion may close."""
 
 GOES_ON = -1
-"""Replaces a switch: the lane has to take another step before the decision."""
+"""Code returned in place of an event: the lane must take another step before the event is located."""
 
 
 @inlined
 def ends_of_step(pool: Any, i: int, sign: float) -> tuple[float, float, float, float, float, float, float]:
-    """Return sign * x and its derivatives at both ends of the latest step, and its length."""
+    """Return sign * (x, v, a) at the start and the end of the latest step, and the length of the step."""
     x, v, a = pool[R.X * R.BLOCK + i], pool[R.V * R.BLOCK + i], pool[R.A * R.BLOCK + i]
     x1, v1 = pool[R.NEW_X * R.BLOCK + i], pool[R.NEW_V * R.BLOCK + i]
     a1, h = pool[R.NEW_A * R.BLOCK + i], pool[R.LENGTH * R.BLOCK + i]
@@ -40,7 +40,7 @@ def ends_of_step(pool: Any, i: int, sign: float) -> tuple[float, float, float, f
 
 @inlined
 def rises_in_step(pool: Any, i: int, level: float, sign: float) -> int:
-    """Decide whether sign * x rises through sign * `level` in the latest step, see `rises_through`."""
+    """Decide whether sign * x rises through sign * `level` in the latest step; see `rises_through`."""
     return rises_through(*ends_of_step(pool, i, sign), sign * level)
 
 
@@ -52,7 +52,7 @@ def level_part(pool: Any, i: int, level: float, sign: float) -> float:
 
 @compiled
 def guess_free(pool: Any, i: int, hammer: Hammer) -> tuple[int, float]:
-    """Return the switch inside the latest step in free flight, and its estimated fraction of the step."""
+    """Return the first event inside the latest step in free flight, and its estimated step fraction."""
     down = rises_in_step(pool, i, hammer[POSITION], -1.0)
     up = rises_in_step(pool, i, hammer[FRONT], 1.0)
     if M.UNRESOLVED in (down, up):
@@ -71,7 +71,7 @@ def guess_free(pool: Any, i: int, hammer: Hammer) -> tuple[int, float]:
 
 @compiled
 def guess_in_pack(pool: Any, i: int, which: int, hammer: Hammer) -> tuple[int, float]:
-    """Return the switch inside the latest step in the pack, and its estimated fraction of the step."""
+    """Return the first event inside the latest step in the pack, and its estimated step fraction."""
     h = pool[R.LENGTH * R.BLOCK + i]
     turn = -1.0 if which == R.UNLOADING_POOL else 1.0
     v0, a0 = turn * pool[R.V * R.BLOCK + i], turn * pool[R.A * R.BLOCK + i]
@@ -95,7 +95,7 @@ def guess_in_pack(pool: Any, i: int, which: int, hammer: Hammer) -> tuple[int, f
 
 @compiled
 def guess_in_contact(pool: Any, i: int) -> tuple[int, float]:
-    """Return the switch inside the latest step in the backstop, and its estimated fraction of the step."""
+    """Return the first event inside the latest step in the backstop, and its estimated step fraction."""
     t0, t1 = pool[i], pool[R.NEW_T * R.BLOCK + i]
     w0, w1 = pool[R.X * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
     v0, v1 = pool[R.V * R.BLOCK + i], pool[R.NEW_V * R.BLOCK + i]
@@ -119,7 +119,7 @@ def guess_in_contact(pool: Any, i: int) -> tuple[int, float]:
 
 @compiled
 def guess(pool: Any, i: int, which: int, hammer: Hammer) -> tuple[int, float]:
-    """Return the switch inside the latest step of a lane, and its estimated fraction of the step."""
+    """Return the first event inside the latest step of a lane, and its estimated step fraction."""
     if which == R.CONTACT_POOL:
         return guess_in_contact(pool, i)
     if which == R.FREE_POOL:
@@ -129,7 +129,7 @@ def guess(pool: Any, i: int, which: int, hammer: Hammer) -> tuple[int, float]:
 
 @compiled
 def aim(pool: Any, i: int, slot: Any, switch: int, part: float) -> None:
-    """Make the next step of a lane end at the estimated switch."""
+    """Set the next step of a lane to end at an event, estimated at the fraction `part` of the latest step."""
     slot[R.SAVED_STEP] = pool[R.FOLLOWING * R.BLOCK + i]
     slot[R.ATTEMPTS] = 0.0
     pool[R.H * R.BLOCK + i] = part * pool[R.LENGTH * R.BLOCK + i]
@@ -140,18 +140,18 @@ def aim(pool: Any, i: int, slot: Any, switch: int, part: float) -> None:
 def land(
     pool: Any, i: int, which: int, slot: Any, hammer: Hammer, control: Any
 ) -> tuple[int, float, float, float]:
-    """Close the remainder between the end of a lane's step and the targeted switch.
+    """Close the remainder between the end of a lane's step and the event that the step was aimed at.
 
     Returns
     -------
     tuple
-        The switch, or GOES_ON, and time, displacement (w in the contact pool) and velocity there.
+        The event, or GOES_ON, and time, displacement (w in the contact pool) and velocity at the event.
     """
     switch = int(pool[R.LANDING * R.BLOCK + i])
     h = pool[R.LENGTH * R.BLOCK + i]
     t, x = pool[R.NEW_T * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
     v, a = pool[R.NEW_V * R.BLOCK + i], pool[R.NEW_A * R.BLOCK + i]
-    # A tenth of the smaller allowance is the tolerance; the next order is far below the remainder.
+    # The remainder may be a hundred times the tolerance: the error of the expansion is of the next order.
     allowed = 10.0 * control[3] * control[0]
     if which == R.CONTACT_POOL:
         if switch == M.EDGE:

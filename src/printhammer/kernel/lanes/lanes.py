@@ -1,9 +1,9 @@
-"""Vector lanes: members in the same mode step together, each with its own step size.
+"""Vector lanes: members of an ensemble in the same mode step together, each with its own step size.
 
-A thread has up to `LANES` active members. They are stored in pools, one per mode; a sweep takes one step in
-every lane of every pool, then handles the lanes with events. A finished member makes room for the next. The
-numbers of a member do not depend on other members: blocks are always computed in full, including idle lanes,
-by the same machine code.
+A thread has up to `LANES` active members, stored in pools, one pool per mode. A sweep takes one step in every
+lane of every pool, then handles the lanes with events. When a member is finished, the next member takes its
+lane. The results of a member do not depend on other members: all lanes of a block, including idle ones, are
+always computed by the same machine code.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ if TYPE_CHECKING:
 
 
 FINE = 1e-6
-"""Allowance of the order 7 estimate below which samples are computed with the extra force evaluation."""
+"""Tolerance of the order 7 estimate below which samples use the additional force evaluation."""
 
 
 @compiled
@@ -102,7 +102,7 @@ def begin_member(
     control: Any,
     slot: Any,
 ) -> int:
-    """Write the initial state of a member into a lane; return its pool, or that lanes do not support it."""
+    """Write the initial state of a member into a lane; return its pool, or LEAVES if not supported."""
     t, x, v = state[0], state[1], state[2]
     scale = control[0] / control[1]
     slot[R.FREE_STEP] = 0.02 * scale
@@ -144,7 +144,7 @@ def begin_member(
 
 @inlined
 def step_block(which: int, pool: Any, begin: int) -> None:
-    """Take a step in every lane of a block, including idle ones."""
+    """Take one step in every lane of a block, including idle lanes, with the function of the pool."""
     if which == R.FREE_POOL:
         free_block(pool, begin)
     elif which == R.LOADING_POOL:
@@ -166,7 +166,7 @@ def look_after(
     under_way: Any,
     live: Any,
 ) -> int:
-    """Handle the event of a lane; return the next pool of the member."""
+    """Handle the event of a lane after a step; return the next pool of the member, or a code."""
     m = int(slot[R.MEMBER])
     row = batch.hammer_of[m]
     hammer, control = batch.hammers[row], control_of(batch, row)
@@ -249,7 +249,7 @@ def lanes(
     spare: Any,
     left_over: Any,
 ) -> int:
-    """Integrate the members `which` and fill their rows of the results.
+    """Integrate the members `which` of an ensemble in lanes; write the results to their rows of `kept`.
 
     Parameters
     ----------
@@ -258,7 +258,7 @@ def lanes(
     uniform : bool
         Whether all members have the same hammer and waveforms.
     under_way, live : array
-        Working space as in :func:`printhammer.kernel.single.run.run`.
+        Working space, as in :class:`printhammer.kernel.model.layout.Train`.
     pools : float64 array, shape (POOLS + 1, POOL_SIZE)
     counts : int64 array, shape (POOLS,)
     members_in : int64 array, shape (POOLS, LANES)
@@ -266,12 +266,12 @@ def lanes(
     spare : int64 array, shape (LANES,)
         Working space.
     left_over : int64 array, shape of `which`
-        Filled with the indices of the members that the lanes do not support.
+        Filled with the indices of the members that left the lanes or are not supported by them.
 
     Returns
     -------
     int
-        Number of these members.
+        Number of members in `left_over`.
     """
     left = 0
     waiting = 0
@@ -326,11 +326,11 @@ def lanes(
             return left
         for p in range(R.POOLS):
             pool = pools[p]
-            # From the last lane to the first: the lane moved into a gap has had its step.
+            # Process lanes from last to first, so that a lane moved into a gap has already been stepped.
             top = counts[p] - 1
             for lane in range(top, -1, -1):
                 if lane == top or lane % R.BLOCK == R.BLOCK - 1:
-                    # The rows of a block are in the cache right after its step.
+                    # Handle events right after the step of a block, while its rows are in the cache.
                     step_block(p, pool, (lane // R.BLOCK) * R.BLOCK_SIZE)
                 i = place(lane)
                 if pool[R.EVENT * R.BLOCK + i] == 0.0:

@@ -1,31 +1,32 @@
-"""Layout of a pool of lanes: one flat array of blocks, each of rows of `BLOCK` lanes.
+"""Layout of a pool of lanes: a flat array of blocks; a block has one row per quantity, of `BLOCK` lanes.
 
-All members in a pool are in the same mode. A row holds one quantity of all lanes of its block, so that a loop
-over lanes reads and writes side by side; the rows of a block lie together.
+A lane holds one member of an ensemble, and all members in a pool are in the same mode. A loop over the lanes
+of a block accesses contiguous memory, and the rows of a block are contiguous as well.
 """
 
 LANES = 256
-"""Active members of a thread; capacity of every pool."""
+"""Maximum number of active members of a thread, and capacity of every pool."""
 
 BLOCK = 16
-"""Lanes in one iteration of the compiled loops."""
+"""Number of lanes of a block, which the compiled loops process together."""
 
 MANY_STEPS, SHORT = 2e4, 1e-12
-"""Number of steps, and ratio of step to elapsed time, at which a member leaves the lanes.
+"""Number of steps and ratio of step size to elapsed time at which a member leaves the lanes.
 
-At a runaway, steps become ever shorter without underflow; the plain kernel determines the status.
+In a runaway, steps become ever shorter without underflow; the plain kernel then determines the status.
 """
 
 STALLED = 200.0
-"""Number of consecutive events that do not advance time, after which a member leaves the lanes.
+"""Number of consecutive events that do not advance the time after which a member leaves the lanes.
 
-A switch that has to be located takes four attempts and at most some forty halvings of the step.
+Locating a switching event takes four attempts and at most about forty halvings of the step.
 """
 
 STILL = 1e-8
-"""Acceleration, in typical speeds over typical times, at which a member about to rest leaves the lanes."""
+"""Acceleration, normalised by scales of velocity and time, below which a member about to rest leaves the
+lanes."""
 
-# Constants of a hammer, in the places that `layout` defines otherwise.
+# Indices of a hammer's constants in lanes; more compact than in `printhammer.kernel.model.layout`.
 INVERSE_MASS = 0
 POSITION = 1
 FRONT = 2
@@ -42,55 +43,55 @@ PLACES = {
     "backstop": (BACKSTOP_PART, 6),
     "magnet": (MAGNET, 6),
 }
-"""First place and number of places of the constants of each part."""
+"""First index and maximum number of the constants of each part in lanes."""
 
-# The drive between two of its edges: reference time, constant, amplitudes of two exponentials, higher
-# coefficients of the cubic, amplitude and phase of the sine; then data of the waveform alone: rates of the
+# Rows of the drive between two edges: reference time, constant, amplitudes of two exponentials, higher
+# coefficients of the cubic, amplitude and phase of the sine. The rows of the waveform follow: rates of the
 # exponentials and angular frequency of the sine.
 DRIVE_WIDTH = 9
 RATES_WIDTH = 3
 
-# Pools.
+# Codes of the pools, one per mode.
 FREE_POOL = 0
 LOADING_POOL = 1
 UNLOADING_POOL = 2
 CONTACT_POOL = 3
 POOLS = 4
 
-# Rows.
+# Rows of a block.
 T = 0
 X = 1
-"""Displacement; in the contact pool w = sqrt(b - x)."""
+"""Row of the displacement [m]; in the contact pool, w = sqrt(b - x) [m^0.5]."""
 V = 2
 A = 3
-"""Acceleration; in the contact pool dv/ds."""
+"""Row of the acceleration [m/s^2]; in the contact pool, dv/ds."""
 H = 4
-"""Next step, in time; in the contact pool in s."""
+"""Row of the next step size [s]; in the contact pool, in the variable s."""
 NEXT = 5
-"""Time of the next edge of the drive, or of the end."""
+"""Row of the time of the next edge of the drive or of the end of the run, whichever is earlier [s]."""
 SAMPLE = 6
-"""Time of the next sample or strobe."""
+"""Row of the time of the next sample or strobe [s]."""
 MEMORY = 7
 PEAK = 8
 FIRST = 9
-"""Step that followed the first one in this mode, 0 before that."""
+"""Row of the step size proposed after the first step in the present mode; 0 before that step."""
 STEPS = 10
 LANDING = 11
-"""Switch at which the current step is to end; 0 for none."""
+"""Row of the code of the switching event at which the current step should end; 0 for none."""
 DRIVE = 12
 EXPONENTIAL_DRIVE = DRIVE + 4
-"""Number of rows that a member with an exponential drive takes to another pool."""
+"""Number of rows to copy when a member whose drive has exponentials only moves to another pool."""
 ANY_DRIVE = DRIVE + DRIVE_WIDTH
-"""Number of rows that a member with any drive takes to another pool."""
+"""Number of rows to copy when a member with any drive moves to another pool."""
 RATES = ANY_DRIVE
 CONTROL = RATES + RATES_WIDTH
 LOWEST = CONTROL + 4
 HIGHEST = CONTROL + 5
 MOST_STEPS = CONTROL + 6
-"""Number of steps after which the member leaves the lanes."""
+"""Row of the number of steps after which the member leaves the lanes."""
 HAMMER = CONTROL + 7
 OWN = HAMMER + CONSTANTS
-"""Rows of the member's waveform and hammer come before this one."""
+"""First row after the data of the member and its hammer; the results of the latest step begin here."""
 
 OLD_T = OWN
 OLD_X = OWN + 1
@@ -101,16 +102,16 @@ NEW_X = OWN + 5
 NEW_V = OWN + 6
 NEW_A = OWN + 7
 LENGTH = OWN + 8
-"""Length of the step that was taken."""
+"""Row of the length of the latest step."""
 FOLLOWING = OWN + 9
-"""Length of the step after it."""
+"""Row of the proposed length of the step after the latest one."""
 EVENT = OWN + 10
 ROWS = OWN + 11
 
 BLOCK_SIZE = ROWS * BLOCK
 POOL_SIZE = BLOCK_SIZE * (LANES // BLOCK)
 
-# Columns of a slot: data of a member outside its lane.
+# Columns of a slot, which holds data of a member outside its lane.
 MEMBER = 0
 NEXT_SAMPLE = 1
 NEXT_STROBE = 2
@@ -118,28 +119,28 @@ FREE_STEP = 3
 PACK_STEP = 4
 CONTACT_STEP = 5
 UNIT = 6
-"""Unit of s of the current backstop contact; 0 for one open since the start."""
+"""Column of the scale of s in the current backstop contact; 0 if the contact is open since the start."""
 DOT = 7
-"""Row of the open pack contact among the dots and extra contacts of the member, -1 for none."""
+"""Column of the row of dot data of the open pack contact; -1 if no pack contact is open."""
 END = 8
 CAREFUL = 9
-"""Whether the next switch is located with steps of the plain kernel."""
+"""Column of the flag that the plain kernel locates the next switching event."""
 ATTEMPTS = 10
 SAVED_STEP = 11
 NEXT_TIME = 12
-"""Time of the next strobe, infinity if there is none."""
+"""Column of the time of the next strobe [s]; infinity after the last strobe."""
 EVENT_TIME = 13
-"""Time of the latest handled event."""
+"""Column of the time of the latest handled event [s]."""
 EVENTS = 14
-"""Number of consecutive events that did not advance time."""
+"""Column of the number of consecutive events that did not advance the time."""
 EXTRA = 15
-"""Number of extra contacts so far."""
+"""Column of the number of extra contacts so far."""
 SLOT_WIDTH = 16
 
-# Events, bit flags to be added.
+# Bit flags of the events of a lane, to be added.
 SWITCH = 1.0
-"""The step may contain a switch and has not been accepted."""
+"""Event flag: the step may contain a switching event and has not been accepted."""
 SAMPLED = 2.0
 AT_EDGE = 4.0
 STUCK = 8.0
-"""The step is too short, or not finite."""
+"""Event flag: the step is too short or not finite, or the step limit or a bound is reached."""

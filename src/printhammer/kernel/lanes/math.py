@@ -1,7 +1,7 @@
 """Elementary functions without branches or calls, for loops that the compiler vectorises.
 
-The laws of the parts are compiled for lanes with this module in the place of :mod:`math`, each function with
-what calls it. Sources: Cody and Waite, Software Manual for the Elementary Functions (1980), for the
+For lanes, the laws of the parts are compiled with this module in place of :mod:`math`, and each function is
+inlined. Sources: Cody and Waite, Software Manual for the Elementary Functions (1980), for the
 reductions; the polynomials are Taylor and atanh series, long enough for the reduced range. Relative errors:
 exp and log 2e-16, pow 2e-16 (1 + |y ln x|); sin and cos have that of rounding their argument. Arguments
 outside the domain, for which `math` raises, give NaN or an infinity.
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     Code = tuple[Any, Callable[..., Any]]
 
     def bits(value: float) -> int:
-        """Return the 64 bits of a floating-point number as an integer."""
+        """Reinterpret the 64 bits of a floating-point number as an integer."""
         raise NotImplementedError
 
     def from_bits(value: int) -> float:
-        """Return the floating-point number with the 64 bits of an integer."""
+        """Reinterpret the 64 bits of an integer as a floating-point number."""
         raise NotImplementedError
 
 
@@ -61,21 +61,21 @@ if not TYPE_CHECKING:
 
 
 def sqrt(x: float) -> float:
-    """Return the square root."""
+    """Return the square root of `x`; NaN for negative `x`."""
     return math.sqrt(x)
 
 
 def isnan(x: float) -> bool:
-    """Whether `x` is not a number."""
+    """Whether `x` is NaN (not a number)."""
     return x != x  # noqa: PLR0124
 
 
 def exp(x: float) -> float:
-    """Return the exponential of `x`; 0 below -708, infinity above 709."""
+    """Return the exponential of `x`; 0 for `x` below -708, infinity above 709."""
     y = min(max(x, -708.0), 709.0)
     n = (y * _LOG2_E + _ROUND) - _ROUND
     r = (y - n * _LN2_HIGH) - n * _LN2_LOW
-    # Taylor to r^13, |r| <= ln(2)/2: remainder below 5e-18.
+    # Taylor series to r^13 for |r| <= ln(2)/2: remainder below 5e-18.
     p = 1.6059043836821613e-10
     p = p * r + 2.08767569878681e-09
     p = p * r + 2.505210838544172e-08
@@ -96,7 +96,7 @@ def exp(x: float) -> float:
 
 
 def log(x: float) -> float:
-    """Return the natural logarithm of a normal number; NaN below 0, minus infinity at 0."""
+    """Return the natural logarithm of a normal number `x`; NaN below 0, minus infinity at 0."""
     b = bits(x)
     # Choose the exponent such that the mantissa lies between sqrt(1/2) and sqrt(2).
     k = (b - 0x3FE6A09E667F3BCD) >> 52
@@ -104,7 +104,7 @@ def log(x: float) -> float:
     f = m - 1.0
     s = f / (2.0 + f)
     z = s * s
-    # Twice the atanh series to s^23, |s| <= 0.1716.
+    # log((1 + s)/(1 - s)) is twice the atanh series, here to s^23 for |s| <= 0.1716.
     p = 0.08695652173913043
     p = p * z + 0.09523809523809523
     p = p * z + 0.10526315789473684
@@ -117,7 +117,7 @@ def log(x: float) -> float:
     p = p * z + 0.4
     p = p * z + 0.6666666666666666
     half = 0.5 * f * f
-    # log(1 + f) = f - f^2/2 + s (f^2/2 + z p), the last term small against f.
+    # log(1 + f) = f - f^2/2 + s (f^2/2 + z p), where the last term is small compared with f.
     tail = s * (half + z * p)
     n = float(k)
     result = n * _LN2_HIGH - ((half - (tail + n * _LN2_LOW)) - f)
@@ -126,17 +126,17 @@ def log(x: float) -> float:
 
 
 def pow(x: float, y: float) -> float:
-    """Return `x` to the power `y` for x >= 0 and y > 0 or normal x."""
+    """Return `x` to the power `y`, for x >= 0; `x` must be a normal number unless y > 0."""
     result = exp(y * log(x))
     return result if x > 0.0 else (0.0 if (x == 0.0 and y > 0.0) else nan)
 
 
 def sin(x: float) -> float:
-    """Return the sine, for arguments up to some thousands."""
+    """Return the sine of `x` [rad], for arguments up to several thousand."""
     n = (x * 0.3183098861837907 + _ROUND) - _ROUND
     r = (x - n * 3.1415926218032837) - n * 3.178650954705639e-08
     z = r * r
-    # Taylor to r^21, |r| <= pi/2: remainder below 2e-18.
+    # Taylor series to r^21 for |r| <= pi/2: remainder below 2e-18.
     p = 1.9572941063391263e-20
     p = p * z - 8.22063524662433e-18
     p = p * z + 2.8114572543455206e-15
@@ -152,5 +152,5 @@ def sin(x: float) -> float:
 
 
 def cos(x: float) -> float:
-    """Return the cosine, for arguments up to some thousands."""
+    """Return the cosine of `x` [rad], for arguments up to several thousand."""
     return sin(x + 0.5 * pi)

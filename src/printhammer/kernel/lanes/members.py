@@ -1,6 +1,6 @@
-"""Scalar loop over members: each run goes to its end, and only requested results are stored.
+"""Scalar loop over the members of an ensemble: runs one after the other, storing only requested results.
 
-A run is integrated in stretches that fit the working space; after each, dots, strobes and samples are
+A run is integrated in segments that fit the working space. After each segment, dots, strobes and samples are
 extracted from its record.
 """
 
@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 
 @inlined
 def control_of(batch: Batch, row: int) -> Control:
-    """Return the step-size control (`Control`) of the hammer in a row."""
+    """Return the step-size control (`Control`) of the hammer in row `row` of a batch."""
     controls = batch.controls
     return controls[row, 0], controls[row, 1], controls[row, 2], controls[row, 3]
 
 
 @inlined
 def train_of(batch: Batch, m: int, under_way: Any, live: Any) -> Train:
-    """Return the drive of a member, with working space."""
+    """Return the pulse train of member `m` of a batch, with the given working space."""
     begin, end = batch.firing_starts[m], batch.firing_starts[m + 1]
     wave = batch.waveform_of[m]
     pieces = batch.pieces[batch.piece_starts[wave] : batch.piece_starts[wave + 1]]
@@ -48,24 +48,24 @@ def members(
     contacts: Any,
     carry: Any,
 ) -> int:
-    """Integrate the members `which` and fill their rows of the results.
+    """Integrate the members `which` of an ensemble one by one; write the results to their rows of `kept`.
 
     Parameters
     ----------
     which : int64 array
         Indices of the members.
     batch, kept : Batch, Kept
-        The members, and their requested results.
+        Inputs of the ensemble, and output arrays.
     under_way, live : array, shape (2, any)
-        Working space as in :func:`printhammer.kernel.single.run.run`, for the run and for its record.
+        Working space, as in :class:`printhammer.kernel.model.layout.Train`, for the run and for its record.
     nodes, contacts, carry
         Working space as in :func:`printhammer.kernel.single.run.run`.
 
     Returns
     -------
     int
-        Number of members of `which` that are done; fewer than all if the working space is too small for the
-        next.
+        Number of members of `which` that are done; less than the length of `which` if the working space is
+        too small for the next member.
     """
     grid, states, bounds = kept.grid, batch.states, batch.bounds
     for number in range(which.size):

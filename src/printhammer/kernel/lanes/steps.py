@@ -1,8 +1,8 @@
-"""One step of every lane of a block, in each pool: branch-free loops that the compiler vectorises.
+"""One step of every lane of a block, for each pool: branch-free loops that the compiler vectorises.
 
-A step that cannot contain a switch and meets the tolerance is accepted at once; the rest is left to
-:mod:`printhammer.kernel.lanes.events`. The Bernstein coefficients of the quintic (position) and cubic
-(velocity) enclose the curve, and show whether a step may contain a switch.
+A step that meets the tolerance and cannot contain a switching event is accepted at once; other steps are
+handled by :mod:`printhammer.kernel.lanes.events`. The Bernstein coefficients of the quintic (position) and
+the cubic (velocity) bound the curve, and show whether a step may contain an event.
 """
 
 from __future__ import annotations
@@ -29,25 +29,25 @@ PHASE_LIMIT = 2.0
 
 @inlined
 def four_at(pool: Any, at: int) -> Any:
-    """Return four rows of a lane."""
+    """Return four consecutive rows of a lane as a tuple; `at` is the index of the first row in its pool."""
     return pool[at], pool[at + BLOCK], pool[at + 2 * BLOCK], pool[at + 3 * BLOCK]
 
 
 @inlined
 def twelve_at(pool: Any, at: int) -> Any:
-    """Return twelve rows of a lane."""
+    """Return twelve consecutive rows of a lane as a tuple; `at` is the index of the first row in its pool."""
     return four_at(pool, at) + four_at(pool, at + 4 * BLOCK) + four_at(pool, at + 8 * BLOCK)
 
 
 @inlined
 def drive_at(pool: Any, i: int) -> Any:
-    """Return the drive of a lane."""
+    """Return the drive of a lane as a tuple: coefficients and rates of the closed formula."""
     return twelve_at(pool, R.DRIVE * BLOCK + i)
 
 
 @inlined
 def hammer_at(pool: Any, i: int) -> Any:
-    """Return the constants of a lane's hammer."""
+    """Return the constants of a lane's hammer as a tuple, in the layout of lanes."""
     at = R.HAMMER * BLOCK + i
     last = pool[at + 24 * BLOCK], pool[at + 25 * BLOCK], pool[at + 26 * BLOCK]
     return twelve_at(pool, at) + twelve_at(pool, at + 12 * BLOCK) + last
@@ -55,7 +55,7 @@ def hammer_at(pool: Any, i: int) -> Any:
 
 @inlined
 def factor(ratio: float) -> float:
-    """Return the factor for the next step size after an error `ratio`; the smallest one if not finite."""
+    """Return the factor of the next step size for an error `ratio`; the smallest factor if not finite."""
     f = 0.85 / math.sqrt(math.sqrt(math.sqrt(max(ratio, 1e-7))))
     f = min(5.0, max(0.2, f))
     return f if ratio < 1e6 else 0.2
@@ -65,7 +65,7 @@ def factor(ratio: float) -> float:
 def settle(
     pool: Any, i: int, start: State, h: float, end: State, ratio: float, sure: bool, edge: bool, outside: bool
 ) -> None:
-    """Accept or reject a step, and store its results."""
+    """Accept or reject a step of a lane; store its results, the next step size and the event flags."""
     t, x, v, a = start
     t1, x1, v1, a1 = end
     small = ratio <= 1.0
@@ -96,7 +96,7 @@ def settle(
     event += R.SAMPLED if (valid and t1 >= pool[R.SAMPLE * BLOCK + i]) else 0.0
     event += R.AT_EDGE if (valid and edge) else 0.0
     most = pool[R.MOST_STEPS * BLOCK + i]
-    # In the backstop step sizes are in s, unrelated to time.
+    # Compare times, since step sizes in the backstop are in s and not in seconds.
     most = min(most, R.MANY_STEPS) if abs(t1 - t) < R.SHORT * abs(t1) else most
     stuck = not (small or following > 1e-14 * scale) or steps > most
     event = R.STUCK if (stuck or (small and outside)) else event
@@ -105,10 +105,10 @@ def settle(
 
 @inlined
 def step_ratio(pool: Any, i: int, error_x: float, error_v: float) -> float:
-    """Return a step's error estimate off the backstop relative to the allowance, possibly not finite."""
+    """Return the error estimate of a step off the backstop as a multiple of the tolerance; may be NaN."""
     ratio_x = abs(error_x) / pool[R.CONTROL * BLOCK + i]
     ratio_v = abs(error_v) / pool[(R.CONTROL + 1) * BLOCK + i]
-    # A sum instead of the maximum propagates a NaN of either.
+    # The sum propagates a NaN of either ratio, which the maximum may not.
     worst = max(ratio_x, ratio_v) + 0.0 * (ratio_x + ratio_v)
     allowance = R.CONTROL + 3 if HAS_DAMPING else R.CONTROL + 2
     return float(worst / pool[allowance * BLOCK + i])
@@ -116,7 +116,7 @@ def step_ratio(pool: Any, i: int, error_x: float, error_v: float) -> float:
 
 @inlined
 def time_to_level(distance: float, v: float, a: float) -> float:
-    """Return the time [s] in which a constant acceleration covers `distance` >= 0, or infinity."""
+    """Return the time [s] to cover `distance` >= 0 [m] at constant acceleration; infinity if never."""
     under_root = v * v + 2.0 * a * distance
     root = math.sqrt(max(under_root, 0.0))
     fast = v > 0.0
@@ -126,18 +126,19 @@ def time_to_level(distance: float, v: float, a: float) -> float:
 
 @inlined
 def start_at(pool: Any, i: int) -> State:
-    """Return time, displacement, velocity and acceleration of a lane; in the backstop w and dv/ds."""
+    """Return time, position, velocity and acceleration of a lane; in the backstop, w and dv/ds."""
     return pool[i], pool[R.X * BLOCK + i], pool[R.V * BLOCK + i], pool[R.A * BLOCK + i]
 
 
 @inlined
 def timed_step(pool: Any, i: int, start: State, h: float, law: ForceLaw) -> tuple[float, State, float, bool]:
-    """Take a step of `h` [s], at most to the next edge, off the backstop.
+    """Take a step of `h` [s] off the backstop, shortened to end at the next edge of the drive at the latest.
 
     Returns
     -------
     tuple
-        Its length, the state at its end, its error over what is allowed, whether it ends at the edge.
+        Length of the step, state at its end, error as a multiple of the tolerance, and whether the step ends
+        at the edge.
     """
     t, x, v, a = start
     left = pool[R.NEXT * BLOCK + i] - t
@@ -204,14 +205,14 @@ def unloading_block(pool: Any, begin: int) -> None:
         _t1, x1, v1, a1 = end
         sure = max(v + h * a / 3.0, v1 - h * a1 / 3.0, v1) < 0.0 and x1 > law.hammer[R.FRONT]
         if not HAS_DAMPING:
-            # On the steep branch the estimate of order 6 is too small by about this factor.
+            # On the steep unloading branch, the order 6 estimate is too small by about this factor.
             ratio *= 5.0
         settle(pool, i, start, h, end, ratio, sure, edge, False)
 
 
 @inlined
 def stiffness(w: float, hammer: Any) -> float:
-    """Return the slope of the elastic force over the compression ``w**2`` [N/m]."""
+    """Return the tangent stiffness of the backstop [N/m] at compression ``w**2`` [m]."""
     stretch = 1.01 * w
     rise = backstop_elastic(hammer[R.BACKSTOP_PART : R.MAGNET], stretch) - backstop_elastic(
         hammer[R.BACKSTOP_PART : R.MAGNET], w
@@ -221,7 +222,7 @@ def stiffness(w: float, hammer: Any) -> float:
 
 @compiled
 def contact_block(pool: Any, begin: int) -> None:
-    """Take a step in s in each lane of a block of members in the backstop."""
+    """Take a step in each lane of a block of members in the backstop, in regularised variables."""
     pool = pool[begin:]
     for i in range(BLOCK):
         start = start_at(pool, i)
@@ -250,11 +251,11 @@ def contact_block(pool: Any, begin: int) -> None:
 
 @compiled
 def lane_acceleration(pool: Any, i: int, t: float, x: float, v: float, mode: int, memory: float) -> float:
-    """Return the acceleration [m/s^2] of the member in a lane, off the backstop."""
+    """Return the acceleration [m/s^2] of the member in a lane at a state off the backstop."""
     return acceleration(t, x, v, mode, memory, hammer_at(pool, i), drive_at(pool, i))
 
 
 @compiled
 def lane_contact_rate(pool: Any, i: int, t: float, w: float, v: float) -> float:
-    """Return dv/ds of the member in a lane, in the backstop."""
+    """Return dv/ds of the member in a lane at a state in the backstop."""
     return 2.0 * w * backstop_acceleration(t, w, v, hammer_at(pool, i), drive_at(pool, i))
