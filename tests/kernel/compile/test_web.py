@@ -192,3 +192,32 @@ def test_a_module_computes_what_machine_code_computes(name: str, tmp_path: Path)
     assert_close(peaks[:, 1:], expected[1][:, 1:])
     np.testing.assert_allclose(peaks[:, 0], expected[1][:, 0], **flat)
     assert_close(energies, expected[2])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["hendriks-1983-1", "relay-5v"])
+def test_a_module_computes_many_runs(name: str, tmp_path: Path) -> None:
+    hammer = ph.load(name)
+    assert hammer.waveform is not None
+    width = hammer.waveform.width
+    drives = [ph.PulseTrain(hammer.waveform, period=period * width, pulses=2) for period in (4.0, 5.0, 6.0)]
+    ensemble = ph.Ensemble(hammer, drives, 11.0 * width)
+    (group,) = ensemble.groups
+
+    def computed() -> ph.EnsembleResult:
+        times = np.linspace(0.0, 11.0 * width, 50)
+        return ensemble.run(dots=True, strobes="firings", times=times, engine="plain", threads=1)
+
+    machine = computed()
+    path = tmp_path / "kernel.wasm"
+    path.write_bytes(group.kernel.web_module().content())
+    host = Wasmtime(path.read_bytes())
+    with Node(path) as node:
+        for call in (host.call, node.call):
+            with computed_by(group.kernel, call):
+                web = computed()
+            np.testing.assert_array_equal(web.status, machine.status)
+            np.testing.assert_allclose(web.x, machine.x, rtol=0.0, atol=1e-6 * np.ptp(machine.x))
+            for column in ("t_touch", "force"):
+                found, expected = getattr(web.dots, column), getattr(machine.dots, column)
+                np.testing.assert_allclose(found, expected, rtol=1e-11)

@@ -36,6 +36,13 @@ MAGIC: Final = b"\0asm\1\0\0\0"
 
 _FEATURES: Final = "+bulk-memory,+mutable-globals,+nontrapping-fptoint,+sign-ext,+simd128"
 """Features of WebAssembly 2.0, which browsers have had since 2023."""
+_POINTERS: Final = "-p:32:32-"
+_PADDED: Final = "-p:32:64-"
+"""Pointers of four bytes that take eight in a structure.
+
+Templates are simplified when they are lowered, and then hold offsets and sizes of structures as numbers, those
+of a machine with pointers of eight bytes.
+"""
 _STACK: Final = 1 << 20
 """Size of the stack, bytes; several times what an entry point uses."""
 
@@ -50,7 +57,14 @@ def _machine() -> Any:
 def emit(module: Any, name: str) -> bytes:
     """Return the object of a linked module, whose function `CALL` gets the symbol `name`."""
     module.get_function(link.CALL).name = name
-    return link.emit(module, _machine())
+    machine = _machine()
+    layout = str(machine.target_data)
+    if _POINTERS not in layout:
+        raise link.LinkError(f"the data layout {layout!r} has no pointers {_POINTERS!r}")
+    module.triple, module.data_layout = machine.triple, layout.replace(_POINTERS, _PADDED)
+    builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=3))
+    builder.getModulePassManager().run(module, builder)
+    return bytes(machine.emit_object(module))
 
 
 def join(objects: Mapping[str, bytes], description: Mapping[str, Any]) -> bytes:
