@@ -218,6 +218,6 @@ def test_a_module_computes_many_runs(name: str, tmp_path: Path) -> None:
                 web = computed()
             np.testing.assert_array_equal(web.status, machine.status)
             np.testing.assert_allclose(web.x, machine.x, rtol=0.0, atol=1e-6 * np.ptp(machine.x))
-            for column in ("t_touch", "force"):
+            for column in ("flight_time", "impact_speed", "peak_force"):
                 found, expected = getattr(web.dots, column), getattr(machine.dots, column)
                 np.testing.assert_allclose(found, expected, rtol=1e-11)
