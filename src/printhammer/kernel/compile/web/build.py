@@ -40,8 +40,8 @@ _POINTERS: Final = "-p:32:32-"
 _PADDED: Final = "-p:32:64-"
 """Pointers of four bytes that take eight in a structure.
 
-Templates are simplified when they are lowered, and then hold offsets and sizes of structures as numbers, those
-of a machine with pointers of eight bytes.
+Templates are simplified when they are lowered: they hold sizes and offsets of structures as numbers, those of
+a machine with pointers of eight bytes.
 """
 _STACK: Final = 1 << 20
 """Size of the stack, bytes; several times what an entry point uses."""
