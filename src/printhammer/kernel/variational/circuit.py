@@ -1,9 +1,9 @@
-"""Coil circuit in the variational equations: derivatives of its current and rates, and its switches.
+"""Coil circuit in the variational equations: derivatives of coil current, state rates and path changes.
 
 At a fixed flux linkage the current depends on the displacement by di/dx = -emf / L and di/d lambda = 1 / L,
-with L the differential inductance, and so does the force. While no current flows in a coil without a shorted
-turn, its linkage is that of the magnet, and not a component of the state. The derivation is in
-docs/tangent.md.
+with L the differential inductance; the force depends on both through the current. While no current flows in a
+coil without a shorted turn, the magnet sets the flux linkage, which is then not a state variable. The
+derivation is in docs/tangent.md.
 """
 
 from __future__ import annotations
@@ -59,12 +59,12 @@ if TYPE_CHECKING:
     from printhammer.kernel.variational.slopes import field_slope
 
 CURRENT_SPACING = 1e-3
-"""Step of difference quotients, as a fraction of the scale of the current."""
+"""Step of difference quotients with respect to current, as a fraction of the current scale."""
 
 
 @inlined
 def electric_in(y: Any) -> Electric:
-    """Return the electric state in a row of the working space."""
+    """Return the electric state stored in a row of the working space; empty without a circuit."""
     if HAS_CIRCUIT:
         i = y.size - V.ELECTRICS
         return y[i], y[i + 1], y[i + 2]
@@ -73,7 +73,7 @@ def electric_in(y: Any) -> Electric:
 
 @inlined
 def electric_at_node(node: Any) -> Electric:
-    """Return the electric state at a node."""
+    """Return the electric state stored in a node of the record; empty without a circuit."""
     if HAS_CIRCUIT:
         return node[ELECTRIC], node[ELECTRIC + 1], node[ELECTRIC + 2]
     return ()
@@ -81,22 +81,23 @@ def electric_at_node(node: Any) -> Electric:
 
 @inlined
 def main_linkage(electric: Electric, hammer: Hammer) -> float:
-    """Return the flux linkage [Wb] of the magnet."""
+    """Return the main flux linkage [Wb], without leakage, from the electric state."""
     return float(electric[1] if hammer[TURN_RESISTANCE] > 0.0 else electric[0])
 
 
 @inlined
 def couples(hammer: Hammer, live: Any) -> bool:
-    """Whether a current driven by the flux linkage can flow."""
+    """Whether the flux linkage can drive a current, in the coil or in a shorted turn."""
     return path_of(live) != BLOCKED or hammer[TURN_RESISTANCE] > 0.0
 
 
 @compiled
 def force_with_current(x: float, current: float, hammer: Hammer) -> float:
-    """Return the slope of the magnet's force with the current [N/A]."""
+    """Return the derivative of the magnet force with respect to current [N/A]."""
     if hammer[COUPLED] != 0.0:
         return float(magnet_emf(hammer[MAGNET:], x, current))
-    # A law without linked flux need not know its own slope; one-sided at the end of a table.
+    # A law without linked flux need not define the derivative; use differences, one-sided at the end of a
+    # table.
     spacing = CURRENT_SPACING * hammer[CURRENT_SCALE]
     for turn in range(3):
         side = (CENTRAL + turn) % 3
@@ -110,9 +111,13 @@ def force_with_current(x: float, current: float, hammer: Hammer) -> float:
 
 @called
 def current_slopes(x: float, electric: Electric, hammer: Hammer, live: Any) -> tuple[float, float, float]:
-    """Return the derivatives of the magnetising current with displacement [A/m] and main linkage [A/Wb].
+    """Return the derivatives of magnetising current and magnet force.
 
-    The third value is the derivative of the force with the current [N/A].
+    Returns
+    -------
+    tuple of float
+        Derivatives of the magnetising current with respect to displacement [A/m] and main flux linkage
+        [A/Wb], and of the magnet force with respect to current [N/A].
     """
     if not couples(hammer, live):
         return 0.0, 0.0, 0.0
@@ -126,7 +131,7 @@ def current_slopes(x: float, electric: Electric, hammer: Hammer, live: Any) -> t
 
 @inlined
 def whole_field_slope(x: float, y: Any, setting: Setting) -> float:
-    """Return the slope [N/m] of magnet and spring force at fixed flux linkage."""
+    """Return the derivative of magnet and spring force with displacement [N/m], at fixed flux linkage."""
     scales, bounds, hammer, live, _forcing = setting
     value = value_at(y[V.TIME], x, hammer, driven(live, electric_in(y)))
     field = field_slope(x, value, scales, bounds, hammer)
@@ -138,7 +143,7 @@ def whole_field_slope(x: float, y: Any, setting: Setting) -> float:
 
 @inlined
 def coil_change(dx: float, linkage: float, turn: float, slopes: Any, hammer: Hammer, live: Any) -> float:
-    """Return the change of the current in the coil with changes of displacement and flux linkages."""
+    """Return the change of the coil current [A] for given changes of displacement and flux linkages."""
     if path_of(live) == BLOCKED:
         return 0.0
     if hammer[TURN_RESISTANCE] > 0.0:
@@ -148,7 +153,7 @@ def coil_change(dx: float, linkage: float, turn: float, slopes: Any, hammer: Ham
 
 @called
 def current_change(x: float, electric: Electric, live: Any, k: int, forcing: Forcing) -> float:
-    """Return the derivative of the magnetising current [A] with a constant, at fixed position and linkage."""
+    """Return the derivative of the magnetising current with respect to constant k, at a fixed state."""
     varied = forcing.varied
     hammer = varied[k, V.MIDDLE]
     if not forcing.of_hammer[k] & V.CIRCUIT_MOVES or not couples(hammer, live):
@@ -162,7 +167,7 @@ def current_change(x: float, electric: Electric, live: Any, k: int, forcing: For
 
 @compiled
 def coil_change_of(x: float, electric: Electric, live: Any, k: int, forcing: Forcing) -> float:
-    """Return the derivative of the coil current [A] with a constant, at fixed position and linkages."""
+    """Return the derivative of the coil current with respect to constant k, at a fixed state."""
     hammer = forcing.varied[k, V.MIDDLE]
     if path_of(live) == BLOCKED:
         return 0.0
@@ -174,7 +179,7 @@ def coil_change_of(x: float, electric: Electric, live: Any, k: int, forcing: For
 
 @compiled
 def linkage_change(x: float, k: int, forcing: Forcing) -> float:
-    """Return the derivative of the linkage without current [Wb] with a constant, at a fixed position."""
+    """Return the derivative of the flux linkage at zero current with respect to constant k."""
     if not forcing.of_hammer[k] & V.CIRCUIT_MOVES:
         return 0.0
     total = 0.0
@@ -186,9 +191,9 @@ def linkage_change(x: float, k: int, forcing: Forcing) -> float:
 
 @called
 def add_circuit(rates: Any, y: Any, count: int, x: float, moves: bool, setting: Setting) -> None:
-    """Fill in the `rates` of the electric state and its changes at `y`; add to those of the velocities.
+    """Write the rates of the electric state and of its tangent rows at `y`; add the effect on the velocities.
 
-    Where the armature is held, nothing `moves` it.
+    `moves` is false while the armature is held at rest.
     """
     hammer, live = setting.hammer, setting.drive
     electric, pace, t = electric_in(y), rates[V.TIME], y[V.TIME]
@@ -222,7 +227,7 @@ def add_circuit(rates: Any, y: Any, count: int, x: float, moves: bool, setting: 
 
 @compiled
 def circuit_pace(x: float, y: Any, setting: Setting) -> float:
-    """Return the fastest rate of the circuit [1/s] about a row of the working space."""
+    """Return the largest rate of the linearised coil circuit and reservoir [1/s], which limits the step."""
     hammer, live, electric = setting.hammer, setting.drive, electric_in(y)
     rate = fastest_rate(x, electric, hammer, live)
     if hammer[CAPACITANCE] > 0.0:
@@ -234,7 +239,10 @@ def circuit_pace(x: float, y: Any, setting: Setting) -> float:
 
 @compiled
 def hold_linkage(x: float, columns: Any, path: float, setting: Setting) -> None:
-    """Tie the linkage to the displacement while no current flows; clear unused rows of the circuit."""
+    """Set the linkage rows of the tangent columns from the displacement rows while no current flows.
+
+    The rows of an absent shorted turn or reservoir are set to zero.
+    """
     hammer = setting.hammer
     has_turn = hammer[TURN_RESISTANCE] > 0.0
     for k in range(columns.shape[1]):
@@ -253,7 +261,7 @@ def hold_linkage(x: float, columns: Any, path: float, setting: Setting) -> None:
 
 @compiled
 def threshold_change(live: Any, k: int, forcing: Forcing) -> float:
-    """Return the derivative [A] of the current at which the present path ends."""
+    """Return the derivative of the current threshold of the present path with respect to constant k."""
     if kind_of(live) != SWITCHED_PIECE:
         return 0.0
     if path_of(live) == SOURCE:
@@ -263,9 +271,9 @@ def threshold_change(live: Any, k: int, forcing: Forcing) -> float:
 
 @called
 def pass_path(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
-    """Propagate the columns through a change of the current's path between edges; return whether smooth.
+    """Propagate the tangent columns through a change of the current path; return whether differentiable.
 
-    The current is continuous there, and so are all forces; only the rate of the coil's linkage jumps.
+    The current and all forces are continuous at the change; only the rate of the coil's flux linkage jumps.
     """
     hammer, live, forcing = setting.hammer, setting.drive, setting.forcing
     before, behind = node[ELECTRIC + 3], after[ELECTRIC + 3]
@@ -306,7 +314,7 @@ def pass_path(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
 
 @compiled
 def pass_edge_of_driver(after: Any, columns: Any, setting: Setting) -> None:
-    """Propagate the columns through an edge of the drive at a fixed time."""
+    """Propagate the tangent columns through an edge of the drive whose time does not vary."""
     for k in range(columns.shape[1]):
         columns[ELECTRIC_ROW + V.ELECTRICS, k] = 0.0
     hold_linkage(after[1], columns, after[ELECTRIC + 3], setting)

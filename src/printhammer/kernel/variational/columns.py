@@ -1,7 +1,7 @@
-"""The variational equations between two switches, integrated together with the motion by DOP853.
+"""Variational equations between two switching events, integrated together with the motion by DOP853.
 
-A column (dx, dv, dp, ...), see `printhammer.kernel.variational.layout`, is a change of the motion, all at one
-time. Off the backstop
+A tangent column (dx, dv, dp, ...), see `printhammer.kernel.variational.layout`, is a change of the motion at
+fixed time. Off the backstop
 
     d(dx)/dt = dv,    d(dv)/dt = a_x dx + a_v dv + a_p dp + a_c,    dp constant,
 
@@ -9,8 +9,8 @@ and in the backstop, with w = sqrt(b - x) and dt = 2 w ds,
 
     d(dx)/ds = 2 w dv,    d(dv)/ds = -a_w dx + 2 w a_v dv + 2 w a_c,
 
-which is smooth where a_x = -a_w / (2 w) is not. The forcing a_c is there for changes with constants only; of
-changes with the initial state, all that has to do with it is left out when the kernel is compiled. The
+which is smooth at w = 0, where a_x = -a_w / (2 w) is not. The forcing a_c occurs only in derivatives with
+respect to constants; the kernel for derivatives with respect to the initial state is compiled without it. The
 derivation is in docs/tangent.md.
 """
 
@@ -48,24 +48,24 @@ if TYPE_CHECKING:
     from printhammer.kernel.variational.supply import add_supply
 
 LONGEST_PHASE = 0.75
-"""Largest phase, in one step, of the oscillation of a perturbation."""
+"""Largest phase advance [rad] of an oscillating perturbation in one step."""
 
 
 @compiled
 def force_slopes(
     y: Any, mode: int, memory: float, peak: float, peaks: Any, setting: Setting
 ) -> tuple[float, float, float, float, float, float]:
-    """Return the derivatives of the forces at `y`: with displacement or w, velocity, time.
+    """Return the derivatives of the forces with respect to displacement (or w), velocity and local maximum.
 
-    `peaks` are the memories of local maxima about `peak` for the unloading branch, from `note_memories`.
+    `peaks` holds the memory values for local maxima around `peak`, computed by `note_memories`.
 
     Returns
     -------
     tuple of float
-        Slope of magnet and spring force with displacement, at a fixed flux linkage if there is one; slopes of
-        the push of the closed contact with displacement, velocity and latest local maximum; slopes of its
-        dissipative part with displacement and velocity. In the backstop all slopes with displacement, except
-        the first, are multiplied by 2 w.
+        Derivative of magnet and spring force with displacement, at fixed flux linkage in a coil circuit;
+        derivatives of the contact force with displacement, velocity and latest local maximum; derivatives of
+        the dissipative contact force with displacement and velocity. In the backstop, all derivatives with
+        displacement except the first are multiplied by 2 w.
     """
     scales, hammer = setting.scales, setting.hammer
     if HAS_BACKSTOP and mode == BACKSTOP:
@@ -86,7 +86,7 @@ def force_slopes(
 def column_rates(
     rates: Any, y: Any, columns: Any, mode: int, memory: float, peak: float, peaks: Any, setting: Setting
 ) -> None:
-    """Fill `rates` with those of displacement or w, velocity, time and columns at `y`."""
+    """Write to `rates` the derivatives of displacement (or w), velocity, time and tangent columns at `y`."""
     hammer, drive, scales = setting.hammer, driven(setting.drive, electric_in(y)), setting.scales
     v = y[1]
     if HAS_CIRCUIT and RESTING <= mode <= HELD_UNLOADING:
@@ -124,9 +124,9 @@ def column_rates(
 
 @compiled
 def longest_step(mode: int, memory: float, peak: float, work: Any, setting: Setting) -> float:
-    """Return the largest step from row START of `work` that resolves a perturbation of the state.
+    """Return the largest step, from the state in row START of `work`, that resolves a perturbation.
 
-    The run's own steps follow the state: near rest, where it hardly moves, they are longer.
+    The steps of the run may be longer, since they resolve only the motion itself, which is slow near rest.
     """
     if HAS_CIRCUIT and RESTING <= mode <= HELD_UNLOADING:
         rate = circuit_pace(work[V.START, 0], work[V.START], setting)
@@ -148,7 +148,7 @@ def longest_step(mode: int, memory: float, peak: float, work: Any, setting: Sett
 def column_step(
     length: float, columns: Any, work: Any, mode: int, memory: float, peak: float, setting: Setting
 ) -> None:
-    """Take one step of `length` (s, or of the variable s in the backstop) from row START of `work`."""
+    """Take one step of state and tangent columns from row START of `work`; `length` in seconds or in s."""
     count = V.FIRST_COLUMN + CHANGING * columns.shape[1]
     if HAS_CIRCUIT:
         count = work.shape[1]
@@ -169,7 +169,7 @@ def column_step(
 
 @compiled
 def take_in(work: Any, columns: Any) -> None:
-    """Copy the rows that change between switches into row START of `work`."""
+    """Copy the rows of the tangent columns that change between switching events to row START of `work`."""
     for k in range(columns.shape[1]):
         j = V.FIRST_COLUMN + CHANGING * k
         for i in range(V.STATE):
@@ -180,7 +180,7 @@ def take_in(work: Any, columns: Any) -> None:
 
 @compiled
 def bring_back(work: Any, columns: Any) -> None:
-    """Copy these rows back into the columns."""
+    """Copy the rows that changed from row START of `work` back to the tangent columns."""
     for k in range(columns.shape[1]):
         j = V.FIRST_COLUMN + CHANGING * k
         for i in range(V.STATE):

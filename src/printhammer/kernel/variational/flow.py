@@ -1,6 +1,6 @@
-"""Columns of a variational equation propagated along a recorded run, in a second pass over its nodes.
+"""Tangent columns propagated along a recorded run, in a second pass over the nodes of its record.
 
-Runs without columns have no overhead.
+Runs without derivatives therefore have no overhead.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 @compiled
 def copy_columns(columns: Any, out: Any) -> None:
-    """Copy columns."""
+    """Copy all elements of a column array to another array of the same shape."""
     for i in range(columns.shape[0]):
         for k in range(columns.shape[1]):
             out[i, k] = columns[i, k]
@@ -56,7 +56,7 @@ def copy_columns(columns: Any, out: Any) -> None:
 
 @compiled
 def unit_of(row: int, scales: Any, hammer: Hammer) -> float:
-    """Return the unit of a component of the state, by its row in a column without forcing."""
+    """Return the scale of a state component, in SI units, given its row in a column without forcing."""
     if row < ENERGY:
         return float(scales[1] if row == 1 else scales[0])
     if row < ELECTRIC_ROW + 2:
@@ -68,7 +68,7 @@ def unit_of(row: int, scales: Any, hammer: Hammer) -> float:
 
 @compiled
 def orthonormalise_with_circuit(columns: Any, scales: Any, hammer: Hammer, grown: Any) -> None:
-    """Like `orthonormalise`, with all components of the state."""
+    """Orthonormalise the columns like `orthonormalise`, including the electric components."""
     count = columns.shape[0]
     for k in range(columns.shape[1]):
         for i in range(count):
@@ -95,9 +95,10 @@ def orthonormalise_with_circuit(columns: Any, scales: Any, hammer: Hammer, grown
 
 @compiled
 def orthonormalise(columns: Any, scales: Any, grown: Any) -> None:
-    """Orthonormalise the columns in units of `scales`; add the logarithms of their lengths to `grown`.
+    """Orthonormalise the columns, scaled by `scales`; add the logarithms of their lengths to `grown`.
 
-    Gram-Schmidt; a column without a remainder is replaced and counts as shrunk without bound.
+    The method is Gram-Schmidt. A column that depends linearly on the earlier ones is replaced, and its growth
+    is set to minus infinity.
     """
     for k in range(columns.shape[1]):
         columns[0, k] /= scales[0]
@@ -116,7 +117,7 @@ def orthonormalise(columns: Any, scales: Any, grown: Any) -> None:
                 columns[i, k] /= length
         else:
             grown[k] = -math.inf
-            # Across the column before it, or along x.
+            # Replace it by a vector orthogonal to the preceding column, or along x if it is the first.
             columns[0, k] = -columns[1, k - 1] if k > 0 else 1.0
             columns[1, k] = columns[0, k - 1] if k > 0 else 0.0
             columns[2, k] = 0.0
@@ -128,7 +129,7 @@ def orthonormalise(columns: Any, scales: Any, grown: Any) -> None:
 
 @compiled
 def note_mark(node: Any, initial: Any, setting: Setting, carried: Carried) -> None:
-    """Store state, columns and their growth at a mark; the columns begin at the first mark."""
+    """Store state, tangent columns and their growth at a mark; at the first mark, initialise the columns."""
     columns, work, track, states, changes, growth, _passed = carried
     hammer = setting.hammer
     mode = int(node[3])
@@ -160,7 +161,7 @@ def note_mark(node: Any, initial: Any, setting: Setting, carried: Carried) -> No
 
 @compiled
 def scale_or_note(factor: float, renormalise: bool, columns: Any, setting: Setting, grown: Any) -> None:
-    """Multiply the columns by a factor, passed as its logarithm, or add it to their growth."""
+    """Apply a factor, passed as its logarithm, to the columns; with `renormalise`, add it to their growth."""
     if renormalise:
         for k in range(columns.shape[1]):
             grown[k] += factor
@@ -189,33 +190,36 @@ def flow(
     initial: Any,
     carried: Carried,
 ) -> None:
-    """Carry columns along a stretch of a run, from the first mark to the last.
+    """Propagate tangent columns along a segment of a run, from the first mark to the last.
 
     Parameters
     ----------
     nodes, train, hammer
-        As recorded by :func:`printhammer.kernel.single.run.run` and passed in its setup.
+        Nodes recorded by :func:`printhammer.kernel.single.run.run`, and the pulse train and parameter array
+        that were passed to it.
     scales : tuple of float
-        Scales of displacement and velocity.
+        Scales of displacement [m] and velocity [m/s].
     bounds : tuple of float
-        As in :class:`printhammer.kernel.single.carry.Setup`.
+        Bounds of the displacement, as in :class:`printhammer.kernel.single.carry.Setup`.
     forced_by : tuple
-        A plain tuple of the fields of `printhammer.kernel.variational.layout.Forcing`; else an empty one.
+        Fields of :class:`printhammer.kernel.variational.layout.Forcing` as a plain tuple; empty without
+        derivatives with respect to constants.
     marks : float64 array, shape (m,)
-        Ascending times [s]; at the instant of a switch, the time after it.
+        Times at which to store the columns, ascending [s]; at a switching event, the state after the event.
     wanted : int64 array, shape (q,)
-        Ascending indices of nodes of the stretch.
+        Indices of the nodes at which to store the columns before and after the event, ascending.
     renormalise : bool
         Whether to orthonormalise the columns at every node, and record their growth.
     ended : bool
-        Whether the run ends with the stretch; otherwise a mark at its end belongs to the next one.
+        Whether the run ends with this segment; otherwise a mark at the end belongs to the next segment.
     initial : float64 array, shape (3, n), with a circuit (6, n)
-        Changes of displacement, velocity and latest local maximum at the first mark; of the electric state.
+        Initial columns at the first mark: changes of displacement, velocity and latest local maximum; with a
+        circuit, also of the electric state.
     carried : Carried
-        The columns, with their recorded values.
+        Columns, working space and output arrays.
     """
     train = Train(*train)
-    # Without forcing no trace of it may pass through the calls: that alone would cost a tenth.
+    # Without forcing, pass an empty tuple: passing the unused arrays alone would take 10 % more time.
     forcing: Any = ()
     if FORCED:
         forcing = Forcing(*forced_by)
@@ -250,7 +254,7 @@ def flow(
             if HAS_CIRCUIT and pulse >= 0:
                 move_edge(node, before, pulse, piece, columns, setting)
         begin_step(node, work)
-        # A mark at the time of several nodes belongs to the last of them.
+        # A mark at a time shared by several nodes belongs to the last of these nodes.
         while due < marks.size and (marks[due] < t_end or (final and ended and marks[due] == t_end)):
             factor = carry(marks[due], node, after, columns, work, setting)
             scale_or_note(factor, renormalise, columns, setting, grown)
@@ -264,7 +268,7 @@ def flow(
             copy_columns(columns, passed[asked, 0])
         if not pass_node(node, after, columns, setting):
             track[SMOOTH] = 0.0
-        # At its end a run puts the current on the path with which the next stretch begins.
+        # The last node of an ended run already has the current path of the next segment, so it is skipped.
         if HAS_CIRCUIT and not (ended and i + 2 == count):
             if t_end >= edge:
                 pass_edge_of_driver(after, columns, setting)

@@ -1,10 +1,10 @@
 """Forcing of the variational equations: derivatives of the forces with constants, at a fixed state.
 
-The slope a_c of the acceleration with a constant is added to the rate of dv, and each energy grows by the
-change of its power. In the backstop the force is a function of w = sqrt(b - x), whose change follows from
-those of displacement and position, 2 w dw = db - dx; in the pack the force is a function of the depth. The
-derivation is in docs/tangent.md. Constants are changed in the array that the laws read, so that a part need
-not declare their effect.
+The derivative a_c of the acceleration with respect to a constant is added to the rate of dv, and the
+derivative of each power to the rate of its energy. In the backstop, the force is a function of w = sqrt(b -
+x), where 2 w dw = db - dx; in the pack, the force is a function of the depth. The derivation is in
+docs/tangent.md. The laws are evaluated with shifted arrays of constants, so that a part need not define
+derivatives.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ if TYPE_CHECKING:
 
 @compiled
 def set_live_moves(first: int, last: int, train: Train, forcing: Forcing) -> None:
-    """Rewrite the changes of the active pieces, in the order of `pass_edges`."""
+    """Update the derivatives of the active waveform pieces, in the order in which `pass_edges` lists them."""
     fire_moves, piece_moves, live_moves = forcing.fire_moves, forcing.piece_moves, forcing.live_moves
     for k in range(fire_moves.shape[0]):
         j = 0
@@ -83,7 +83,7 @@ def set_live_moves(first: int, last: int, train: Train, forcing: Forcing) -> Non
 
 @inlined
 def drive_change(t: float, drive: Drive, delayed: Any) -> float:
-    """Return the change of the drive [A or N] at a fixed time; `delayed` is a row of `live_moves`."""
+    """Return the derivative of the drive with a constant, whose row of `live_moves` is `delayed`."""
     total = 0.0
     i, j = 1, 0
     for _ in range(int(drive[0])):
@@ -97,14 +97,14 @@ def drive_change(t: float, drive: Drive, delayed: Any) -> float:
 
 @inlined
 def force_with_value(x: float, value: float, hammer: Hammer, drive: Drive, forcing: Forcing) -> float:
-    """Return the slope of magnet and drive force with the drive: N/A, or 1 for a force drive."""
+    """Return the derivative of magnet and drive force with respect to the drive: N/A, or 1 for a force."""
     if HAS_CIRCUIT:
         return force_with_current(x, value, hammer)
     if drive[0] == 0.0:
         return 0.0
     if FORCE_DRIVE:
         return 1.0
-    # One-sided where a measured table ends.
+    # Use one-sided differences at the end of a measured table.
     spacing = forcing.value_spacing
     for turn in range(3):
         side = (CENTRAL + turn) % 3
@@ -120,10 +120,10 @@ def force_with_value(x: float, value: float, hammer: Hammer, drive: Drive, forci
 def field_changes(
     t: float, x: float, value: float, with_value: float, k: int, drive: Drive, forcing: Forcing
 ) -> tuple[float, float, float]:
-    """Return the changes [N] of magnet, spring and drive force, and of their parts from coil and drive force.
+    """Return the derivatives of total, coil and drive force with respect to constant k.
 
-    At a fixed flux linkage, if there is one. `with_value` is the slope of the force with the `value` of the
-    drive.
+    The total is the sum of magnet, spring and drive force. The state, including any flux linkage, is fixed.
+    `with_value` is the derivative of the force with respect to the drive `value`.
     """
     varied, of_hammer, live_moves = forcing.varied, forcing.of_hammer, forcing.live_moves
     if HAS_CIRCUIT:
@@ -145,7 +145,7 @@ def field_changes(
 
 @inlined
 def damping_change(v: float, k: int, forcing: Forcing) -> float:
-    """Return the change [N] of the damping force at a fixed velocity."""
+    """Return the derivative of the damping force with respect to constant k, at a fixed velocity."""
     total = 0.0
     if HAS_DAMPING and forcing.of_hammer[k] & V.DAMPING_MOVES:
         for i in range(POINTS[CENTRAL]):
@@ -156,7 +156,7 @@ def damping_change(v: float, k: int, forcing: Forcing) -> float:
 
 @compiled
 def note_changed_memories(peak: float, forcing: Forcing) -> None:
-    """Store the memory of the pack law for `peak` [m], at a fixed depth, for shifted constants."""
+    """Compute the memory values of the pack law for shifted constants, at the fixed depth of `peak` [m]."""
     varied, moves, of_hammer, memories = forcing.varied, forcing.moves, forcing.of_hammer, forcing.memories
     for k in range(of_hammer.size):
         if of_hammer[k] & V.PACK_MOVES:
@@ -167,7 +167,7 @@ def note_changed_memories(peak: float, forcing: Forcing) -> None:
 
 @inlined
 def pack_change(x: float, v: float, mode: int, k: int, forcing: Forcing) -> float:
-    """Return the change [N] of the force of the pack at a fixed depth."""
+    """Return the derivative of the pack force with respect to constant k, at a fixed depth."""
     varied, moves, of_hammer, memories = forcing.varied, forcing.moves, forcing.of_hammer, forcing.memories
     if not of_hammer[k] & V.PACK_MOVES:
         return 0.0
@@ -190,7 +190,7 @@ def pack_change(x: float, v: float, mode: int, k: int, forcing: Forcing) -> floa
 
 @inlined
 def contact_changes(w: float, v: float, k: int, forcing: Forcing) -> tuple[float, float]:
-    """Return the changes [N] of the force of the backstop and of its viscous part, at a fixed compression."""
+    """Return derivatives of total and viscous backstop force with respect to constant k, at fixed w and v."""
     varied, of_hammer = forcing.varied, forcing.of_hammer
     if not of_hammer[k] & V.BACKSTOP_MOVES:
         return 0.0, 0.0
@@ -210,7 +210,7 @@ def contact_changes(w: float, v: float, k: int, forcing: Forcing) -> tuple[float
 
 @compiled
 def rebound_change(v_in: float, k: int, forcing: Forcing) -> float:
-    """Return the change [m/s] of the velocity after an impact on a rigid backstop."""
+    """Return the derivative of the rebound velocity of a rigid backstop with respect to constant k."""
     varied, of_hammer = forcing.varied, forcing.of_hammer
     change = 0.0
     if of_hammer[k] & V.BACKSTOP_MOVES:
@@ -222,7 +222,7 @@ def rebound_change(v_in: float, k: int, forcing: Forcing) -> float:
 
 @compiled
 def stored_change(x: float, dx: float, k: int, hammer: Hammer, forcing: Forcing) -> float:
-    """Return the change of the energy [J] stored in the backstop at place `x`, which changes by `dx`."""
+    """Return the derivative of the energy stored in the backstop with constant k; `x` changes by `dx`."""
     varied, moves, of_hammer = forcing.varied, forcing.moves, forcing.of_hammer
     w = math.sqrt(max(hammer[POSITION] - x, 0.0))
     change = backstop_elastic(hammer[BACKSTOP_PART:MAGNET], w) * (moves[k, POSITION] - dx)
@@ -237,9 +237,9 @@ def stored_change(x: float, dx: float, k: int, hammer: Hammer, forcing: Forcing)
 def add_forcing(
     rates: Any, y: Any, columns: Any, mode: int, memory: float, slopes: Any, setting: Setting
 ) -> None:
-    """Add the effect of constants to the `rates` of the columns at `y`, and fill in those of the energies.
+    """Add the effect of constants to the velocity rates of the columns at `y`; write the energy rates.
 
-    `slopes` are those of `printhammer.kernel.variational.columns.force_slopes` there.
+    `slopes` is the result of :func:`printhammer.kernel.variational.columns.force_slopes` at `y`.
     """
     scales, bounds, hammer, live, forcing = setting
     drive = driven(live, electric_in(y))
@@ -282,7 +282,7 @@ def add_forcing(
             push, lost = contact_changes(w, v, k, forcing)
         elif indented:
             surface = moves[k, FRONT]
-            # A pack returns nothing: its whole work is loss.
+            # The work on the pack is counted as loss as a whole.
             push = pack_change(x, v, mode, k, forcing)
             lost = push
         change = pace * (change + push) - (push_x + push_peak) * surface

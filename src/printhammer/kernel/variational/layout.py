@@ -1,11 +1,11 @@
-"""Layout of a column of a variational equation, and of the working space.
+"""Layout of the tangent columns of the variational equations, and of the working space.
 
-A column is the change of the motion, all at one time, per unit of an initial change or of a constant: of the
-`STATE` components of the state, displacement [m] and velocity [m/s]; of the latest local maximum in the pack
-[m], which changes at switches only; and, where constants force the equation, of the energies [J] that coil
-and drive force have given and pack, backstop and damping have taken. Where a voltage drives the coil, four
-more rows come last: of the electric state, flux linkage of the coil and of the shorted turn [Wb] and voltage
-of the reservoir [V], and of the time [s] at which a fixed off-time of a chopper ends.
+A column is a tangent vector: the derivative of the motion, at fixed time, with respect to an initial
+condition or a constant. Its first rows are the derivatives of displacement [m], velocity [m/s] and the latest
+local maximum in the pack [m], which changes at switching events only. If derivatives with respect to
+constants are computed (forcing), the energies [J] follow: work of coil and drive force, losses in pack,
+backstop and damping. A coil circuit adds four rows at the end: flux linkages of coil and shorted turn [Wb],
+reservoir voltage [V], and the end of the off-time [s] of a fixed off-time chopper.
 """
 
 from typing import Any, NamedTuple
@@ -13,60 +13,61 @@ from typing import Any, NamedTuple
 from printhammer.kernel.methods.dop853_tableau import STAGES
 
 STATE = 2
-"""Components of the state: displacement and velocity."""
+"""Number of mechanical state components: displacement and velocity."""
 PEAK = STATE
 ENERGY = STATE + 1
 COIL, DRIVE, PACK_LOSS, BACKSTOP_LOSS, DAMPING_LOSS = range(ENERGY, ENERGY + 5)
 ENERGIES = 5
 ROWS = ENERGY + ENERGIES
-"""Rows of a column without a circuit; without forcing the first three."""
+"""Number of rows of a column without a circuit; without forcing, only the first three exist."""
 ELECTRICS = 3
-"""Components of the electric state; the end of an off-time is one row more."""
+"""Number of components of the electric state; the end of an off-time is an additional row."""
 
 START, STAGE, MEMORIES = STAGES, STAGES + 1, STAGES + 2
 WORK_ROWS = STAGES + 3
-"""Rows of the working space: slopes of the stages, state at the start, state at a stage, memories."""
+"""Number of rows of the working space: slopes of the stages, state at the start, stage state, memories."""
 TIME = STATE
-"""Place of the time in a row of the working space, after displacement or w and velocity."""
+"""Index of the time in a row of the working space, after displacement (or w) and velocity."""
 FIRST_COLUMN = TIME + 1
-"""Place there of the first column."""
+"""Index of the first tangent column in a row of the working space."""
 
-# Places in `track`.
+# Indices in `track`.
 DUE = 0
-"""Number of the next mark."""
+"""Index of the element that counts the marks already passed."""
 SMOOTH = 1
-"""Whether the map is differentiable so far, 1 or 0."""
+"""Index of the flag, 1 or 0, that the motion so far depends differentiably on the initial state."""
 GROWN = 2
-"""From here on: logarithms of growth since the latest mark."""
+"""Index of the first column's logarithm of growth since the latest mark; further columns follow."""
 
-# Forcing: each constant changes the array of the hammer's constants, the firing times and the waveforms.
+# Forcing: a constant may change the parameter array of the hammer, the firing times and the waveforms.
 SPACING = 1e-3
-"""Step of difference quotients with constants, as a fraction of the constant or its scale."""
+"""Step of difference quotients with respect to a constant, as a fraction of the constant or its scale."""
 MIDDLE = 4
-"""Row of `varied` with the unchanged constants."""
+"""Row of `varied` that holds the unchanged constants."""
 VARIED = 9
-"""Rows of `varied`: row 4 + j holds the constants with j times `SPACING` of the change."""
+"""Number of rows of `varied`: row 4 + j holds the constants shifted by j times `SPACING` of the change."""
 FIELD_MOVES, PACK_MOVES, BACKSTOP_MOVES, DAMPING_MOVES, CIRCUIT_MOVES = 1, 2, 4, 8, 16
-"""Bits of `of_hammer`: which laws a column changes; mass and position of the backstop are no law's."""
+"""Bits of `of_hammer` for the laws that a constant changes; mass and backstop position belong to no law."""
 DELAYED = 5
-"""Numbers kept for each pulse under way: delay of its piece, changes of p0 to p3, from place 1 on."""
+"""Number of values stored per active pulse: delay of the active piece, and the changes of p0 to p3."""
 
 
 class Forcing(NamedTuple):
-    """Changes of the kernel's arrays with n constants, and working space; an empty tuple without constants.
+    """Derivatives of the kernel's input arrays with respect to n constants, and working space.
 
     Attributes
     ----------
     varied, moves : float64 arrays, shapes (n, 9, h) and (n, h)
-        The hammer's constants moved by -4 to 4 times `SPACING` of their changes, and the changes.
+        Parameter arrays shifted by -4 to 4 times `SPACING` of their changes, and the changes per unit of each
+        constant.
     of_hammer : int64 array, shape (n,)
-        Laws that a column changes, as a sum of bits.
+        Laws that each constant changes, as a sum of bits.
     fire_moves, piece_moves : float64 arrays, shapes (n, f) and (n, m, 6)
-        Changes of the firing times [s] and of the waveforms' tables.
+        Changes of the firing times [s] and of the waveform tables, per unit of each constant.
     live_moves, memories : float64 arrays, shapes (n, 5 f) and (n, 9)
         Working space.
     value_spacing : float
-        Step of the drive for the derivative of the force [A or N].
+        Step of the drive [A or N] for the derivative of the force with respect to the drive.
     """
 
     varied: Any
@@ -80,25 +81,26 @@ class Forcing(NamedTuple):
 
 
 class Carried(NamedTuple):
-    """Columns during their propagation along a run, and their values at marks and requested nodes.
+    """Tangent columns during their propagation along a run, and their values at marks and requested nodes.
 
-    Without forcing a column has r = 3 rows, with it 8; with a circuit four more.
+    A column has r = 3 rows without forcing and 8 rows with forcing; a circuit adds four rows.
 
     Attributes
     ----------
     columns : float64 array, shape (r, n)
-        Columns at the end of the stretch or at the last mark.
+        Columns at the end of the segment or at the last mark.
     work : float64 array, shape (15, `work_width`)
         Working space.
     track : float64 array, shape (2 + n,)
-        Before the first stretch zeros, except a one at index 1; afterwards the data for the next stretch,
-        with at index 1 whether the motion is differentiable so far.
+        Data passed from one segment to the next; element 1 is 1 while the motion is differentiable, else 0.
+        Before the first segment, all elements are zero except element 1, which is one.
     states : float64 array, shape (m, 4), with a circuit (m, 8)
-        Displacement, velocity, mode and latest local maximum at the marks; electric state and path.
+        Displacement, velocity, mode and latest local maximum at the marks; with a circuit, also electric
+        state and current path.
     changes, growth : float64 array, shapes (m, r, n) and (m, n)
-        Columns at the marks, and the logarithms of their growth since the mark before.
+        Columns at the marks, and the logarithms of their growth since the preceding mark.
     passed : float64 array, shape (q, 2, r, n)
-        Columns at the requested nodes, before and after the switch there.
+        Columns at the requested nodes, before and after the switching event at the node.
     """
 
     columns: Any
@@ -111,7 +113,7 @@ class Carried(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """Data that stay constant along a run."""
+    """Data that do not change along a run: scales, bounds, parameter array, drive and forcing."""
 
     scales: Any
     bounds: Any
@@ -121,29 +123,29 @@ class Setting(NamedTuple):
 
 
 def electric_row(forced: bool) -> int:
-    """Return the first row of the circuit in a column."""
+    """Return the index of the first row of the electric state in a tangent column."""
     return ROWS if forced else ENERGY
 
 
 def row_count(forced: bool, circuit: bool) -> int:
-    """Return the number of rows of a column."""
+    """Return the number of rows of a tangent column."""
     return electric_row(forced) + (ELECTRICS + 1 if circuit else 0)
 
 
 def changing(forced: bool, damped: bool = True, circuit: bool = False) -> int:
-    """Return the number of rows of a column that change between switches.
+    """Return the number of rows of a tangent column that change between switching events.
 
-    The last of the energies is that of damping; with a circuit it is always there, and the electric state
-    comes after it.
+    The damping loss, which is the last energy, is included if the armature is damped or a circuit is present;
+    the electric state follows it.
     """
     energies = ENERGIES - (not (damped or circuit)) if forced else 0
     return STATE + energies + (ELECTRICS if circuit else 0)
 
 
 def work_width(columns: int, forced: bool, circuit: bool = False) -> int:
-    """Return the length of the rows of the working space; `MEMORIES` needs five places.
+    """Return the length of a row of the working space, at least the five elements that `MEMORIES` needs.
 
-    The electric state is in the last places.
+    The electric state is stored in the last elements of a row.
     """
     width = max(FIRST_COLUMN + changing(forced, circuit=circuit) * columns, 5)
     return width + (ELECTRICS if circuit else 0)

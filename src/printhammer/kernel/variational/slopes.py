@@ -1,8 +1,8 @@
-"""Derivatives of the force laws, by differences of fourth order on one side of every kink.
+"""Derivatives of the force laws by fourth-order differences that do not cross a kink of a law.
 
-A part need not define its derivatives. In the middle of a law's range the five-point formula is central; at
-an end of the range, at a surface and beside a kink it is one-sided. The spacings below make truncation and
-rounding errors about equal, some 1e-12 of the slope. M. Abramowitz and I. A. Stegun, *Handbook of
+A part need not define derivatives of its laws. Inside the range of a law, the five-point formula is central;
+at an end of the range, at a surface and beside a kink, it is one-sided. The step sizes below make truncation
+and rounding errors about equal, near 1e-12 of the derivative. M. Abramowitz and I. A. Stegun, *Handbook of
 Mathematical Functions* (1964), table 25.2.
 """
 
@@ -37,17 +37,19 @@ if TYPE_CHECKING:
     )
 
 FIELD_SPACING = 2e-4
-"""Step, as a fraction of the scale of displacement."""
+"""Step size for magnet and spring force, as a fraction of the displacement scale."""
 NEAR_END = 1e-3
-"""Step, as a fraction of the distance from an end of the range, which may be a pole of the law."""
+"""Limit of the step size, as a fraction of the distance to an end of the range, where the law may be
+singular."""
 DEPTH_SPACING = 3e-4
-"""Step, as a fraction of the depth in the pack, whose law may have high powers of the depth."""
+"""Step size in the pack, as a fraction of the depth, since the law may contain high powers of the depth."""
 LEAST_DEPTH_SPACING = 1e-7
-"""Smallest step in the pack, as a fraction of the scale of displacement."""
+"""Smallest step size in the pack, as a fraction of the displacement scale."""
 ROOT_SPACING = 1e-3
-"""Step, as a fraction of w in the backstop, or of a hundredth of the root of the displacement scale."""
+"""Step size of w in the backstop, as a fraction of w, or of 1/100 of the root of the displacement scale if
+larger."""
 SPEED_SPACING = 1e-3
-"""Step, as a fraction of the scale of velocity."""
+"""Step size of the velocity, as a fraction of the velocity scale."""
 
 BACKWARD, CENTRAL, FORWARD = 0, 1, 2
 OFFSETS = np.array([[0.0, -1.0, -2.0, -3.0, -4.0], [-2.0, -1.0, 1.0, 2.0, 0.0], [0.0, 1.0, 2.0, 3.0, 4.0]])
@@ -60,20 +62,21 @@ POINTS = np.array([5, 4, 5])
 
 @inlined
 def field_at(x: float, value: float, hammer: Hammer) -> float:
-    """Return the sum of magnet and spring force [N] while the drive has the value `value`."""
+    """Return the sum of magnet and spring force [N] for a drive value; a drive force is not included."""
     current = 0.0 if FORCE_DRIVE else value
     return magnet_force(hammer[MAGNET:], x, current) + spring_force(hammer[SPRING:PACK], x)
 
 
 @compiled
 def field_slope(x: float, value: float, scales: Any, bounds: Any, hammer: Hammer) -> float:
-    """Return the slope [N/m] of the sum of magnet and spring force.
+    """Return the derivative of magnet and spring force with respect to displacement [N/m].
 
-    `scales` are those of displacement and velocity; `bounds` begins with the ends of the range of the laws.
+    `scales` holds the scales of displacement and velocity; `bounds` begins with the ends of the range of the
+    laws.
     """
     to_end = min(x - bounds[0], bounds[1] - x)
     spacing = min(FIELD_SPACING * scales[0], NEAR_END * max(to_end, NEAR_END * scales[0]))
-    # Recompute the step in floating point, so that the points lie where the formula assumes them.
+    # Round the step so that x + spacing is exact, as the difference formula assumes.
     spacing = (x + spacing) - x
     side = CENTRAL
     if x - 2.0 * spacing < bounds[0]:
@@ -88,7 +91,7 @@ def field_slope(x: float, value: float, scales: Any, bounds: Any, hammer: Hammer
 
 @compiled
 def damping_slope(v: float, scales: Any, hammer: Hammer) -> float:
-    """Return the slope of the damping force with velocity [N s/m]."""
+    """Return the derivative of the damping force with respect to velocity [N s/m]."""
     if not HAS_DAMPING:
         return 0.0
     spacing = SPEED_SPACING * scales[1]
@@ -103,10 +106,11 @@ def damping_slope(v: float, scales: Any, hammer: Hammer) -> float:
 def pack_slopes(
     x: float, v: float, mode: int, memory: float, peak: float, scales: Any, hammer: Hammer
 ) -> tuple[float, float]:
-    """Return the slopes of the pack force with displacement [N/m] and velocity [N s/m].
+    """Return the derivatives of the pack force with displacement [N/m] and velocity [N s/m].
 
-    On an unloading branch, with its local maximum `peak`, the law is not evaluated beyond the maximum: the
-    branch has so high a power of the depth that in a shallow contact it would dominate the differences.
+    On an unloading branch, the step size is limited by the depth of its local maximum `peak`: the branch
+    contains so high a power of the depth that, in a shallow contact, points far beyond the maximum would
+    dominate.
     """
     front = hammer[FRONT]
     x = max(x, front)
@@ -146,13 +150,13 @@ def pack_slopes(
 
 @inlined
 def peak_spacing(peak: float, hammer: Hammer) -> float:
-    """Return the step of a local maximum [m] for the derivative of the unloading branch."""
+    """Return the step size [m] of the local maximum for the derivative of the unloading branch."""
     return float((peak + DEPTH_SPACING * (peak - hammer[FRONT])) - peak)
 
 
 @compiled
 def note_memories(memories: Any, peak: float, hammer: Hammer) -> None:
-    """Fill `memories`, five places, with the memory of the pack law for local maxima about `peak` [m]."""
+    """Write the memory values of the pack law for five local maxima around `peak` [m] to `memories`."""
     spacing = peak_spacing(peak, hammer)
     for k in range(5):
         memories[k] = pack_memory(hammer[PACK:BACKSTOP_PART], peak + OFFSETS[CENTRAL, k] * spacing)
@@ -160,7 +164,7 @@ def note_memories(memories: Any, peak: float, hammer: Hammer) -> None:
 
 @compiled
 def memory_slope(x: float, v: float, peak: float, memories: Any, hammer: Hammer) -> float:
-    """Return the slope [N/m] of the unloading branch at (`x`, `v`) with its local maximum `peak`."""
+    """Return the derivative of the unloading force at (`x`, `v`) with respect to the local maximum [N/m]."""
     spacing = peak_spacing(peak, hammer)
     if spacing == 0.0:
         return 0.0
@@ -172,16 +176,17 @@ def memory_slope(x: float, v: float, peak: float, memories: Any, hammer: Hammer)
 
 @inlined
 def contact_force(w: float, v: float, hammer: Hammer) -> float:
-    """Return the force of the backstop [N] at compression ``w**2`` [m]."""
+    """Return the total (elastic plus viscous) backstop force [N] at compression ``w**2`` [m]."""
     c = hammer[BACKSTOP_PART:MAGNET]
     return backstop_elastic(c, w) + backstop_viscous(c, w, v)
 
 
 @compiled
 def contact_slopes(w: float, v: float, scales: Any, hammer: Hammer) -> tuple[float, float, float, float]:
-    """Return the slopes of the backstop's force with w [N/m^0.5] and with velocity [N s/m].
+    """Return the derivatives of the backstop force with w [N/m^0.5] and with velocity [N s/m].
 
-    If constants force the columns, also the slopes of its viscous part.
+    The third and fourth values are the derivatives of the viscous force; without forcing they are not
+    computed.
     """
     c = hammer[BACKSTOP_PART:MAGNET]
     w = max(w, 0.0)

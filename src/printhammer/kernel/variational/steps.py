@@ -1,4 +1,4 @@
-"""Columns propagated from one node of a recorded run to the next, in motion and at rest."""
+"""Tangent columns propagated from one node of a recorded run to the next, in motion and at rest."""
 
 from __future__ import annotations
 
@@ -66,13 +66,13 @@ if TYPE_CHECKING:
     )
 
 GRADING = 1.0 / 64.0
-"""Shortest first step after a touch of the pack, whose slope is not smooth there, as a fraction of the step.
-"""
+"""Smallest step after a touch of the pack, where the stiffness is not smooth, as a fraction of the run's
+step."""
 
 
 @compiled
 def begin_step(node: Any, work: Any) -> None:
-    """Copy the state at a node into row START of `work`."""
+    """Copy the state at a node of the record to row START of `work`."""
     work[START, 0] = node[4] if int(node[3]) == M.BACKSTOP else node[1]
     work[START, 1] = node[2]
     work[START, TIME] = node[0]
@@ -85,10 +85,10 @@ def begin_step(node: Any, work: Any) -> None:
 def length_in_contact(
     t: float, leaves: bool, t0: float, w0: float, v0: float, hammer: Hammer, drive: Drive
 ) -> float:
-    """Return the s, from a state in the backstop at time `t0`, of the time `t` [s].
+    """Return the length in s from a state in the backstop at time `t0` to the time `t` [s].
 
-    As `printhammer.kernel.methods.contact.s_at`, with the accuracy that the variation needs. If the armature
-    `leaves` at `t`, w = 0 is solved for, since dt/ds = 0 there.
+    Like :func:`printhammer.kernel.methods.contact.s_at`, with the lower accuracy that the columns need. If
+    the armature `leaves` at `t`, solves w = 0 instead, since dt/ds = 0 there.
     """
     kv0 = contact_rate(w0, v0, t0, hammer, drive)
     s, change = 0.0, math.inf
@@ -105,7 +105,7 @@ def length_in_contact(
 
 @compiled
 def place_of_rest(t: float, node: Any, k: int, columns: Any, setting: Setting) -> float:
-    """Return the derivative of the rest position with a constant [m]."""
+    """Return the derivative of the rest position [m] with respect to constant k."""
     scales, bounds, hammer, live, forcing = setting
     x, mode, moves = node[1], int(node[3]), forcing.moves
     if mode == M.RESTING:
@@ -132,10 +132,10 @@ def place_of_rest(t: float, node: Any, k: int, columns: Any, setting: Setting) -
 
 @compiled
 def settle(pause: float, node: Any, columns: Any, setting: Setting) -> float:
-    """Let the columns decay for `pause` [s] about a rest position in the backstop.
+    """Propagate the columns for `pause` [s] at a rest position in the elastic backstop, in closed form.
 
-    The decay is that of the linear oscillator with the slopes at the rest position, in closed form. Returns
-    the logarithm of a factor taken out of the columns.
+    The perturbation obeys the linear oscillator with the stiffness and damping at the rest position. Returns
+    the logarithm of a factor that has been divided out of the columns.
     """
     scales, bounds, hammer = setting.scales, setting.bounds, setting.hammer
     x, w = node[1], node[4]
@@ -164,7 +164,7 @@ def settle(pause: float, node: Any, columns: Any, setting: Setting) -> float:
 def rest(t: float, t_to: float, node: Any, columns: Any, setting: Setting) -> float:
     """Propagate the columns through a rest from `t` to `t_to` [s]; earlier perturbations vanish or decay.
 
-    Returns the logarithm of a factor taken out of the columns.
+    Returns the logarithm of a factor that has been divided out of the columns.
     """
     grown = 0.0
     if int(node[3]) != M.HELD:
@@ -192,8 +192,8 @@ def rest(t: float, t_to: float, node: Any, columns: Any, setting: Setting) -> fl
 def rest_with_current(t: float, t_to: float, node: Any, columns: Any, work: Any, setting: Setting) -> float:
     """Propagate the columns through a rest from `t` to `t_to` [s] while the circuit evolves.
 
-    An armature held in the backstop still oscillates about its rest position; elsewhere it does not move.
-    Returns the logarithm of a factor taken out of the columns.
+    In an elastic backstop, perturbations oscillate about the rest position; elsewhere the armature is fixed.
+    Returns the logarithm of a factor that has been divided out of the columns.
     """
     hammer, live = setting.hammer, setting.drive
     mode, grown = int(node[3]), 0.0
@@ -201,7 +201,7 @@ def rest_with_current(t: float, t_to: float, node: Any, columns: Any, work: Any,
         grown = rest(t, t_to, node, columns, setting)
         if hammer[CAPACITANCE] == 0.0:
             return grown
-        # Meanwhile a reservoir is charged, with its own time constant.
+        # Meanwhile a reservoir charges with the time constant of its RC circuit.
         fall = math.exp(-(t_to - t) / (hammer[CHARGING] * hammer[CAPACITANCE]))
         for k in range(columns.shape[1]):
             columns[0, k] *= math.exp(grown)
@@ -227,7 +227,7 @@ def rest_with_current(t: float, t_to: float, node: Any, columns: Any, work: Any,
 
 @compiled
 def set_in(t: float, t_to: float, node: Any, columns: Any, work: Any, setting: Setting) -> None:
-    """Propagate the columns through the step that starts the regularised equations."""
+    """Propagate the columns through the short first step of a backstop contact that begins at rest."""
     hammer, drive, forcing = setting.hammer, setting.drive, setting.forcing
     x, pause = node[1], t_to - t
     if HAS_CIRCUIT:
@@ -252,7 +252,7 @@ def set_in(t: float, t_to: float, node: Any, columns: Any, work: Any, setting: S
 
 @compiled
 def add_stored(sign: float, columns: Any, work: Any, hammer: Hammer, forcing: Forcing) -> None:
-    """Add the energy still stored in a released backstop to its loss: in closed form."""
+    """Add the derivative of the energy stored in a released backstop, times `sign`, to the backstop loss."""
     for k in range(columns.shape[1]):
         columns[BACKSTOP_LOSS, k] += sign * stored_change(work[START, 0], columns[0, k], k, hammer, forcing)
 
@@ -261,7 +261,7 @@ def add_stored(sign: float, columns: Any, work: Any, hammer: Hammer, forcing: Fo
 def carry(t_to: float, node: Any, after: Any, columns: Any, work: Any, setting: Setting) -> float:
     """Propagate state and columns from row START of `work` to `t_to` [s], in the step from `node`.
 
-    Returns the logarithm of a factor taken out of the columns.
+    Returns the logarithm of a factor that has been divided out of the columns.
     """
     grown = carry_state(t_to, node, after, columns, work, setting)
     if HAS_CIRCUIT:
@@ -273,7 +273,7 @@ def carry(t_to: float, node: Any, after: Any, columns: Any, work: Any, setting: 
 
 @compiled
 def carry_state(t_to: float, node: Any, after: Any, columns: Any, work: Any, setting: Setting) -> float:
-    """Like `carry`, except for a linkage tied to the displacement."""
+    """Propagate state and columns like `carry`, but without `hold_linkage`."""
     hammer, drive, forcing = setting.hammer, driven(setting.drive, electric_in(work[START])), setting.forcing
     t = work[START, TIME]
     if t_to <= t:
@@ -290,7 +290,7 @@ def carry_state(t_to: float, node: Any, after: Any, columns: Any, work: Any, set
         work[START, TIME] = t_to
         set_in(t, t_to, node, columns, work, setting)
         return 0.0
-    # The energy still stored in a released backstop is lost as it recovers.
+    # The energy still stored in a released backstop is dissipated while the backstop recovers.
     if FORCED and HAS_BACKSTOP and mode == M.BACKSTOP_RELEASED:
         add_stored(1.0, columns, work, hammer, forcing)
     take_in(work, columns)

@@ -1,7 +1,7 @@
-"""Derivatives of the coil circuit with constants: the forcing of its rows, and moving edges.
+"""Derivatives of the coil circuit with respect to constants: forcing of the electric rows, and moving edges.
 
-At a fixed state and time the rates of the electric state change with the resistances, the voltages and the
-current of a linkage; a later edge prolongs the rates before it.
+At a fixed state and time, the rates of the electric state depend on the resistances, the voltages and the
+current for a flux linkage. If an edge moves to a later time, the rates before the edge apply for longer.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
 @compiled
 def source_changes(t: float, live: Any, k: int, forcing: Forcing) -> tuple[float, float]:
-    """Return the changes of the voltage [V] that acts on the coil and of the resistance in series [ohm]."""
+    """Return the derivatives of the source voltage and the series resistance with respect to constant k."""
     moves, pulse = forcing.moves, forcing.live_moves[k]
     kind, path = kind_of(live), path_of(live)
     if kind == SWITCHED_PIECE:
@@ -66,7 +66,7 @@ def source_changes(t: float, live: Any, k: int, forcing: Forcing) -> tuple[float
 
 @called
 def add_supply(rates: Any, y: Any, count: int, x: float, setting: Setting) -> None:
-    """Add the effect of constants to the `rates` of the electric rows at `y`."""
+    """Add the effect of constants to the `rates` of the electric rows of the tangent columns at `y`."""
     hammer, live, forcing = setting.hammer, setting.drive, setting.forcing
     moves, pace, t, electric = forcing.moves, rates[V.TIME], y[V.TIME], electric_in(y)
     has_turn, blocked = hammer[TURN_RESISTANCE] > 0.0, path_of(live) == BLOCKED
@@ -99,7 +99,7 @@ def add_supply(rates: Any, y: Any, count: int, x: float, setting: Setting) -> No
 
 @compiled
 def latest_edge(t: float, train: Train, first: int, last: int) -> tuple[int, int]:
-    """Return pulse and piece of the latest edge that `pass_edges` has still to pass; or -1."""
+    """Return pulse and piece indices of the latest edge not yet passed by `pass_edges`; (-1, -1) if none."""
     pulse, begun = -1, -1
     for p in range(first, last):
         piece = train.under_way[p]
@@ -114,13 +114,13 @@ def latest_edge(t: float, train: Train, first: int, last: int) -> tuple[int, int
 
 @compiled
 def rates_at(node: Any, setting: Setting) -> tuple[float, float, float]:
-    """Return the rates of the electric state at a node, under the piece and on the path of `live`."""
+    """Return the time derivatives of the electric state at a node, for the piece and path in `live`."""
     return electric_rates(node[0], node[1], node[2], electric_at_node(node), setting.hammer, setting.drive)
 
 
 @called
 def move_edge(node: Any, before: Any, pulse: int, piece: int, columns: Any, setting: Setting) -> None:
-    """Propagate the columns through a moving edge of a driver, with the rates `before` it."""
+    """Propagate the columns through a driver edge whose time varies; `before` holds the rates before it."""
     live, forcing = setting.drive, setting.forcing
     behind = rates_at(node, setting)
     off_time = kind_of(live) == SWITCHED_PIECE and live[7] < 0.0

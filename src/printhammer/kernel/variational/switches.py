@@ -1,7 +1,8 @@
-"""Jumps of columns at the switches of a run and at the edges of its drive: the saltation matrices.
+"""Jumps of the tangent columns at switching events and edges of the drive: the saltation matrices.
 
-A neighbouring motion meets a switch slightly earlier or later and follows the other law in between; a
-constant may also move a surface, an edge or the law of an impact. The derivation is in docs/tangent.md.
+A neighbouring motion meets a switching event slightly earlier or later, and obeys the other force law in
+between. A constant may also move a surface or an edge, or change the law of an impact. The derivation is in
+docs/tangent.md.
 """
 
 from __future__ import annotations
@@ -36,14 +37,15 @@ if TYPE_CHECKING:
     from printhammer.kernel.variational.slopes import field_at
 
 SPEED_SPACING = 1e-3
-"""Step of the impact speed for the derivative of the rebound, as a fraction of the speed."""
+"""Step size of the impact speed for the derivative of the rebound velocity, as a fraction of the speed."""
 NEAR = 1e-9
-"""Fraction of an indentation by which a reversal must differ from the old maximum to count as a new one."""
+"""Smallest distance of a reversal from the old local maximum, as a fraction of the indentation, at which the
+reversal is differentiable."""
 
 
 @compiled
 def acceleration_at(node: Any, mode: int, kept: float, v: float, hammer: Hammer, drive: Drive) -> float:
-    """Return the acceleration [m/s^2] at a node under the law of `mode`."""
+    """Return the acceleration [m/s^2] at a node with the force law of `mode`, for velocity `v`."""
     if mode == M.BACKSTOP:
         return backstop_acceleration(node[0], 0.0, v, hammer, drive)
     return acceleration(node[0], node[1], v, mode, memory_of(mode, kept, hammer), hammer, drive)
@@ -51,26 +53,26 @@ def acceleration_at(node: Any, mode: int, kept: float, v: float, hammer: Hammer,
 
 @compiled
 def powers_at(node: Any, mode: int, kept: float, v: float, hammer: Hammer, drive: Drive) -> Any:
-    """Return the powers [W] at a node under the law of `mode`; the backstop is not compressed there."""
+    """Return the powers [W] at a node with the force law of `mode`, with an uncompressed backstop."""
     return powers(node[0], node[1], v, 0.0, mode, memory_of(mode, kept, hammer), hammer, drive)
 
 
 @compiled
 def add_energies(columns: Any, k: int, later: float, before: Any, behind: Any) -> None:
-    """Add to the energies the effect of a delay `later` [s] of a switch: power [W] `before` less `behind`."""
+    """Add to the energy rows the effect of delaying an event by `later` [s]: (before - behind) * later."""
     for i in range(ENERGIES):
         columns[ENERGY + i, k] += (before[i] - behind[i]) * later
 
 
 @compiled
 def is_rebound(node: Any, after: Any) -> bool:
-    """Whether two nodes are the two sides of an impact on a rigid backstop."""
+    """Whether two nodes are the states before and after an impact on a rigid backstop."""
     return RIGID and node[0] == after[0] and int(node[3]) == M.FREE and node[2] < 0.0 and after[2] >= 0.0
 
 
 @compiled
 def pass_rebound(node: Any, after: Any, columns: Any, setting: Setting) -> None:
-    """Propagate the columns through an impact on a rigid backstop."""
+    """Propagate the tangent columns through an impact on a rigid backstop."""
     hammer, drive, forcing = setting.hammer, driven(setting.drive, electric_at_node(after)), setting.forcing
     c = hammer[BACKSTOP_PART:MAGNET]
     v_in, v_out = node[2], after[2]
@@ -80,7 +82,7 @@ def pass_rebound(node: Any, after: Any, columns: Any, setting: Setting) -> None:
         - (backstop_rebound(c, v_in + 2.0 * spacing) - backstop_rebound(c, v_in - 2.0 * spacing))
     ) / (12.0 * spacing)
     a = acceleration(node[0], node[1], v_in, M.FREE, 0.0, hammer, drive)
-    # Only damping distinguishes the two sides of the impact.
+    # Only a damping force makes the accelerations before and after the impact differ.
     jump = acceleration(node[0], node[1], v_out, M.FREE, 0.0, hammer, drive) - a if HAS_DAMPING else 0.0
     for k in range(columns.shape[1]):
         if FORCED:
@@ -98,7 +100,7 @@ def pass_rebound(node: Any, after: Any, columns: Any, setting: Setting) -> None:
         if FORCED:
             columns[1, k] += rebound_change(v_in, k, forcing)
             columns[BACKSTOP_LOSS, k] -= v_out * (columns[1, k] - (a + jump) * earlier) / hammer[INVERSE_MASS]
-            # The lost energy is proportional to the mass.
+            # The energy lost at the impact is proportional to the mass.
             lost = 0.5 * (v_in * v_in - v_out * v_out) / hammer[INVERSE_MASS]
             columns[BACKSTOP_LOSS, k] -= lost * forcing.moves[k, INVERSE_MASS] / hammer[INVERSE_MASS]
             columns[0, k] += forcing.moves[k, POSITION]
@@ -106,14 +108,14 @@ def pass_rebound(node: Any, after: Any, columns: Any, setting: Setting) -> None:
 
 @compiled
 def pass_reversal(node: Any, after: Any, mode: int, following: int, columns: Any, setting: Setting) -> bool:
-    """Propagate the columns through a reversal inside the pack; return whether it is differentiable.
+    """Propagate the tangent columns through a reversal in the pack; return whether differentiable.
 
-    The velocity is zero, and so are all powers.
+    The energy rows do not jump, since all powers are zero at zero velocity.
     """
     hammer, drive = setting.hammer, driven(setting.drive, electric_at_node(after))
     before = acceleration_at(after, mode, node[4], 0.0, hammer, drive)
     behind = acceleration_at(after, following, after[4], 0.0, hammer, drive)
-    # Along the unloading curve: the old maximum is met without velocity.
+    # If the reversal is at the old maximum, the motion meets the maximum with zero velocity.
     if before == 0.0 or (mode == M.RELOADING and node[4] - after[1] <= NEAR * (node[4] - hammer[FRONT])):
         return False
     new_peak = following == M.UNLOADING and (mode == M.LOADING or after[4] != node[4])
@@ -153,7 +155,7 @@ def pass_level(
 
 @compiled
 def pass_node(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
-    """Propagate the columns through the switch at the node `after`, if any; return whether differentiable."""
+    """Propagate the columns through any event at the node `after`; return whether it is differentiable."""
     if is_rebound(node, after):
         pass_rebound(node, after, columns, setting)
         return True
@@ -168,7 +170,7 @@ def pass_node(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
 
 @compiled
 def value_of_piece(t: float, fired: float, piece: int, pieces: Any) -> float:
-    """Return the value [A or N] of one piece of a pulse fired at time `fired` [s]."""
+    """Return the value [A or N] at time `t` of one waveform piece of a pulse fired at time `fired` [s]."""
     if pieces[piece, 1] == END:
         return 0.0
     return piece_value(pieces[piece], 1, (t - fired) - pieces[piece, 0])
@@ -178,7 +180,7 @@ def value_of_piece(t: float, fired: float, piece: int, pieces: Any) -> float:
 def pass_edge(
     node: Any, value: float, change: float, pulse: int, piece: int, columns: Any, setting: Setting
 ) -> float:
-    """Propagate the columns through an edge at which the drive jumps by `change`; return its new value."""
+    """Propagate the columns through an edge where the drive jumps by `change`; return the new drive."""
     hammer, forcing = setting.hammer, setting.forcing
     new = value + change
     if HAS_CIRCUIT:
@@ -204,7 +206,7 @@ def pass_edge(
 
 @compiled
 def pass_moving_edges(node: Any, train: Train, first: int, last: int, columns: Any, setting: Setting) -> None:
-    """Propagate the columns through all edges of the drive at a node that `pass_edges` has not passed yet."""
+    """Propagate the columns through the edges of the drive at a node not yet passed by `pass_edges`."""
     firings, begins, pieces, replace, under_way, live = train
     t = node[0]
     value = drive_value(t, live)
