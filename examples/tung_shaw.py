@@ -7,7 +7,7 @@ to the elements that are sufficient for chaos: a rigid mass, a preloaded spring 
 negative stiffness for magnet and flexure together, half-sine pulses of force, a
 spring and a dashpot for the paper, and a coefficient of restitution for the backstop.
 All of these elements exist as parts, so that a hammer file can describe their hammer.
-The constants in this file are assumed; the article prints none.
+The constants in this file are assumed; none is taken from the article.
 """
 
 import matplotlib.pyplot as plt
