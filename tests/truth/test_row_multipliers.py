@@ -58,3 +58,13 @@ def test_signs_and_sizes() -> None:
 def test_short_rows_are_refused(shipped: ph.Hammer) -> None:
     with refused("drive"):
         row_multipliers([shipped], [ph.PulseTrain(shipped.waveform, rate=500.0, pulses=3)], TIGHT)
+
+
+def test_a_relay_at_rest_on_its_stop_forgets() -> None:
+    """It bounces less than a run of a table errs, or rests, where x has no lower neighbour."""
+    relay = ph.load("relay-5v")
+    short = ph.PulseTrain(relay.waveform.model_copy(update={"width": 10e-3}), rate=30.0, pulses=DOTS)
+    rows = [ph.PulseTrain(relay.waveform, rate=30.0, pulses=DOTS), short]
+    for closed in (False, True):
+        found = row_multipliers([relay] * 2, rows, Effort(5e-7), firing=2, closed=closed)
+        assert (np.abs(found) < 1e-2).all()

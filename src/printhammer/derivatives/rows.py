@@ -20,6 +20,7 @@ from printhammer.derivatives.states import components
 from printhammer.drive.trains import Drive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
+from printhammer.hammer.static_force import StaticForce
 from printhammer.run.effort import Effort
 from printhammer.run.ensemble import Ensemble, Strobes
 from printhammer.run.start import initial_state
@@ -35,8 +36,13 @@ DOTS: Final = FIRING + MORE
 """Number of dots in a row that is long enough for the default starting firing."""
 
 _SPACING: Final = 1e-5  # Finite-difference step of the state, in its scales
+# Largest error tolerance: a derivative errs by that of a run over the step. In velocity the former counts in
+# speeds of the flight, the latter in ways per period, 150 times smaller for a relay.
+_TOLERANCE: Final = 1e-9
 _CLOSED: Final = 1e-6  # Distance from state to image below which an orbit is closed, in scales of the state
 _LONGEST_STEP: Final = 0.1  # Longest Newton step, in scales of the state
+# Size of the derivative below which steps are not limited; arbitrary, well below 1
+_CONTRACTING: Final = 0.3
 _ITERATIONS: Final = 12  # Iteration limit
 
 
@@ -56,7 +62,7 @@ def row_multipliers(
         One hammer and one drive per row. A drive starts from rest and has at least four firings more than
         `firing`; from the firing before `firing` on, all firings are identical and equally spaced.
     effort : Effort
-        Tolerance and threads.
+        Tolerance, at most `_TOLERANCE`, and threads.
     closed : bool, optional
         Whether to find the fixed point by Newton's method; otherwise the derivative is evaluated at the state
         that the row from rest reaches, which is near the fixed point if the preceding dots are good.
@@ -86,8 +92,11 @@ def row_multipliers(
         left = size > _CLOSED
         open_, defect = open_[left], defect[left]
         step = (np.linalg.pinv(np.eye(2) - jacobian[open_]) @ defect[:, :, np.newaxis])[:, :, 0]
+        contracts = np.abs(jacobian[open_]).max(axis=(1, 2)) < _CONTRACTING
         longest = np.abs(step).max(axis=1, keepdims=True)
-        z[open_] += step * np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, _CLOSED))
+        # A map that contracts may go all the way, as far as from a bounce to rest.
+        allowed = np.where(contracts, np.inf, _LONGEST_STEP)[:, np.newaxis]
+        z[open_] += step * np.minimum(1.0, allowed / np.maximum(longest, _CLOSED))
     if closed:
         jacobian[open_] = np.nan
     return leading(jacobian)
@@ -120,6 +129,7 @@ class _Maps:
         period = self.times[:, 2] - self.times[:, 1]
         way = np.array([_way(hammer) for hammer in hammers])
         self.scales = np.stack([way, way / period], axis=1)
+        self.lowest = np.array([StaticForce(hammer).limits[0] for hammer in hammers])
         strobes = self._run(None, np.zeros(len(hammers)), self.times[:, :2], hammers, drives)
         states = np.stack([strobes.x, strobes.v], axis=2)
         states[_with_memory(strobes)] = np.nan
@@ -131,7 +141,12 @@ class _Maps:
         """Compute the images (n, 2) of scaled states of given rows, and the derivatives (n, 2, 2)."""
         steps = _SPACING * np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
         count, places = len(steps), np.repeat(rows, len(steps))
-        states = ((z[:, np.newaxis] + steps) * self.scales[rows][:, np.newaxis]).reshape(-1, 2)
+        shifted = (z[:, np.newaxis] + steps) * self.scales[rows][:, np.newaxis]
+        # On a rigid backstop the difference is one-sided.
+        shifted[:, :, 0] = np.maximum(shifted[:, :, 0], self.lowest[rows, np.newaxis])
+        apart = shifted[:, [1, 3]] - shifted[:, [2, 4]]
+        apart = np.stack([apart[:, 0, 0], apart[:, 1, 1]], axis=1) / self.scales[rows]
+        states = shifted.reshape(-1, 2)
         images = np.full((len(places), 2), np.nan)
         able = np.array([_possible(self.hammers[k], state) for k, state in zip(places, states, strict=True)])
         able = np.repeat(able.reshape(-1, count).all(axis=1), count)
@@ -148,8 +163,8 @@ class _Maps:
                 middle = np.flatnonzero(able)[::count] // count
                 self.current[rows[middle]] = strobes.electric[::count, 0]
         groups = np.asarray(images.reshape(-1, count, 2))
-        slopes = [(groups[:, k] - groups[:, k + 1]) / (2.0 * _SPACING) for k in (1, 3)]
-        return groups[:, 0], np.stack(slopes, axis=2)
+        differences = np.stack([groups[:, k] - groups[:, k + 1] for k in (1, 3)], axis=2)
+        return groups[:, 0], differences / apart[:, np.newaxis]
 
     def _run(
         self,
@@ -165,7 +180,7 @@ class _Maps:
             moments[:, -1],
             states=states,
             starts=starts,
-            tolerance=self.effort.tolerance,
+            tolerance=min(self.effort.tolerance, _TOLERANCE),
         )
         result = ensemble.run(strobes=list(moments), threads=self.effort.threads)
         assert result.strobes is not None
