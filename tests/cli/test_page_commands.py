@@ -108,7 +108,6 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     Image.fromarray(255 - 255 * (np.arange(9 * 40).reshape(9, 40) % 7 == 0).astype(np.uint8)).save(
         folder / "drawing.png"
     )
-    (folder / "solenoid.csv").write_text((ROOT / "tests/data/solenoid-quasistatic.csv").read_text("utf-8"))
     ph.tune(hammer, rates=["1.3 kHz"], history=1).save(folder / "table.csv")
     return folder
 

@@ -36,7 +36,6 @@ LONG = {"basins", "bifurcation", "continue", "curve", "orbits", "energy", "feedb
 ELSEWHERE = {
     "paper": "takes minutes; test_paper.py writes the whole report",
     "studio": "ends with Ctrl-C only, in test_studio.py",
-    "fit solenoid": "reads a table that no other verb writes; test_fit_solenoid.py",
     "fit coil": "reads a hammer on a voltage that no other verb writes; test_fit_coil.py",
     "warm": "test_warm.py runs it",
     "learn": "chooses among 400 hammers; test_learn.py, and its page, with fewer",
@@ -115,6 +114,12 @@ def written_by(verb: Verb) -> set[str]:
     names = [words[k + 1] for k, word in enumerate(words) if word in ("--out", ">")]
     names += re.findall(r"[\w.]+\.jsonl?\b", verb.example)
     return {Path(name).parts[0] for name in names}
+
+
+def test_the_examples_run_one_after_the_other_in_one_folder() -> None:
+    """Each writes files of its own; the tables of the bench are written over."""
+    written = [name for verb in VERBS for name in written_by(verb) if name not in ("build", "lab")]
+    assert len(set(written)) == len(written)
 
 
 @pytest.mark.parametrize("verb", VERBS, ids=NAMES)

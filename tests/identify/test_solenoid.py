@@ -10,7 +10,7 @@ import printhammer as ph
 from printhammer.errors import InputError
 from printhammer.parts.magnet.reluctance import ReluctanceMagnet, magnet_force, magnet_linkage
 
-PUBLISHED = Path(__file__).parents[1] / "data" / "solenoid-quasistatic.csv"
+PUBLISHED = Path(ph.__file__).parent / "identify" / "static" / "pot-magnet.csv"
 MADE = {
     "pole_area": 4e-5,
     "residual_gap": 2e-4,

@@ -4,7 +4,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-TABLE = Path(__file__).parents[2] / "data" / "solenoid-quasistatic.csv"
+import printhammer as ph
+
+TABLE = Path(ph.__file__).parent / "identify" / "static" / "pot-magnet.csv"
 
 
 def test_the_verb_writes_a_fragment(cli: Callable[..., Any], tmp_path: Path) -> None:

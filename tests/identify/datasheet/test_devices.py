@@ -85,7 +85,7 @@ def test_a_pinball_plunger_arrives_while_its_coil_is_fired() -> None:
 
 def test_a_pot_magnet_meets_the_forces_and_inductances_of_its_study() -> None:
     study = np.loadtxt(
-        Path(__file__).parents[2] / "data" / "solenoid-quasistatic.csv", delimiter=",", skiprows=4
+        Path(ph.__file__).parent / "identify" / "static" / "pot-magnet.csv", delimiter=",", skiprows=4
     )
     magnet = ph.load("pot-magnet").magnet
     assert magnet is not None

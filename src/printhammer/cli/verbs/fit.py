@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
+
+import typer
 
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Content, Job, announce_compiling, verb
@@ -96,20 +99,21 @@ def magnet(
 
 @verb(
     "fit solenoid",
-    "printhammer fit solenoid solenoid.csv --turns 600 --current '0.8 A' --out solenoid.toml",
+    "printhammer fit solenoid --example > solenoid.csv"
+    " && printhammer fit solenoid solenoid.csv --turns 957 --current '1.2 A' --out solenoid.toml",
     _PASSED,
     **_FILES,
 )
 def solenoid(
     job: Job,
-    file: Path = _measured(
-        "Table of a coil, armature held: columns gap, force, inductance or linkage, optionally current.",
-        default=...,
+    file: Path | None = _measured(
+        "Table of a coil, armature held: columns gap, force, inductance or linkage, optionally current."
     ),
-    turns: float = opt.number("Number of turns of the coil.", metavar="N", default=...),
+    turns: float | None = opt.number("Number of turns of the coil.", metavar="N"),
     current: float | None = opt.quantity(
         "A", "CURRENT", "Current of all rows, if the table has no column of currents."
     ),
+    example: bool = opt.switch("Print the published table of a pot magnet, as an example."),
     hammer: str | None = _HAMMER,
     strict: bool = _STRICT,
     **passed: Any,
@@ -119,6 +123,14 @@ def solenoid(
     Force and inductance at one current reveal the saturation of the core. The constants are those of the
     magnet law `reluctance`, except the displacement at which its gap closes.
     """
+    if example:
+        table = files("printhammer").joinpath("identify", "static", "pot-magnet.csv")
+        typer.echo(table.read_text(encoding="utf-8"), nl=False)
+        return Answer()
+    if file is None:
+        raise InputError("FILE is missing", key="FILE", expected="a table; --example prints one")
+    if turns is None:
+        raise InputError("--turns is missing", key="--turns", expected="the number of turns of the coil")
     from printhammer.identify.fitting import fit
 
     return _fitted(
