@@ -19,7 +19,7 @@ CODE = b"machine code"
 
 
 def kept(name: str = "curves.code") -> cache.Code:
-    return cache.Code(name, "curves", "a line")
+    return cache.Code(name, "curves", "a line", lambda: True)
 
 
 def make() -> bytes:
@@ -182,10 +182,16 @@ def test_a_record_that_is_none_is_passed_over(tmp_path: Path, text: str) -> None
     assert records.mismatch(tmp_path) == ""
     records.note(tmp_path, "runs", 2.5)
     assert records.expected([tmp_path], "runs") == 2.5
+    # Modules that a checkout has to lower first take longer, and are recorded by themselves.
+    lowered = cache.Code("runs.code", "runs", "a line", lambda: False).work
+    assert records.expected([tmp_path], lowered) > 2.0 * records.expected([], "runs")
+    records.note(tmp_path, lowered, 12.0)
+    assert records.expected([tmp_path], lowered) == 12.0
+    assert records.expected([tmp_path], "runs") == 2.5
 
 
 def test_what_may_follow_is_told_until_it_is_there(folder: Path, said: list[str]) -> None:
-    first, second = kept(), cache.Code("peaks.code", "peaks", "a line")
+    first, second = kept(), cache.Code("peaks.code", "peaks", "a line", lambda: True)
     first.with_it, second.with_it = (second,), (first,)
     assert [first.get(make), second.get(make)] == [CODE, CODE]
     assert said == [

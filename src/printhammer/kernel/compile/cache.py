@@ -183,6 +183,10 @@ class File:
         contents = (_content(folder / self.name) for folder in self._read)
         return next((content for content in contents if content is not None), None)
 
+    def exists(self) -> bool:
+        """Whether the content is on disk, undamaged."""
+        return self.read() is not None
+
     def keep(self, content: bytes) -> None:
         """Keep the content; say once in this process where it cannot be."""
         if self._written is None:
@@ -212,42 +216,45 @@ class Code(File):
     """The machine code of an entry point on disk, made when it is wanted.
 
     `kind` is the kind of code in the records, and `label` says what it computes, for who waits for it.
+    `is_lowered` says whether the modules that it is linked from are there, as in a wheel.
     """
 
-    def __init__(self, name: str, kind: str, label: str) -> None:
+    def __init__(self, name: str, kind: str, label: str, is_lowered: Callable[[], bool]) -> None:
         super().__init__(name)
-        self.kind, self.label = kind, label
+        self.kind, self.label, self._is_lowered = kind, label, is_lowered
         self.with_it: tuple[Code, ...] = ()
         """Machine code that is often needed after this one."""
         self.is_begun = False
-
-    def exists(self) -> bool:
-        """Whether the machine code is on disk, for this processor and these versions."""
-        return self.read() is not None
 
     def get(self, make: Callable[[], bytes]) -> bytes:
         """Return machine code; where there is none, say what comes, make it, and note how long that took."""
         code = self.read()
         if code is not None:
             return code
+        work = self.work
         if listeners:
             self._announce()
         self.is_begun = True
         for watcher in tuple(watchers):
             watcher(True)
         try:
-            return super().get(lambda: self._noted(make))
+            return super().get(lambda: self._noted(work, make))
         finally:
             for watcher in tuple(watchers):
                 watcher(False)
 
-    def _noted(self, make: Callable[[], bytes]) -> bytes:
+    @property
+    def work(self) -> str:
+        """Kind of work in the records: making code of modules that have to be lowered first takes longer."""
+        return self.kind if self._is_lowered() else f"{self.kind}, {records.LOWERED}"
+
+    def _noted(self, work: str, make: Callable[[], bytes]) -> bytes:
         """Make machine code, and note how long that took."""
         begun = thread_time()
         code = make()
         if self._written is not None:
             with suppress(OSError):
-                records.note(self._written, self.kind, thread_time() - begun)
+                records.note(self._written, work, thread_time() - begun)
         return code
 
     def _announce(self) -> None:
@@ -256,9 +263,9 @@ class Code(File):
         for folder in folders:
             if reason := records.mismatch(folder):
                 say_once(f"{folder}: the machine code there {reason}; it is made anew")
-        seconds = records.expected(folders, self.kind)
+        seconds = records.expected(folders, self.work)
         later = [other for other in self.with_it if not (other.is_begun or other.exists())]
-        rest = sum(records.expected(folders, other.kind) for other in later)
+        rest = sum(records.expected(folders, other.work) for other in later)
         more = f", then at most {rest:.0f} s for {', '.join(other.kind for other in later)}" if later else ""
         what = f"{self.kind} ({self.label})"
         place = "" if self.place in _said else f"; {self.place}"

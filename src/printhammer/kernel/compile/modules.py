@@ -101,6 +101,10 @@ class Module:
         """Return a name that is unique to the content of the module, without reading it."""
         return self.name if self.shipped.exists() else f"{self.name}_{_lowering()}"
 
+    def is_there(self) -> bool:
+        """Whether it is in the wheel or on disk."""
+        return self.shipped.exists() or File(f"{self.name}_{_lowering()}.bc").exists()
+
     def content(self) -> bytes:
         """Return the content, from the wheel, from disk, or made now."""
         if self.shipped.exists():
@@ -203,7 +207,13 @@ class Entry:
         parts = [module.identity() for module in (self._template, *self._laws)]
         here = (*link.processor(), version("llvmlite"), _digest_of(("compile/link.py", "compile/calls.py")))
         digest = hashlib.sha256(repr((parts, sorted(self._choices.items()), here)).encode())
-        self.code = Code(f"{name}_{digest.hexdigest()[:24]}.code", KINDS[name], label)
+        modules = [self._template, *self._laws]
+        self.code = Code(
+            f"{name}_{digest.hexdigest()[:24]}.code",
+            KINDS[name],
+            label,
+            lambda: all(module.is_there() for module in modules),
+        )
 
     def is_ready(self) -> bool:
         """Whether it is loaded, or has machine code on disk."""
