@@ -103,7 +103,7 @@ class Module:
 
     def is_there(self) -> bool:
         """Whether it is in the wheel or on disk."""
-        return self.shipped.exists() or File(f"{self.name}_{_lowering()}.bc").exists()
+        return self.shipped.exists() or File(f"{self.name}_{_lowering()}{self.suffix}").exists()
 
     def content(self) -> bytes:
         """Return the content, from the wheel, from disk, or made now."""
