@@ -131,7 +131,8 @@ class AxisTables:
         interpolates between them.
         """
         unit, first = checked_tick(tick), self.tables[0]
-        times = {name: np.stack([getattr(table, name) for table in self.tables]) for name in COLUMNS}
+        rounded = self.quantised(unit).tables
+        times = {name: np.stack([getattr(table, name) for table in rounded]) for name in COLUMNS}
         size = self.size(tick)
         if budget is not None and size > budget:
             raise InputError(

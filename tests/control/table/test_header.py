@@ -13,7 +13,15 @@ from tests.control.table.by_hand import by_hand
 from tests.errors import refused
 
 from printhammer.control.table.compensation import CompensationTable
-from printhammer.control.table.drive import COLUMNS, histories, number_of, pattern_of, pulses_of
+from printhammer.control.table.drive import (
+    COLUMNS,
+    histories,
+    number_of,
+    numbers_before,
+    pattern_of,
+    pulses_of,
+    shared_numbers,
+)
 from printhammer.control.table.header import look_ahead
 from printhammer.printing.dots.strategy import FIRST_SLOT
 
@@ -95,6 +103,32 @@ def braked(**changes: Any) -> CompensationTable:
         values["brake_width"][:, number], values["brake_delay"][:, number] = 20e-6, delay
     values["advance"][1, number_of((2, 1), 2)] += 30e-6
     return replace(table, **values, **changes)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_pulses_that_touch_do_not_overlap_in_whole_ticks(seed: int) -> None:
+    """The brake pulse begins where the pulse before it ends, and ends where the dot is fired."""
+    rng = np.random.default_rng(seed)
+    table = by_hand()
+    values = {name: getattr(table, name) + rng.uniform(0.0, 4e-6, table.advance.shape) for name in COLUMNS}
+    shared = shared_numbers(table.gaps, table.reach)
+    values = {name: each[:, shared] for name, each in values.items()}
+    for row, rate in enumerate(table.rates.tolist()):
+        for history in histories(table.gaps, table.reach):
+            cell, before = (row, number_of(history, table.reach)), numbers_before(history, table.reach)
+            values["brake_delay"][cell] = (
+                values["width"][row, before] - values["advance"][row, before]
+            ).max()
+            begun = history[0] / rate - values["advance"][cell]
+            values["brake_width"][cell] = begun - values["brake_delay"][cell] if history[0] else 50e-6
+    exact = replace(table, **{name: each[:, shared] for name, each in values.items()})
+    for tick in (1e-6, 2e-6, 5e-6):
+        # A table whose pulses overlap is refused when it is made.
+        whole = exact.quantised(tick)
+        for name in COLUMNS:
+            each = getattr(whole, name)
+            assert np.abs(each / tick - np.rint(each / tick)).max() < 1e-6
+            assert np.abs(each - getattr(exact, name)).max() <= 2.5 * tick
 
 
 @pytest.mark.parametrize("tick", TICKS)

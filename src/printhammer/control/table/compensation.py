@@ -20,6 +20,7 @@ from printhammer.control.table.drive import (
     histories,
     history_text,
     number_of,
+    numbers_before,
     print_pulse,
     pulses_of,
     sequence,
@@ -31,7 +32,14 @@ from printhammer.control.table.formats import (
     csv_head,
     read_table,
 )
-from printhammer.control.table.header import NANOSECOND, bits_of, header_text, look_ahead, size_of
+from printhammer.control.table.header import (
+    NANOSECOND,
+    bits_of,
+    header_text,
+    look_ahead,
+    size_of,
+    whole_ticks,
+)
 from printhammer.drive.input import read_positive
 from printhammer.drive.trains import Drive
 from printhammer.drive.waveforms.shapes import Waveform
@@ -139,10 +147,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         for name in ("brake_delay", "brake_width"):
             if values[name] < 0.0:
                 raise InputError.of(name, values[name], "a number not below 0", file=where, unit="s")
-        before = [
-            number_of((*history[1:], gap) if history[0] else history, self.reach)
-            for gap in range(self.reach + 1)
-        ]
+        before = numbers_before(history, self.reach)
         # The preceding dot may have been fired late; its pulse must be over before the next pulse begins.
         over = float((self.width[row, before] - self.advance[row, before]).max())
         if values["brake_width"] > 0.0:
@@ -363,7 +368,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
                 value=budget,
                 expected="a larger budget, a longer tick, a shorter history, a shorter reach, or fewer rates",
             )
-        return header_text(self._head, self.rates, self._times, unit)
+        return header_text(self._head, self.rates, self.quantised(unit)._times, unit)
 
     def size(self, tick: float | str = NANOSECOND) -> int:
         """Return the size of the C header's arrays in bytes, for a tick, s, or text with a unit."""
@@ -371,9 +376,10 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return size_of(self.rates.size, entries_of(self.gaps, self.reach), bits)
 
     def quantised(self, tick: float | str) -> CompensationTable:
-        """Return a copy with times rounded to a timer tick, s or text; its deviations are unknown (NaN)."""
-        unit = checked_tick(tick)
-        times: dict[str, Any] = {name: np.rint(values / unit) * unit for name, values in self._times.items()}
+        """Return a copy with times in whole timer ticks, s or text; its deviations are unknown (NaN)."""
+        times: dict[str, Any] = whole_ticks(
+            self._times, self.rates, self.gaps, self.reach, checked_tick(tick)
+        )
         return replace(self, **times, deviation=np.full_like(self.deviation, np.nan))
 
     @property

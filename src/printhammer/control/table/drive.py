@@ -71,6 +71,13 @@ def histories(gaps: int, reach: int) -> list[History]:
     return sorted((row for row in every if row == plain(row)), key=lambda row: (gaps - row.count(REST), row))
 
 
+def numbers_before(history: Sequence[int], reach: int) -> list[int]:
+    """List the history numbers that the preceding dot may have; before a rest, the number of `history`."""
+    if not history[0]:
+        return [number_of(history, reach)]
+    return [number_of((*history[1:], gap), reach) for gap in range(reach + 1)]
+
+
 def shared_numbers(gaps: int, reach: int) -> IntArray:
     """Map every history number to the number whose history it stands for, shape (entries,)."""
     every = itertools.product(range(reach + 1), repeat=gaps)

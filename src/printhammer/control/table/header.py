@@ -6,13 +6,23 @@ headers. The C interpolation between rates, or between values of an axis, agrees
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from printhammer.control.table.drive import COLUMNS, JUMP, REST, entries_of
+from printhammer.control.table.drive import (
+    COLUMNS,
+    JUMP,
+    REST,
+    entries_of,
+    histories,
+    number_of,
+    numbers_before,
+    shared_numbers,
+)
 from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.c_code import comment, identifier, nested, numbers
 
@@ -35,6 +45,35 @@ def size_of(rates: int, entries: int, bits: int, values: int = 0) -> int:
     """Return the size of the arrays of a header in bytes, for numbers of rates, entries and axis values."""
     each = len(COLUMNS) * bits // 8 + 1
     return max(values, 1) * rates * entries * each + _PLACE_BYTES * (rates + values)
+
+
+def whole_ticks(
+    times: Mapping[str, FloatArray], rates: FloatArray, gaps: int, reach: int, tick: float
+) -> dict[str, FloatArray]:
+    """Round the times of a table to whole ticks, such that no pulse begins before the preceding one ends.
+
+    Where rounding to the nearest tick makes two pulses overlap, the brake pulse begins later or is shorter,
+    or the dot is fired later, by a tick or two. Arguments as for `look_ahead`, with arrays (rates, entries).
+    """
+    rounded = {name: np.rint(values / tick) for name, values in times.items()}
+    advance, width, delay, brake = (rounded[name] for name in COLUMNS)
+    near = NANOSECOND / tick
+    # A dot that is fired later may delay the next one.
+    for _ in range(gaps + 1):
+        for row, rate in enumerate(rates.tolist()):
+            for history in histories(gaps, reach):
+                number, slot = number_of(history, reach), history[0] / rate / tick
+                cell, before = (row, number), numbers_before(history, reach)
+                over = float((width[row, before] - advance[row, before]).max())
+                if brake[cell] > 0.0:
+                    delay[cell] = max(delay[cell], math.ceil(over - near))
+                    if history[0]:
+                        room = math.floor(slot - advance[cell] - delay[cell] + near)
+                        brake[cell] = max(min(brake[cell], room), 0)
+                elif history[0]:
+                    advance[cell] = min(advance[cell], math.floor(slot - over + near))
+    shared = shared_numbers(gaps, reach)
+    return {name: values[:, shared] * tick for name, values in rounded.items()}
 
 
 def look_ahead(times: Mapping[str, FloatArray], rates: FloatArray, gaps: int, reach: int) -> IntArray:
