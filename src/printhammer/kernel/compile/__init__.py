@@ -1,1 +1,1 @@
-"""Compiling: the compiler's setting, and the kernel of one combination of laws."""
+"""Compilation of the kernel for a combination of force laws: lowering, linking, code generation, cache."""

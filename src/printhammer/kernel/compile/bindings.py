@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Bindings(NamedTuple):
-    """Law functions by name, choices by name, and a digest of the sources of each part's laws."""
+    """Law functions by name, choices by name, and for each part a digest of the sources of its laws."""
 
     names: dict[str, Any]
     choices: dict[str, bool]
@@ -59,9 +59,9 @@ def bindings_of(laws: Laws) -> Bindings:
 
 
 def code_digest(sources: Iterable[str]) -> str:
-    """Return a digest of the code of source texts, to which docstrings, comments and layout add nothing.
+    """Return a digest of source texts that ignores docstrings, comments and layout.
 
-    It is kept under the digest of the texts: parsing the kernel takes a tenth of a second.
+    The digest is cached on disk under a digest of the full texts, since parsing the kernel takes 0.1 s.
     """
     texts = list(sources)
     name = hashlib.sha256("\0".join(texts).encode()).hexdigest()[:24]
@@ -74,9 +74,9 @@ def code_digest(sources: Iterable[str]) -> str:
 
 
 def syntax_text(node: Any, replaced: Callable[[ast.AST], str | None] = lambda _node: None) -> str:
-    """Return the text of a syntax tree without docstrings, the same in all versions of Python.
+    """Return a text form of a syntax tree, without docstrings, that is the same in all Python versions.
 
-    `replaced` returns another text for a node, or None; a node whose text is empty is left out.
+    `replaced` returns a replacement text for a node, or None; a node with empty text is omitted.
     """
     if isinstance(node, list):
         return "[" + ",".join(filter(None, (syntax_text(each, replaced) for each in node))) + "]"
@@ -101,7 +101,7 @@ def syntax_text(node: Any, replaced: Callable[[ast.AST], str | None] = lambda _n
 
 
 def helpers_of(function: FunctionType) -> dict[str, FunctionType]:
-    """Return the functions that a law calls, by the name that it uses."""
+    """Return the Python functions that a law calls directly, by the name under which it calls them."""
     return {
         name: value
         for name in function.__code__.co_names
@@ -110,5 +110,5 @@ def helpers_of(function: FunctionType) -> dict[str, FunctionType]:
 
 
 def _modules_of(function: FunctionType) -> set[str]:
-    """Return the names of the modules of a law and all that it calls."""
+    """Return the names of the modules that define a law and all functions that it calls."""
     return {function.__module__}.union(*(_modules_of(helper) for helper in helpers_of(function).values()))

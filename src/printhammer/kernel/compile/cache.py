@@ -1,9 +1,9 @@
-"""The cache of machine code and lowered modules on disk, and the messages while they are made.
+"""Disk cache of machine code and lowered modules, and the messages shown during compilation.
 
-They lie in a folder: that of NUMBA_CACHE_DIR, `__pycache__` beside the kernel, numba's folder of the user,
-or a temporary one of the user. In a container there may be none that can be written to, the disk may be full,
-a file cut short, a folder copied from another machine. None of this is a reason not to run: what can only be
-read is read, what cannot be kept or does not fit is made again.
+The cache folder is the first writable one of: NUMBA_CACHE_DIR, `__pycache__` in the kernel package, numba's
+cache folder of the user, and a temporary folder of the user. Cache problems never stop the program: read-only
+folders are read, and files that are missing, truncated, damaged or made for another machine are compiled
+again, also if no folder is writable or the disk is full.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
 listeners: set[Callable[[str], None]] = set()
-"""Called with a sentence before machine code is made, and where its folder is of no use."""
+"""Functions called with a message before compilation, and when a cache folder cannot be used."""
 
 watchers: set[Callable[[bool], None]] = set()
-"""Called with true when machine code begins to be made, with false when it is there or has failed."""
+"""Functions called with True when a compilation starts, and with False when it has ended or failed."""
 
 _NAME = "printhammer"
 _USER = f"{_NAME}-{os.getuid() if hasattr(os, 'getuid') else os.environ.get('USERNAME', 'user')}"
 _WANTED = "NUMBA_CACHE_DIR"
 _OTHER = f"{_WANTED} names another folder"
 _MARK: Final = b"printhammer 1\n"
-"""Beginning of a file; the SHA-256 digest of what follows is next."""
+"""First bytes of every cache file; the SHA-256 digest of the payload and the payload follow."""
 _said: set[str] = set()
 
 
@@ -46,7 +46,7 @@ def _say(sentence: str) -> None:
 
 
 def say_once(sentence: str) -> None:
-    """Tell the listeners a sentence, unless they have heard it in this process."""
+    """Pass a message to all listeners, at most once per process."""
     if sentence not in _said:
         _said.add(sentence)
         _say(sentence)
@@ -57,7 +57,7 @@ def _temporary_folder() -> Path:
 
 
 def _user_folder() -> Path:
-    """Return where the operating system wants caches of programs."""
+    """Return numba's cache folder of the user, by the convention of the operating system."""
     if sys.platform == "win32":
         return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "numba" / "Cache"
     if sys.platform == "darwin":
@@ -66,18 +66,18 @@ def _user_folder() -> Path:
 
 
 def _folders() -> Iterator[Path]:
-    """Yield the folders where machine code may be, the folder that is wanted most first."""
+    """Yield the possible cache folders, the preferred folder first."""
     if wanted := os.environ.get(_WANTED):
         yield Path(wanted) / _NAME
     yield Path(__file__).parents[1] / "__pycache__"
     with suppress(RuntimeError):
-        # Without a home.
+        # RuntimeError: the user has no home folder.
         yield _user_folder() / _NAME
     yield _temporary_folder()
 
 
 def _is_safe(folder: Path) -> bool:
-    """Whether nobody else can have put code, which would be run, into the temporary folder."""
+    """Whether only this user can have written code to the folder; checked for the temporary folder only."""
     if folder != _temporary_folder():
         return True
     try:
@@ -101,7 +101,7 @@ def _can_be_written(folder: Path) -> bool:
 
 
 def _content(path: Path) -> bytes | None:
-    """Return the payload of a file; None if the file is missing, cut short or damaged."""
+    """Return the payload of a cache file; None if the file is missing, truncated or damaged."""
     try:
         content = path.read_bytes()
     except OSError:
@@ -123,7 +123,7 @@ def _write(path: Path, payload: bytes) -> None:
 
 @contextmanager
 def _alone(path: Path) -> Iterator[None]:
-    """Wait until no other process makes the content of a file; do not wait where files cannot be locked."""
+    """Lock a file while its content is made, waiting for other processes; no lock if unsupported."""
     lock = path.with_name(f".{path.name}.lock")
     handle = -1
     try:
@@ -132,12 +132,13 @@ def _alone(path: Path) -> Iterator[None]:
         while handle < 0:
             handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o600)
             fcntl.flock(handle, fcntl.LOCK_EX)
-            # The process that has locked it before has deleted it, and a third one may lock its successor.
+            # The previous owner of the lock has deleted the lock file, so another process may hold a new one:
+            # retry.
             if os.fstat(handle).st_nlink == 0:
                 os.close(handle)
                 handle = -1
     except (ImportError, OSError):
-        # Two processes then make the same, and the last one replaces the file.
+        # Without a lock, two processes may make the same content; the last one replaces the file.
         pass
     try:
         yield
@@ -149,10 +150,10 @@ def _alone(path: Path) -> Iterator[None]:
 
 
 class File:
-    """A file of the cache, named after the digest of its sources.
+    """File of the disk cache, named after the digest of its sources.
 
-    It is read from the read-only folders and from the first folder that can be written to, and written to
-    that one. Errors of reading or writing never stop the program: the content is then made again.
+    The file is looked up in the folders up to and including the first writable one, and is written to that
+    folder. Read and write errors never stop the program: the content is then made again.
     """
 
     def __init__(self, name: str) -> None:
@@ -160,7 +161,7 @@ class File:
 
     @cached_property
     def _written(self) -> Path | None:
-        """The folder that it goes to; None if no folder can be written to."""
+        """Folder to which the file is written; None if no folder is writable."""
         return next((folder for folder in _folders() if _can_be_written(folder)), None)
 
     @cached_property
@@ -175,11 +176,11 @@ class File:
 
     @property
     def can_be_kept(self) -> bool:
-        """Whether a folder can be written to."""
+        """Whether the file can be cached, i.e. whether a cache folder is writable."""
         return self._written is not None
 
     def read(self) -> bytes | None:
-        """Return the content; None if it is not there, or damaged."""
+        """Return the cached content; None if the file is missing or damaged in all folders."""
         contents = (_content(folder / self.name) for folder in self._read)
         return next((content for content in contents if content is not None), None)
 
@@ -188,7 +189,7 @@ class File:
         return self.read() is not None
 
     def keep(self, content: bytes) -> None:
-        """Keep the content; say once in this process where it cannot be."""
+        """Write the content to the cache; report a write error once per process."""
         if self._written is None:
             return
         try:
@@ -197,7 +198,7 @@ class File:
             say_once(f"{self._written}: machine code cannot be kept ({error.strerror or error}); {_OTHER}")
 
     def get(self, make: Callable[[], bytes]) -> bytes:
-        """Return the content, made and kept if it is not there."""
+        """Return the cached content; if it is missing, make it and write it to the cache."""
         content = self.read()
         if content is None:
             with self._alone():
@@ -208,14 +209,14 @@ class File:
         return content
 
     def _alone(self) -> AbstractContextManager[None]:
-        """Lock the file against other processes; one of them may have made it when the lock is obtained."""
+        """Return a lock on the file; another process may have made the content once the lock is obtained."""
         return nullcontext() if self._written is None else _alone(self._written / self.name)
 
 
 class Code(File):
-    """The machine code of an entry point on disk, made when it is wanted.
+    """Cached machine code of an entry point, compiled on first use.
 
-    `kind` is the kind of code in the records, and `label` says what it computes, for who waits for it.
+    `kind` is the name of the code in the records of compile times; `label` describes the laws in messages.
     `is_lowered` says whether the modules that it is linked from are there, as in a wheel.
     """
 
@@ -223,11 +224,11 @@ class Code(File):
         super().__init__(name)
         self.kind, self.label, self._is_lowered = kind, label, is_lowered
         self.with_it: tuple[Code, ...] = ()
-        """Machine code that is often needed after this one."""
+        """Other machine code that is often needed after this one, announced in the same message."""
         self.is_begun = False
 
     def get(self, make: Callable[[], bytes]) -> bytes:
-        """Return machine code; where there is none, say what comes, make it, and note how long that took."""
+        """Return the machine code; if not cached, announce the compilation, compile, and record the time."""
         code = self.read()
         if code is not None:
             return code
@@ -249,7 +250,7 @@ class Code(File):
         return self.kind if self._is_lowered() else f"{self.kind}, {records.LOWERED}"
 
     def _noted(self, work: str, make: Callable[[], bytes]) -> bytes:
-        """Make machine code, and note how long that took."""
+        """Compile the machine code, and record the compile time."""
         begun = thread_time()
         code = make()
         if self._written is not None:
@@ -258,7 +259,7 @@ class Code(File):
         return code
 
     def _announce(self) -> None:
-        """Say what is about to be compiled, how long that takes, and what may follow."""
+        """Report what is about to be compiled, the expected time, and what may be compiled next."""
         folders = self._read
         for folder in folders:
             if reason := records.mismatch(folder):
@@ -274,7 +275,7 @@ class Code(File):
 
     @property
     def place(self) -> str:
-        """Where the machine code is kept, in a few words."""
+        """Phrase for messages that states where the machine code is cached."""
         if self._written is None:
             return f"kept nowhere, since no folder for it can be written to; {_OTHER}"
         wanted, folder = next(_folders()), self._written

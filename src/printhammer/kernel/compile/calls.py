@@ -1,9 +1,9 @@
-"""How Python calls an entry point of a linked module: with one block of arguments.
+"""Calling convention between Python and the entry points of linked modules: one block of arguments.
 
-An entry point takes numbers, arrays and tuples of them. Its caller writes them one after the other into a
-block of memory, eight bytes each, and passes the address of that block: a tuple as its elements, an array as
-the address of its object, from which the module reads where the elements are. A function of C with seventy
-arguments would take five times as long for a short call.
+The arguments of an entry point are numbers, arrays and nested tuples of them. The caller writes the flattened
+arguments to a block of memory, eight bytes each, and passes the address of the block. An array is passed as
+the address of its object, from which the module reads the address and shape of the data. A C function with
+seventy arguments would take five times as long for a short call.
 """
 
 from __future__ import annotations
@@ -18,22 +18,23 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
 Signature = Any
-"""Letters, nested in tuples as the arguments are: `i` int64, `f` float64, `b` bool; `f2` an array of float64
-with two dimensions in C order, `s2` of float32, `i1` of int64."""
+"""Type codes of the arguments, nested in tuples like the arguments: `i` is int64, `f` float64, `b` bool; `f2`
+is a two-dimensional float64 array in C order, `s2` the same in float32, `i1` a one-dimensional int64
+array."""
 
 _ELEMENTS: Final = {"f": (np.float64, 8), "s": (np.float32, 4), "i": (np.int64, 8)}
 _NUMBERS: Final = {"i": ("q", "i64"), "f": ("d", "double"), "b": ("?7x", "i8")}
 _SLOT: Final = 8
 
-# Places of the fields of an array object and of the description of its elements, fixed by NumPy's C API.
+# Byte offsets of fields in array objects and dtype descriptors, fixed by the binary interface of NumPy.
 _DATA, _DIMENSIONS, _SHAPE, _STRIDES, _DESCRIPTION, _FLAGS = 16, 24, 32, 40, 56, 64
 _BYTE_ORDER, _TYPE_NUMBER = 26, 28
 _ORDERLY: Final = 0x1 | 0x100 | 0x400
-"""Flags of an array in C order that is aligned and can be written to."""
+"""NumPy flags that an array must have: C-contiguous, aligned and writeable."""
 
 
 def _slots(signature: Signature, argument: str) -> Iterator[tuple[str, str]]:
-    """Yield an expression of Python for each slot of an argument, and the letters of what is there."""
+    """Yield, for each slot of an argument, the Python expression of its value and its type code."""
     if isinstance(signature, str):
         yield (f"id({argument})" if len(signature) == 2 else argument), signature
     else:
@@ -42,17 +43,17 @@ def _slots(signature: Signature, argument: str) -> Iterator[tuple[str, str]]:
 
 
 def caller(address: int, signature: Signature, results: int) -> Callable[..., Any]:
-    """Return a function of Python that calls the compiled function at an address.
+    """Return a Python function that calls the compiled function at an address.
 
-    It returns a tuple of as many integers as `results` says, a single one alone, None for no result.
-    TypeError if an array is not as the signature says.
+    The function returns None, an integer, or a tuple of integers, for 0, 1 or more `results`. It raises
+    TypeError if an array does not match the signature.
     """
     names = [f"a{i}" for i in range(len(signature))]
     slots = [slot for name, one in zip(names, signature, strict=True) for slot in _slots(one, name)]
     formats = "".join("q" if len(letters) == 2 else _NUMBERS[letters][0] for _, letters in slots)
     arguments, given = struct.Struct("=" + formats), struct.Struct(f"={results}q")
     scope = {
-        # A result of None is a null pointer.
+        # A function without results still writes one null pointer, hence at least one result slot.
         "new_block": ctypes.c_char * (arguments.size + _SLOT * max(results, 1)),
         "pack": arguments.pack_into,
         "call": ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(address),
@@ -60,7 +61,7 @@ def caller(address: int, signature: Signature, results: int) -> Callable[..., An
         "read": given.unpack_from,
     }
     value = f"read(block, {arguments.size})" + ("[0]" if results == 1 else "") if results else "None"
-    # A loop that takes nested tuples apart would cost more than the call.
+    # Generate straight-line code: a loop that flattens nested tuples would cost more than the call.
     source = f"""
 def function({", ".join(names)}):
     block = new_block()
@@ -96,9 +97,9 @@ def _flat(value: Any) -> Iterator[Any]:
 def calling_code(entry: str, signature: Signature, name: str, *, bare: bool = False) -> str:
     """Return the text of a module with a function that takes a block and calls the function `entry` with it.
 
-    It returns 0, or the number of the slot whose array is not as the signature says, or -1 for an exception.
-    The results follow the arguments in the block. Where no Python is, arrays are `bare`: the address of the
-    elements, then the length along each axis, eight bytes each.
+    The function returns 0, the number of the first slot whose array does not match the signature, or -1 for
+    an exception. The results follow the arguments in the block. Where no Python is, arrays are `bare`: the
+    address of the elements, then the length along each axis, eight bytes each.
     """
     code: list[str] = []
     passed: list[tuple[str, str]] = []
@@ -136,7 +137,7 @@ ret i64 %returned
 
 
 def _array_code(i: int, kind: str, code: list[str]) -> list[tuple[str, str]]:
-    """Append the code that checks the array in a slot and reads its fields; return what is passed for it."""
+    """Append code that checks the array in slot `i` and reads its fields; return the arguments to pass."""
     dtype, _size = _ELEMENTS[kind[0]]
     count = int(kind[1])
 
@@ -192,10 +193,10 @@ def _bare_array_code(i: int, kind: str, code: list[str]) -> list[tuple[str, str]
 def _passed(
     i: int, kind: str, code: list[str], data: str, lengths: list[str], steps: list[str]
 ) -> list[tuple[str, str]]:
-    """Return what is passed for an array, types and values.
+    """Return the arguments that pass an array to a function compiled by numba, as (type, value) pairs.
 
-    Numba's functions take two owners, unused here, number and size of the elements, their address, shape and
-    strides.
+    Numba expects two owner pointers, unused here, the number and size of the elements, the address of the
+    data, the shape and the strides.
     """
     items, size = "1", _ELEMENTS[kind[0]][1]
     for axis, length in enumerate(lengths):

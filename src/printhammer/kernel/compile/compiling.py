@@ -1,4 +1,4 @@
-"""The one compiler setting that all compiled functions of the kernel share."""
+"""Compiler options shared by all compiled functions of the kernel, and the decorators that apply them."""
 
 from __future__ import annotations
 
@@ -19,20 +19,21 @@ if TYPE_CHECKING:
 Function = TypeVar("Function", bound="Callable[..., Any]")
 
 # Contraction to fused multiply-add changes no sign, comparison or NaN; the other fast-math freedoms would.
-# Without reference counts (_nrt) no compiled function may allocate: all arrays are the caller's. Counting the
-# references to the drive's arrays at every call made a run thirty times slower.
+# Without reference counting (_nrt), no compiled function may allocate memory: the caller allocates all
+# arrays. Counting references to the drive's arrays at every call made a run thirty times slower.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True, "_nrt": False}
 
-# A function first met in one that is inlined would inherit that, and be inlined wherever it is called.
+# Set forceinline explicitly: a function first compiled for an inlined caller would otherwise inherit its
+# flag.
 _CALLED: dict[str, Any] = {**_OPTIONS, "forceinline": False}
 
 
 class _Helper(CPUDispatcher):
-    """A function of which compiled callers take the module; Python calls one compiled by itself."""
+    """Dispatcher of a kernel function: compiled callers link its module, Python calls a separate copy."""
 
     @cached_property
     def alone(self) -> Any:
-        """The function as an entry point."""
+        """Copy of the function compiled on its own, for calls from Python."""
         return numba.njit(pipeline_class=WholeCompiler, **_CALLED)(self.py_func)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -47,7 +48,7 @@ def _helper(function: Function, compiler: type[Compiler], options: dict[str, Any
 
 
 def inlined(function: Function) -> Function:
-    """Compile a scalar helper lazily, always as part of the machine code of whatever calls it."""
+    """Mark a scalar helper for lazy compilation, always inlined into its callers."""
     return _helper(function, PartCompiler, {**_OPTIONS, "forceinline": True})
 
 
@@ -56,7 +57,7 @@ _inline_all = False
 
 @contextmanager
 def all_inlined() -> Iterator[None]:
-    """Have `compiled` do what `inlined` does: a loop that is to become vector code must not hold calls."""
+    """Make `compiled` and `called` inline as well: a loop is vectorised only if it contains no calls."""
     global _inline_all  # noqa: PLW0603
     _inline_all = True
     try:
@@ -66,24 +67,24 @@ def all_inlined() -> Iterator[None]:
 
 
 def compiled(function: Function) -> Function:
-    """Compile a scalar helper lazily, as part of whatever calls it."""
+    """Mark a scalar helper for lazy compilation; the optimiser decides whether to inline it."""
     if _inline_all:
         return inlined(function)
     return _helper(function, PartCompiler, _CALLED)
 
 
 def called(function: Function) -> Function:
-    """Compile a long helper lazily, once for all that call it, unless everything is to be inlined."""
+    """Mark a long helper for lazy compilation as a function that is not inlined, except in `all_inlined`."""
     if _inline_all:
         return inlined(function)
     return _helper(function, KeptCompiler, _CALLED)
 
 
 def entry(function: Function) -> Function:
-    """Compile an entry point lazily, as the last part of its template."""
+    """Mark an entry point for lazy compilation, as the top-level function of its template."""
     return _helper(function, PartCompiler, _CALLED)
 
 
 def opened(function: Function) -> Function:
-    """Compile the calls of a function, and leave open what it does."""
+    """Mark a stub: calls of the function are compiled, and its body is linked from another module later."""
     return _helper(function, OpenCompiler, _CALLED)

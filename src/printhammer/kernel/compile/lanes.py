@@ -1,4 +1,4 @@
-"""The kernel for lanes: which members it suits, and what its template is linked with."""
+"""Kernel for lanes: which laws it supports, and the choices with which its template is linked."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.laws import Laws
 
 LaneKinds = tuple[int, bool, bool]
-"""Number of exponentials in the drive, whether it has a cubic part, whether a sine."""
+"""Kinds of pieces in the drive: number of exponentials, whether it has a cubic, whether it has a sine."""
 
 
 def suits(laws: Laws) -> bool:
-    """Whether members with these laws can run in lanes."""
+    """Whether members of an ensemble with these force laws can run in lanes."""
     choices = _choices(laws)
     return bool(
         not is_interpreted()
@@ -32,14 +32,14 @@ def suits(laws: Laws) -> bool:
 
 @functools.cache
 def _choices(laws: Laws) -> dict[str, bool]:
-    """Return the choices of laws; cached, since each run of an ensemble asks for them."""
+    """Return the compile-time choices for `laws`; cached, since every run of an ensemble needs them."""
     return bindings_of(laws).choices
 
 
 def specialise_lanes(laws: Laws, kinds: LaneKinds) -> Kernel:
-    """Return the kernel for `laws` and the pieces that a drive consists of.
+    """Return the lane kernel for `laws` and for a drive with the kinds of pieces `kinds`.
 
-    Its entry point is `lanes`, see :mod:`printhammer.kernel.lanes.lanes`.
+    The entry point of the kernel is `lanes`, see :mod:`printhammer.kernel.lanes.lanes`.
     """
     with one_at_a_time:
         return _specialised(laws, kinds)

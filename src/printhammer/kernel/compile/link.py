@@ -1,7 +1,7 @@
-"""Linking and emitting: from bitcode to machine code, by llvmlite alone.
+"""Linking and code generation: from LLVM bitcode to machine code, with llvmlite only.
 
-The template of an entry point, the laws of a hammer and its choices become one module; LLVM optimises it as a
-whole and makes machine code for this processor of it.
+The template of an entry point, the laws of a hammer and the values of its choices are linked to one module.
+LLVM optimises the module as a whole and generates machine code for this processor.
 """
 
 from __future__ import annotations
@@ -15,22 +15,22 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
 ENTRY, CALL = "entry", "call"
-"""Symbols of an entry point in its template, and of the function that calls it with a block of arguments."""
+"""Symbols of the entry point in its template, and of the wrapper that calls it with a block of arguments."""
 LAW, CHOICE = "law.", "choice."
 """Prefixes of the symbols of laws and of choices; symbols of integer choices end with `.int`."""
 INTEGER: Final = ".int"
 
 _OURS: Final = (ENTRY, LAW, CHOICE, "_ZN")
-"""Prefixes of the symbols that linking must define; the last one is that of numba's functions."""
+"""Prefixes of the symbols that must be defined after linking; `_ZN` is the prefix of numba's functions."""
 
 
 def law_symbol(name: str, for_lanes: bool) -> str:
-    """Return the symbol of a law for arrays of constants, or for lanes."""
+    """Return the symbol of a law function, in the version for arrays of constants or for lanes."""
     return f"{LAW}lane.{name}" if for_lanes else LAW + name
 
 
 class LinkError(ValueError):
-    """Modules that do not fit together."""
+    """Error raised if modules cannot be linked."""
 
 
 @cache
@@ -39,7 +39,7 @@ def _machine() -> Any:
     llvm.initialize_native_asmprinter()
     triple, name, features = processor()
     target = llvm.Target.from_triple(triple)
-    # On x86, code that is loaded into a process has to be static.
+    # On x86, code that is loaded into a process must use static relocation.
     moving = {"x86": "static", "ppc": "pic"}.get(target.name[:3], "default")
     return target.create_target_machine(
         opt=3, cpu=name, features=features, reloc=moving, codemodel="jitdefault", jit=True
@@ -48,17 +48,17 @@ def _machine() -> Any:
 
 @cache
 def processor() -> tuple[str, str, str]:
-    """Return the target of the machine code: triple of the system, name and features of the processor."""
+    """Return the compilation target: triple of the system, name and features of the processor."""
     return llvm.get_process_triple(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
 
 
 def link(template: bytes, laws: Iterable[bytes], choices: Mapping[str, int], calling: str) -> Any:
-    """Return the module of an entry point with its laws and choices; `calling` is the text that calls it.
+    """Link the template of an entry point with laws, choices and the wrapper `calling`; return the module.
 
     Raises
     ------
     LinkError
-        A module cannot be read, or leaves a name open that the others do not define.
+        A module cannot be read, or a symbol is not defined by any module.
     """
     _machine()
     try:
@@ -72,13 +72,13 @@ def link(template: bytes, laws: Iterable[bytes], choices: Mapping[str, int], cal
         if symbol.is_declaration and symbol.name.startswith(_OURS):
             raise LinkError(f"{symbol.name} is left open by a template and defined by no other module")
         if not symbol.is_declaration and symbol.name != CALL:
-            # Nobody else calls it: it may be inlined and left out.
+            # Only this module calls the function, so that it may be inlined and removed.
             symbol.linkage = "internal"
     return whole
 
 
 def is_readable(bitcode: bytes) -> bool:
-    """Whether this LLVM reads a module; one that a later LLVM has written it may not."""
+    """Whether the installed LLVM can read a module; it may not read bitcode of a later version."""
     try:
         llvm.parse_bitcode(bitcode)
     except RuntimeError:
@@ -87,7 +87,7 @@ def is_readable(bitcode: bytes) -> bool:
 
 
 def _values(template: Any, choices: Mapping[str, int]) -> str:
-    """Return the text of a module with the values of a template's choices."""
+    """Return LLVM assembly that defines the choices of a template as constants."""
     lines = []
     for symbol in template.global_variables:
         name = symbol.name.removeprefix(CHOICE).removesuffix(INTEGER)
@@ -98,9 +98,9 @@ def _values(template: Any, choices: Mapping[str, int]) -> str:
 
 
 def emit(module: Any, machine: Any = None) -> bytes:
-    """Return machine code of a module, for this processor if no other `machine` is the target."""
+    """Optimise a module and return its machine code, for `machine` (default: this processor)."""
     machine = machine or _machine()
-    # That of the machine where it was lowered may be another.
+    # The module may have been lowered on a machine with another triple.
     module.triple, module.data_layout = machine.triple, str(machine.target_data)
     options = llvm.create_pipeline_tuning_options(speed_level=3)
     options.loop_vectorization, options.slp_vectorization = True, False
@@ -110,11 +110,11 @@ def emit(module: Any, machine: Any = None) -> bytes:
 
 
 _engines: list[Any] = []
-"""Engines that own the loaded machine code, kept as long as the process runs."""
+"""Execution engines that own the loaded machine code; they live as long as the process."""
 
 
 def load(code: bytes) -> int:
-    """Load machine code; return the address of the function that takes a block of arguments."""
+    """Load machine code; return the address of the wrapper that takes a block of arguments."""
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()

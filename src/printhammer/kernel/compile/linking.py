@@ -1,9 +1,9 @@
-"""Compilers for the functions of a kernel: each stays a part, and a template is all parts that it calls.
+"""Numba compilers that keep each function as an unoptimised module, and link all modules before optimisation.
 
-Numba compiles each function to machine code of its own, with all that it calls, and then links and optimises
-the same functions again in whatever calls it: a helper five calls deep is compiled five times over, and the
-machine code of four is never run. Here the module of a helper is kept as it was lowered, and all helpers of
-an entry point are linked before anything is optimised.
+By default, numba compiles every function together with its callees, and links and optimises the same callees
+again in every caller: a helper five calls deep is compiled five times, and four of the results are never run.
+Here, the module of a helper is kept as it was lowered, and all helpers of an entry point are linked before
+the result is optimised once.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from numba.core.typed_passes import NativeLowering
 
 
 class _Part(JITCodeLibrary):
-    """The module of a helper, not optimised and never run by itself."""
+    """Code library with the module of a helper, which is not optimised and never run by itself."""
 
     kept = False
-    """Whether the helper stays a function in what calls it."""
+    """Whether the helper stays a separate function, i.e. is not inlined into its callers."""
 
     def finalize(self) -> None:
-        """Let nothing be added any more."""
+        """Mark the library as final, without the optimisation and code generation of numba."""
         self._finalized = True
 
     def own_module(self) -> Any:
-        """Return the module of the helper alone, its functions such that several modules may have them."""
+        """Return the module of the helper alone; its functions may occur in several linked modules."""
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == Linkage.external:
                 function.linkage = "linkonce_odr"
@@ -37,7 +37,7 @@ class _Part(JITCodeLibrary):
         return self._final_module
 
     def link_callees(self, module: Any) -> None:
-        """Link all that this library calls, directly or through others, into a module, but for laws."""
+        """Link the libraries of all direct and indirect callees into a module, except the stubs of laws."""
         for library in self._callees():
             if not isinstance(library, Open):
                 alone = isinstance(library, _Part) and not isinstance(library, _Whole)
@@ -46,10 +46,10 @@ class _Part(JITCodeLibrary):
                 )
 
     def with_callees(self, function: str, symbol: str) -> Any:
-        """Return the module of a helper with all that it calls.
+        """Return the module of a helper with all its callees linked.
 
-        From outside only `function` is seen, under the name `symbol`. Laws stay open, under the names of
-        their stubs.
+        Only `function` is visible from outside, under the name `symbol`. Laws stay undefined symbols, with
+        the names of their stubs.
         """
         module = self.own_module().clone()
         self.link_callees(module)
@@ -63,14 +63,14 @@ class _Part(JITCodeLibrary):
         return module
 
     def _callees(self) -> list[Any]:
-        """Return the libraries that this one calls, directly or through others."""
+        """Return the libraries of all direct and indirect callees, callers first."""
         ordered: dict[Any, None] = {}
         self._add_callees(ordered)
-        # The linker takes a function only if what is there already calls it: callers come first.
+        # The linker adds a function only if the module already refers to it, so callers come first.
         return list(reversed(ordered))
 
     def _add_callees(self, ordered: dict[Any, None]) -> None:
-        """Add the libraries that this one calls, directly or through others, each after those it calls."""
+        """Add the libraries of all direct and indirect callees to `ordered`, each after its own callees."""
         for library in self._linking_libraries:
             if library not in ordered:
                 if isinstance(library, _Part) and not isinstance(library, _Whole):
@@ -78,7 +78,7 @@ class _Part(JITCodeLibrary):
                 ordered[library] = None
 
     def _get_module_for_linking(self) -> Any:
-        # What numba's own compiler makes of a caller links this and nothing else.
+        # A caller compiled by numba's own compiler links only this module, so it must contain all callees.
         if self._shared_module is None:
             self._shared_module = self.own_module().clone()
             self.link_callees(self._shared_module)
@@ -86,31 +86,31 @@ class _Part(JITCodeLibrary):
 
 
 class Open(_Part):
-    """The stub of a law, of which callers know the name, and which no module has."""
+    """Code library of the stub of a law: callers refer to its name, and no module contains its body."""
 
     @property
     def function(self) -> str:
-        """Symbol of the stub in what calls it."""
+        """Symbol by which callers refer to the stub."""
         return next(str(one.name) for one in self._final_module.functions if not one.is_declaration)
 
 
 class _Kept(_Part):
-    """The module of a helper that stays a function."""
+    """Code library of a helper that stays a separate function."""
 
     kept = True
 
 
 class _Whole(_Part):
-    """The module of a helper that Python calls, with all that it calls."""
+    """Code library of a helper that Python calls, with all its callees."""
 
     def finalize(self) -> None:
-        """Link, optimise and make machine code."""
+        """Link all callees, optimise the module, and generate machine code."""
         self.link_callees(self._final_module)
         self._linking_libraries = []
         JITCodeLibrary.finalize(self)  # type: ignore[no-untyped-call]
 
     def _verify_declare_only_symbols(self) -> None:
-        # The engine would call what is missing at address zero.
+        # The execution engine would call a missing function at address zero.
         for function in self._final_module.functions:
             if function.is_declaration and function.name.startswith("_ZN"):
                 raise AssertionError(f"{function.name} is called but was not linked")
@@ -134,7 +134,7 @@ class _LowerPart(NativeLowering):
         state.flags.no_cpython_wrapper = state.flags.no_cfunc_wrapper = state.flags.no_compile = True
         super().run_pass(state)  # type: ignore[no-untyped-call]
         lowered = state["cr"]
-        # Callers know a function by its entry point, which has to be a built-in; nobody calls this one.
+        # Numba identifies a function by an entry point, which must be a built-in; this one is never called.
         key = dict[str, str]().__getitem__
         state.targetctx.insert_user_function(key, lowered.fndesc, [state["library"]])
         state["cr"] = _LowerResult(lowered.fndesc, lowered.call_helper, cfunc=key, env=lowered.env)
@@ -164,12 +164,12 @@ class _LowerWhole(NativeLowering):
 
 
 class _Lowered(Compiler):
-    """The compiler of numba with another way to lower a function."""
+    """Numba's compiler with a replaced lowering pass."""
 
     lowering: type[NativeLowering]
 
     def define_pipelines(self) -> list[Any]:
-        """Return the pipelines of numba, the lowering replaced."""
+        """Return numba's compiler pipelines, with the lowering pass replaced."""
         pipelines = super().define_pipelines()  # type: ignore[no-untyped-call]
         for pipeline in pipelines:
             pipeline.passes = [
@@ -185,18 +185,18 @@ class PartCompiler(_Lowered):
 
 
 class KeptCompiler(_Lowered):
-    """Compiler of long helpers with several callers: their machine code is made once for all of these."""
+    """Compiler of long helpers that are not inlined: their machine code is generated once for all callers."""
 
     lowering = _LowerKept
 
 
 class OpenCompiler(_Lowered):
-    """Compiler of stubs of laws."""
+    """Compiler of the stubs that stand for law functions."""
 
     lowering = _LowerOpen
 
 
 class WholeCompiler(_Lowered):
-    """Compiler of helpers that Python calls."""
+    """Compiler of helpers that are called from Python."""
 
     lowering = _LowerWhole

@@ -1,8 +1,8 @@
-"""Lowering: from Python to bitcode of LLVM, by numba.
+"""Lowering: translation of Python functions to LLVM bitcode, by numba.
 
-The template of an entry point is the module of all that it calls, with its laws and choices left open, so
-that one serves every hammer; the laws of a part are a module of their own. The types must be those of every
-hammer: with a coil's circuit and without there are two templates.
+The template of an entry point is a module of the entry point and all its callees, in which laws and choices
+stay undefined, so that one template serves every hammer. The laws of a part are a separate module. Since the
+types of all arguments are fixed, there are two templates: with and without a coil circuit.
 """
 
 from __future__ import annotations
@@ -41,9 +41,10 @@ _NUMBERS = {"f": types.float64, "s": types.float32, "i": types.int64, "b": types
 
 
 def template(entry: str, variant: Mapping[str, bool]) -> bytes:
-    """Return the template of an entry point, as bitcode.
+    """Lower the template of an entry point; return LLVM bitcode.
 
-    The variant says whether the hammer `HAS_CIRCUIT`, and whether columns are `FORCED`.
+    `variant` states whether the hammer `HAS_CIRCUIT` and, for `flow`, whether the tangent columns are
+    `FORCED`, i.e. include derivatives with respect to constants.
     """
     if entry == "lanes":
         namespace = _lanes()
@@ -60,7 +61,7 @@ def template(entry: str, variant: Mapping[str, bool]) -> bytes:
 
 
 def laws(role: str, functions: Mapping[str, Callable[..., Any]], for_lanes: bool) -> bytes:
-    """Return the law functions of a part, as bitcode of one module."""
+    """Lower the law functions of a part to one module; return LLVM bitcode."""
     whole = llvm.parse_assembly("")
     for name in LAW_FUNCTIONS[role]:
         constants: Any = types.Array(types.float64, 1, "C")
@@ -79,12 +80,12 @@ def laws(role: str, functions: Mapping[str, Callable[..., Any]], for_lanes: bool
 
 @functools.cache
 def _lane_math() -> ModuleType:
-    """Return the elementary functions of lanes, compiled."""
+    """Return the elementary functions for lanes as a module of inlined functions."""
     return compile_module(lane_math, inlined)
 
 
 def _lowered(function: Any, arguments: tuple[Any, ...]) -> tuple[Any, str, Any]:
-    """Return the library of a function for types of arguments, its symbol, and the type of its result."""
+    """Lower a function for given argument types; return its code library, symbol and result type."""
     function.compile(arguments)
     result = function.overloads[arguments]
     fields = result._asdict()
@@ -92,7 +93,7 @@ def _lowered(function: Any, arguments: tuple[Any, ...]) -> tuple[Any, str, Any]:
 
 
 def _types(signature: Any) -> Any:
-    """Return numba's types of a signature."""
+    """Return the numba type of an argument, given its signature."""
     if isinstance(signature, str):
         number = _NUMBERS[signature[0]]
         return types.Array(number, int(signature[1]), "C") if len(signature) == 2 else number
@@ -105,7 +106,7 @@ def _tuple(elements: list[Any], named: type | None = None) -> Any:
 
 
 def _opened() -> dict[str, Any]:
-    """Return the laws and choices that stay open, by name."""
+    """Return stand-ins for all laws and choices that a template leaves undefined, by name."""
     namespace: dict[str, Any] = {}
     for name, kind in declared.__annotations__.items():
         if kind in ("bool", "int"):
@@ -140,10 +141,10 @@ def _lanes() -> dict[str, Any]:
 def _execute_lanes(plain: dict[str, Any], vector: dict[str, Any]) -> dict[str, Any]:
     """Execute the templates of lanes, bound to laws without branches or calls.
 
-    The force sum and the steps are those of the plain kernel, with :mod:`printhammer.kernel.lanes.math` in
-    the place of :mod:`math`, the drive in closed form, the constants of a hammer as a tuple, and everything
-    inlined; what looks after switches is scalar and uses the plain kernel. `plain` holds the names of the
-    plain templates, `vector` the laws for lanes and the choices.
+    Total force and step functions are those of the plain kernel, with :mod:`printhammer.kernel.lanes.math` in
+    place of :mod:`math`, the drive in closed form, the constants of a hammer as a tuple, and all functions
+    inlined. The functions that handle events are scalar and use the plain kernel. `plain` holds the names of
+    the plain templates, `vector` the laws for lanes and the choices.
     """
     scalar, vector = ({**names, "lane_math": _lane_math()} for names in (plain, vector))
 
@@ -180,7 +181,7 @@ def _execute_lanes(plain: dict[str, Any], vector: dict[str, Any]) -> dict[str, A
 
 
 def _with_lane_layout(module: ModuleType) -> ModuleType:
-    """Replace the indices of the constants of a hammer in a template by those of the layout of lanes."""
+    """Replace the parameter indices in a template module by the indices of the layout of lanes."""
     for name in _LAYOUT:
         if hasattr(module, name):
             setattr(module, name, getattr(lane_layout, name))

@@ -1,7 +1,7 @@
-"""The modules of an entry point: where its template and its laws are, and the machine code that they become.
+"""Entry points and the lowered modules from which their machine code is linked: the template and the laws.
 
-A module is named after a digest of the sources that it is made of. It is lowered by numba when it is first
-wanted, and kept with the machine code.
+A module is named after a digest of its sources. It is read from the wheel, or else lowered by numba on first
+use and cached with the machine code.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ KINDS: Final = {
     "lanes": "many runs side by side",
     "flow": "derivatives",
 }
-"""Names of the entry points, and what each of them computes."""
+"""Entry points by name, with a phrase that describes their results in messages."""
 
 KERNEL: Final = Path(__file__).parents[1]
 SHIPPED: Final = KERNEL / "modules"
-"""Folder of the modules that the wheel holds."""
+"""Folder of the lowered modules that the wheel contains."""
 
 _PLAIN: Final = (
     "model",
@@ -61,7 +61,7 @@ one_at_a_time: Final = threading.RLock()
 
 @cache
 def _digest_of(places: tuple[str, ...]) -> str:
-    """Return the digest of the sources in folders of the kernel."""
+    """Return a digest of the kernel's source files and folders in `places`, and of sources common to all."""
     paths = [
         KERNEL / place
         for place in (*places, "compile/opening.py", "compile/signatures.py", "compile/templates.py")
@@ -72,7 +72,7 @@ def _digest_of(places: tuple[str, ...]) -> str:
 
 @cache
 def _lowering() -> str:
-    """Return the versions of numba and llvmlite, on which lowered modules depend, as part of a file name."""
+    """Return the versions of numba and llvmlite, on which lowered modules depend, for use in file names."""
     versions = []
     for name in ("numba", "llvmlite"):
         try:
@@ -83,7 +83,7 @@ def _lowering() -> str:
 
 
 class Module:
-    """Bitcode of a template or of the laws of a part; `make` lowers it."""
+    """Lowered module, as LLVM bitcode, of a template or of the laws of a part; `make` lowers it."""
 
     suffix = ".bc"
     is_readable = staticmethod(link.is_readable)
@@ -94,11 +94,11 @@ class Module:
 
     @property
     def shipped(self) -> Path:
-        """The file of the wheel that it is in, if it ships."""
+        """Path of the module in the wheel; the file exists only if the module is shipped."""
         return SHIPPED / f"{self.name}{self.suffix}.xz"
 
     def identity(self) -> str:
-        """Return a name that is unique to the content of the module, without reading it."""
+        """Return a name that identifies the content of the module, without reading or lowering it."""
         return self.name if self.shipped.exists() else f"{self.name}_{_lowering()}"
 
     def is_there(self) -> bool:
@@ -106,7 +106,7 @@ class Module:
         return self.shipped.exists() or File(f"{self.name}_{_lowering()}{self.suffix}").exists()
 
     def content(self) -> bytes:
-        """Return the content, from the wheel, from disk, or made now."""
+        """Return the content of the module: from the wheel, from the disk cache, or lowered now."""
         if self.shipped.exists():
             with suppress(OSError, EOFError, lzma.LZMAError):
                 content = lzma.decompress(self.shipped.read_bytes())
@@ -117,18 +117,18 @@ class Module:
 
 
 class WebModule(Module):
-    """Entry points of a kernel as one module of WebAssembly."""
+    """WebAssembly module that contains several entry points of a kernel."""
 
     suffix = ".wasm"
 
     @staticmethod
     def is_readable(content: bytes) -> bool:
-        """Whether the content begins as a module of WebAssembly does."""
+        """Whether the content begins with the magic number of WebAssembly."""
         return content.startswith(web.MAGIC)
 
 
 def template_of(entry: str, variant: Mapping[str, bool]) -> Module:
-    """Return the template of an entry point."""
+    """Return the template of an entry point in a variant, without lowering it."""
 
     def make() -> bytes:
         from printhammer.kernel.compile import lower
@@ -150,7 +150,7 @@ def every_template() -> Iterator[Module]:
 
 
 def laws_of(role: str, bindings: Bindings, for_lanes: bool) -> Module:
-    """Return the law functions of a part, for arrays of constants or for lanes."""
+    """Return the module of the law functions of a part, for arrays of constants or for lanes."""
     package = __name__.partition(".")[0]
     ours = all(bindings.names[name].__module__.partition(".")[0] == package for name in LAW_FUNCTIONS[role])
 
@@ -173,20 +173,20 @@ def laws_of(role: str, bindings: Bindings, for_lanes: bool) -> Module:
 
 
 class Entry:
-    """An entry point of the kernel for certain laws; its machine code is made, or loaded, when it is wanted.
+    """Entry point of the kernel for given laws; its machine code is loaded or compiled on first use.
 
     Parameters
     ----------
     name : str
-        One of `KINDS`.
+        Name of the entry point, a key of `KINDS`.
     variant : mapping
-        Which template it has, see :func:`printhammer.kernel.compile.lower.template`.
+        Variant of the template, see :func:`printhammer.kernel.compile.lower.template`.
     bindings : Bindings
-        The laws, and choices of the hammer.
+        Law functions and choices of the hammer.
     choices : mapping
-        Further choices.
+        Additional choices, by name.
     label : str
-        The laws in words, for who waits.
+        Description of the laws, for messages.
     """
 
     def __init__(
@@ -216,11 +216,11 @@ class Entry:
         )
 
     def is_ready(self) -> bool:
-        """Whether it is loaded, or has machine code on disk."""
+        """Whether the machine code is loaded or cached on disk, so that no compilation is needed."""
         return self._function is not None or self.code.exists()
 
     def function(self) -> Callable[..., Any]:
-        """Return the function that Python calls, compiled if need be."""
+        """Return the entry point as a Python function, compiled if necessary."""
         with one_at_a_time:
             if self._function is None:
                 address = link.load(self.code.get(self._make))
@@ -241,21 +241,21 @@ class Entry:
 
     @property
     def sources(self) -> tuple[Any, ...]:
-        """What a module of WebAssembly depends on."""
+        """Inputs of the entry point's WebAssembly module: names of the lowered modules, and choices."""
         return self.name, self._template.name, [law.name for law in self._laws], sorted(self._choices.items())
 
     def web_object(self) -> bytes:
-        """Return the entry point as an object of WebAssembly."""
+        """Compile the entry point to a WebAssembly object file; return its content."""
         calling = calls.calling_code(link.ENTRY, self._signature, link.CALL, bare=True)
         return web.emit(self._linked(calling), self.name)
 
     def description(self) -> dict[str, Any]:
-        """Return the arguments and the number of results of the entry point, for a module of WebAssembly."""
+        """Return argument types and number of results of the entry point, for its WebAssembly module."""
         return {"arguments": web.description_of(self._signature), "results": RESULTS[self.name]}
 
 
 def web_module_of(entries: Sequence[Entry]) -> WebModule:
-    """Return the module of WebAssembly of entry points; making it needs the extra `page`."""
+    """Return the WebAssembly module of several entry points; building it needs the extra `page`."""
 
     def make() -> bytes:
         description = {

@@ -1,7 +1,7 @@
-"""Names that a template leaves open: laws, which other modules define, and choices, set by linking.
+"""Names that a template leaves undefined: laws, defined by other modules, and choices, set when linking.
 
-Both are names of Python in the source of a template; numba is taught here to compile a law as a call of a
-function that is declared only, and a choice as the value of a constant that is declared only.
+Both are ordinary Python names in the source of a template. The numba extensions below compile a law as a call
+of an external function, and a choice as the value of an external constant.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from printhammer.kernel.compile.link import CHOICE, INTEGER
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-# Numba's own types are not complete.
+# The type annotations of numba are incomplete.
 _typeof_impl: Any = typeof_impl
 _register: Any = register_default
 _infer: Any = infer_global
@@ -35,13 +35,13 @@ _signature: Any = signature
 
 
 class Choice:
-    """A constant, true or false or an integer, of which a template knows no value."""
+    """Stand-in for a boolean or integer constant whose value is set when modules are linked."""
 
     def __init__(self, name: str, base: Any) -> None:
         self.name, self.base = name, base
 
     def __bool__(self) -> bool:
-        """Refuse to have a value: numba then keeps both branches."""
+        """Raise TypeError, so that numba does not evaluate a condition and keeps both branches."""
         raise TypeError(f"{self.name} is set when modules are linked")
 
 
@@ -51,12 +51,12 @@ class _ChoiceType(types.Type):
         super().__init__(f"choice({base})")
 
     def can_convert_to(self, typingctx: Any, other: Any) -> Any:
-        """Convert as the base type does."""
+        """Return the conversion to another type, as for the base type."""
         conversion = typingctx.can_convert(self.base, other)
         return None if conversion is None else max(conversion, Conversion.safe)
 
     def unify(self, typingctx: Any, other: Any) -> Any:
-        """Unify as the base type does."""
+        """Return the common type with another type, as for the base type."""
         return typingctx.unify_pairs(self.base, other)
 
 
@@ -111,7 +111,7 @@ def _not(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
 
 
 def law(name: str, symbol: str, floats: int) -> Callable[..., float]:
-    """Return a function that stands for a law, of constants and so many floats, in what calls it."""
+    """Return a stub for a law whose arguments are the constants and `floats` numbers, for its callers."""
     arguments = ", ".join(f"a{i}" for i in range(floats))
     scope: dict[str, Any] = {"__name__": __name__}
     exec(f"def {name}(c, {arguments}):\n    return 0.0\n", scope)

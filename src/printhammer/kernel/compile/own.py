@@ -1,7 +1,7 @@
-"""Laws of one's own as modules, by numba's public interface alone.
+"""Lowering of user-defined laws to modules, with numba's public interface only.
 
-Templates and the laws that ship are lowered when the wheel is built, by private classes of numba. A law from
-elsewhere is lowered where it is used, and must not depend on the version of numba there.
+Templates and shipped laws are lowered when the wheel is built, with private classes of numba. A user-defined
+law is lowered on the user's machine, and must therefore work with any version of numba.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ _OPTIONS: Final[dict[str, Any]] = {
     "nogil": True,
     "_nrt": False,
 }
-"""Options of the kernel, see :mod:`printhammer.kernel.compile.compiling`."""
+"""Compiler options, the same as in :mod:`printhammer.kernel.compile.compiling`."""
 
 _FOR_C: Final = "cfunc."
-"""Prefix of the symbol of the wrapper for C; the symbol of the function for compiled callers follows."""
+"""Prefix of the symbol of numba's C wrapper of a function; the symbol of the function itself follows."""
 
 
 def laws(role: str, functions: Mapping[str, Callable[..., Any]], for_lanes: bool) -> bytes:
-    """Return the law functions of a part, as bitcode of one module."""
+    """Lower the law functions of a part to one module; return LLVM bitcode."""
 
     def compiled(function: Any) -> Any:
         return numba.njit(**_OPTIONS)(function)
@@ -56,7 +56,7 @@ def laws(role: str, functions: Mapping[str, Callable[..., Any]], for_lanes: bool
 
 
 def _alone(text: str, symbol: str) -> Any:
-    """Return the module of a compiled function as text, in which only the function is seen, as `symbol`."""
+    """Parse the LLVM assembly of a function; return its module, where only `symbol` is visible."""
     module = llvm.parse_assembly(text)
     (name,) = (
         function.name.removeprefix(_FOR_C)

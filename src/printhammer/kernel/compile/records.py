@@ -1,7 +1,7 @@
-"""What lies beside machine code: which machine and versions made it, and how long that took.
+"""Records in a folder of machine code: machine, versions and compile times of its content.
 
-A folder of machine code may have been copied from another machine, baked into a container, or be shared by
-machines that are not alike. Its record tells why code there cannot be used, and how long making it takes.
+A folder may have been copied from another machine, included in a container image, or be shared by different
+machines. The record explains why code in the folder cannot be used, and gives the expected compile time.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _USUAL: Final = {
     "many runs side by side": 5.5,
     "derivatives": 2.0,
 }
-"""How long the entry points take to compile on a usual machine, s."""
+"""Typical compile times of the entry points, s, by kind; used where no time has been recorded."""
 
 _LOWERING: Final = 4.0  # How much longer it takes with modules that have to be lowered first
 
@@ -42,7 +42,7 @@ _ANOTHER: Final = 5.0
 
 
 def maker() -> dict[str, str]:
-    """Return what machine code made by this process depends on, apart from the sources of its kernel."""
+    """Return versions, system and processor on which machine code compiled by this process depends."""
     system, processor, features = this_processor()
     return {
         "printhammer": __version__,
@@ -54,7 +54,7 @@ def maker() -> dict[str, str]:
 
 
 def read(folder: Path) -> list[dict[str, Any]]:
-    """Return who made the machine code in a folder: entries of `maker`, each with its `seconds`."""
+    """Return the record of a folder: entries like `maker()`, each with compile times `seconds` by kind."""
     with suppress(OSError, ValueError, TypeError, KeyError):
         entries = json.loads((folder / FILE).read_bytes())["makers"]
         return [
@@ -67,7 +67,7 @@ def read(folder: Path) -> list[dict[str, Any]]:
 
 
 def note(folder: Path, name: str, seconds: float) -> None:
-    """Record that an entry point took so long to compile, s; OSError if the record cannot be written."""
+    """Record the compile time of an entry point, s; raise OSError if the record cannot be written."""
     mine = maker()
     entries = read(folder)
     if (own := _own(entries, mine)) is None:
@@ -83,7 +83,7 @@ def note(folder: Path, name: str, seconds: float) -> None:
 
 
 def expected(folders: Iterable[Path], name: str) -> float:
-    """Return how long an entry point takes to compile, s: as here before, else elsewhere, else usually."""
+    """Return the expected compile time, s: recorded here, else on another machine, else typical."""
     mine = maker()
     records = [read(folder) for folder in folders]
     own = [entry for entries in records if (entry := _own(entries, mine)) is not None]
@@ -95,7 +95,7 @@ def expected(folders: Iterable[Path], name: str) -> float:
 
 
 def mismatch(folder: Path) -> str:
-    """Say why this process cannot use the machine code in a folder; empty if it can, or there is none."""
+    """Return the reason why the machine code in a folder cannot be used; empty if usable or absent."""
     mine = maker()
     entries = read(folder)
     if not entries or _own(entries, mine) is not None:

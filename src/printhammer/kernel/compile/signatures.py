@@ -1,4 +1,4 @@
-"""Signatures of the entry points, see :data:`printhammer.kernel.compile.calls.Signature`."""
+"""Argument types of the entry points, see :data:`printhammer.kernel.compile.calls.Signature`."""
 
 from __future__ import annotations
 
@@ -61,11 +61,11 @@ _SIGNATURES: Final[dict[str, Signature]] = {
 }
 
 RESULTS: Final = {"run": 4, "resample": 0, "peaks": 0, "quadratures": 0, "members": 1, "lanes": 1, "flow": 0}
-"""Number of integers that an entry point returns."""
+"""Number of integers that each entry point returns."""
 
 
 def signature_of(entry: str, variant: Mapping[str, bool]) -> Any:
-    """Return the signature of an entry point in a variant of its template."""
+    """Return the argument types of an entry point in a variant of its template."""
     if entry == "flow":
         return (*_FLOW, _FORCING if variant["FORCED"] else (), "f1", "i1", "b", "b", "f2", _CARRIED)
     return _SIGNATURES[entry]

@@ -1,4 +1,4 @@
-"""One kernel for each combination of laws: its entry points as functions of Python."""
+"""Kernels specialised for a combination of laws: their entry points as Python functions."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.laws import Laws
 
 begin_ahead: Callable[[Laws], Callable[[], None]] | None = None
-"""Called with the laws before `run` is compiled: has the entry points `AHEAD` compiled elsewhere meanwhile.
+"""Hook called with the laws before `run` is compiled, to compile the entry points `AHEAD` in parallel.
 
-What it returns waits for these.
+The hook returns a function that waits until these entry points are compiled.
 """
 
 ENTRIES = ("run", "resample", "quadratures", "peaks", "members")
 """Entry points of the plain kernel."""
 
 AHEAD = ("peaks", "quadratures", "resample")
-"""Entry points that whoever runs a hammer wants next."""
+"""Entry points that are usually needed after `run`, and may be compiled ahead in parallel."""
 
 
 class Kernel:
-    """The entry points for one combination of laws, as functions of Python.
+    """Entry points of the kernel for one combination of laws, as Python functions.
 
-    The plain kernel has `run`, `resample`, `quadratures`, `peaks` and `members`, defined in its template
-    modules; kernels for lanes and for variational equations have one of their own, `lanes` or `flow`. The
-    `label` says what the kernel is for.
+    The plain kernel has the entry points `run`, `resample`, `quadratures`, `peaks` and `members`, defined in
+    its template modules. The kernels for lanes and for variational equations have a single entry point,
+    `lanes` and `flow`. `label` describes the laws in messages.
     """
 
     _wait: Callable[[], None] | None = None
@@ -49,7 +49,7 @@ class Kernel:
             code.with_it = tuple(other for other in codes.values() if other is not code)
 
     def __getattr__(self, name: str) -> Any:
-        """Return an entry point, compiled if need be, with others compiled elsewhere where that is wanted."""
+        """Return an entry point, compiled if necessary; `begin_ahead` may compile others in parallel."""
         try:
             entry = self.__dict__["_entries"][name]
         except KeyError:
@@ -62,7 +62,7 @@ class Kernel:
                 wait, self._wait = self._wait, None
                 wait()
         function = entry.function()
-        # Found there from now on, without coming here.
+        # Later look-ups find the attribute without calling this method.
         self.__dict__[name] = function
         return function
 
@@ -71,10 +71,10 @@ class Kernel:
         return name not in self._entries or self._entries[name].is_ready()
 
     def web_module(self, names: Sequence[str] = ENTRIES, *others: Kernel) -> WebModule:
-        """Return the module of WebAssembly of entry points, and of all those of `others`.
+        """Return the WebAssembly module of the entry points `names`, and of all entry points of `others`.
 
-        It is called as :mod:`printhammer.kernel.compile.web.build` says. Its content ships for the laws of
-        shipped hammers; making it takes the extra `page`.
+        The calling convention is described in :mod:`printhammer.kernel.compile.web.build`. The content is
+        shipped for the laws of shipped hammers; building other modules needs the extra `page`.
         """
         entries = [self._entries[name] for name in names]
         entries += [entry for other in others for entry in other._entries.values()]
@@ -82,7 +82,7 @@ class Kernel:
 
     @functools.cached_property
     def namespace(self) -> dict[str, Any]:
-        """All names of the template modules, bound to the laws: for helpers that are called by themselves."""
+        """All names of the template modules, bound to the laws, for direct calls of helper functions."""
         from printhammer.kernel.compile.compiling import compiled
 
         bindings = bindings_of(self.laws)
@@ -90,24 +90,24 @@ class Kernel:
         return execute_all(TEMPLATES, {**laws, **bindings.choices}, f"{id(self):x}")
 
     def interpret(self, namespace: Mapping[str, Any]) -> None:
-        """Take the entry points of executed template modules, as plain Python."""
+        """Replace the entry points by the uncompiled functions of executed template modules."""
         for name in self._entries:
             self.__dict__[name] = namespace[name]
         self._entries = {}
 
 
 def is_interpreted() -> bool:
-    """Whether the kernel is to run as plain Python."""
+    """Whether the kernel runs as plain Python, i.e. whether numba's JIT compilation is disabled."""
     if "numba" in sys.modules:
         return bool(sys.modules["numba"].config.DISABLE_JIT)
     return os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 
 
 def specialise(laws: Laws) -> Kernel:
-    """Return the kernel for `laws`; the same object for equal laws.
+    """Return the kernel specialised for `laws`; equal laws share one kernel object.
 
-    Its entry points are compiled, or their machine code is loaded from disk, when they are first wanted.
-    ImportError if a module named in `laws` cannot be imported.
+    The entry points are compiled, or their machine code is loaded from disk, on first use. Raises ImportError
+    if a module named in `laws` cannot be imported.
     """
     with one_at_a_time:
         return _specialised(laws)
@@ -128,10 +128,10 @@ def _specialised(laws: Laws) -> Kernel:
 
 
 def variational(plain: Kernel, *, forced: bool) -> Kernel:
-    """Return the kernel whose entry point `flow` carries columns along the runs of a plain one.
+    """Return the kernel of the variational equations for the laws of a plain kernel; entry point `flow`.
 
-    See :mod:`printhammer.kernel.variational.flow`; `forced` says whether constants force the columns. It is
-    apart from the plain kernel, so that runs which do not ask for derivatives compile nothing for them.
+    See :mod:`printhammer.kernel.variational.flow`. With `forced`, derivatives with respect to constants are
+    computed. The kernel is separate, so that runs without derivatives compile nothing for them.
     """
     with one_at_a_time:
         return _built(plain, forced)

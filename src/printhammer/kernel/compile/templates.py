@@ -1,10 +1,9 @@
-"""One kernel for each combination of laws.
+"""Execution of the kernel's template modules with the laws of a hammer, or with stubs for lowering.
 
-The kernel's template modules are ordinary source files whose law functions are names without a value. They
-are executed once more under a module name of their own, with something put in the place of these names: where
-they are lowered, see :mod:`printhammer.kernel.compile.lower`, functions that stay open; where the kernel runs
-as plain Python, the laws of a hammer. What is lowered is linked with the laws of a hammer before it is
-optimised, so that LLVM sees every call and can inline it.
+The template modules are ordinary source files in which the law functions are names without a value. They are
+executed again under separate module names, with these names defined: as stubs for lowering, see
+:mod:`printhammer.kernel.compile.lower`, or as the laws of a hammer where the kernel runs as plain Python. A
+lowered template is linked with the laws of a hammer before optimisation, so that LLVM can inline every call.
 """
 
 from __future__ import annotations
@@ -41,22 +40,22 @@ TEMPLATES = (
     "single.stretch",
     "lanes.members",
 )
-"""Template modules of the kernel in the order in which they use one another."""
+"""Template modules of the kernel; a module uses only names of the modules before it."""
 
 VARIATIONAL = tuple(
     f"variational.{name}"
     for name in ("slopes", "circuit", "forcing", "supply", "columns", "steps", "switches", "flow")
 )
-"""Template modules of the variational equations, which use those of the kernel."""
+"""Template modules of the variational equations, executed after the modules of `TEMPLATES`."""
 
 
 def source_file(name: str) -> Path:
-    """Return the file of a module of the kernel, named from there, such as "model.forces"."""
+    """Return the source file of a kernel module, given its name within the kernel, e.g. "model.forces"."""
     return Path(__file__).parents[1].joinpath(*name.split(".")).with_suffix(".py")
 
 
 def execute_all(templates: Sequence[str], namespace: dict[str, Any], tag: str) -> dict[str, Any]:
-    """Execute templates one after the other, each with the functions of those before it; return all names."""
+    """Execute templates in order, each with the functions of earlier templates; return all names."""
     names = dict(namespace)
     for name in templates:
         module = execute(name, tag, names)
@@ -65,7 +64,7 @@ def execute_all(templates: Sequence[str], namespace: dict[str, Any], tag: str) -
 
 
 def _functions_of(module: ModuleType) -> dict[str, Any]:
-    """Return the functions that a template defines or has been given, by name."""
+    """Return the functions in the namespace of an executed template, by name."""
     return {
         name: value
         for name, value in vars(module).items()
@@ -75,7 +74,7 @@ def _functions_of(module: ModuleType) -> dict[str, Any]:
 
 
 def compile_law(function: Callable[..., Any], compiled: Callable[..., Any], **names: Any) -> Any:
-    """Compile a law, together with the helpers that it calls; `names` are what names in it stand for."""
+    """Compile a law and the helpers that it calls; `names` overrides global names in their code."""
     helpers = helpers_of(function) if isinstance(function, FunctionType) else {}
     if helpers or names:
         scope = {**function.__globals__, **names}
@@ -85,7 +84,7 @@ def compile_law(function: Callable[..., Any], compiled: Callable[..., Any], **na
 
 
 def compile_module(module: ModuleType, compiled: Callable[..., Any]) -> ModuleType:
-    """Return a copy of a module whose public functions are compiled, each for what calls it."""
+    """Return a copy of a module in which the decorator `compiled` is applied to all public functions."""
     copy = ModuleType(module.__name__)
     scope = vars(copy)
     scope.update(vars(module))
@@ -96,7 +95,7 @@ def compile_module(module: ModuleType, compiled: Callable[..., Any]) -> ModuleTy
 
 
 def execute(template: str, tag: str, namespace: dict[str, Any]) -> ModuleType:
-    """Execute a template as a module of its own, told by `tag`, in which `namespace` is already defined."""
+    """Execute a template as a new module, named with the suffix `tag`, with `namespace` predefined."""
     path, name = source_file(template), f"printhammer.kernel.{template}_{tag}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
