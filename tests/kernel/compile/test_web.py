@@ -183,7 +183,7 @@ def test_a_module_computes_what_machine_code_computes(name: str, tmp_path: Path)
     def from_record() -> list[FloatArray]:
         ends = np.ascontiguousarray(record.nodes[:, 0])
         energies = problem.quadratures(record, steps, ends[:-1], ends[1:])
-        return [problem.resample(record, times)[:, :10], problem.peaks(record), energies[:, :5]]
+        return [problem.resample(record, times), problem.peaks(record), energies]
 
     expected = from_record()
     with computed_by(problem.kernel, host.call):
