@@ -185,7 +185,7 @@ class File:
         return next((content for content in contents if content is not None), None)
 
     def exists(self) -> bool:
-        """Whether the content is on disk, undamaged."""
+        """Whether an undamaged copy of the content is in the disk cache."""
         return self.read() is not None
 
     def keep(self, content: bytes) -> None:
@@ -217,7 +217,7 @@ class Code(File):
     """Cached machine code of an entry point, compiled on first use.
 
     `kind` is the name of the code in the records of compile times; `label` describes the laws in messages.
-    `is_lowered` says whether the modules that it is linked from are there, as in a wheel.
+    `is_lowered` returns whether all modules of the code are already lowered, as in a wheel.
     """
 
     def __init__(self, name: str, kind: str, label: str, is_lowered: Callable[[], bool]) -> None:
@@ -246,7 +246,7 @@ class Code(File):
 
     @property
     def work(self) -> str:
-        """Kind of work in the records: making code of modules that have to be lowered first takes longer."""
+        """Kind of compilation in the records, which distinguishes compilations that also lower modules."""
         return self.kind if self._is_lowered() else f"{self.kind}, {records.LOWERED}"
 
     def _noted(self, work: str, make: Callable[[], bytes]) -> bytes:

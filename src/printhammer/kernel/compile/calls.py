@@ -98,8 +98,8 @@ def calling_code(entry: str, signature: Signature, name: str, *, bare: bool = Fa
     """Return the text of a module with a function that takes a block and calls the function `entry` with it.
 
     The function returns 0, the number of the first slot whose array does not match the signature, or -1 for
-    an exception. The results follow the arguments in the block. Where no Python is, arrays are `bare`: the
-    address of the elements, then the length along each axis, eight bytes each.
+    an exception. The results follow the arguments in the block. Outside Python (WebAssembly), arrays are
+    passed `bare`: the address of the elements, then the length along each axis, eight bytes each.
     """
     code: list[str] = []
     passed: list[tuple[str, str]] = []
@@ -176,7 +176,7 @@ def _array_code(i: int, kind: str, code: list[str]) -> list[tuple[str, str]]:
 
 
 def _bare_array_code(i: int, kind: str, code: list[str]) -> list[tuple[str, str]]:
-    """Append the code that reads address and lengths of an array in C order; return what is passed for it."""
+    """Append code that reads address and lengths of a bare array; return the arguments to pass."""
     count = int(kind[1])
     data, lengths = f"%data.{i}", [f"%length{axis}.{i}" for axis in range(count)]
     code.append(f"{data} = load ptr, ptr %p{i}")

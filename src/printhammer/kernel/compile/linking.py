@@ -179,7 +179,7 @@ class _Lowered(Compiler):
 
 
 class PartCompiler(_Lowered):
-    """Compiler of helpers, which other compiled functions call."""
+    """Compiler of helpers that other compiled functions call and may inline."""
 
     lowering = _LowerPart
 

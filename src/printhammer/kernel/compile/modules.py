@@ -102,7 +102,7 @@ class Module:
         return self.name if self.shipped.exists() else f"{self.name}_{_lowering()}"
 
     def is_there(self) -> bool:
-        """Whether it is in the wheel or on disk."""
+        """Whether the lowered module is in the wheel or in the disk cache."""
         return self.shipped.exists() or File(f"{self.name}_{_lowering()}{self.suffix}").exists()
 
     def content(self) -> bytes:
@@ -140,7 +140,7 @@ def template_of(entry: str, variant: Mapping[str, bool]) -> Module:
 
 
 def every_template() -> Iterator[Module]:
-    """Yield the templates of all entry points in all variants."""
+    """Yield the templates of all entry points in all variants, e.g. with and without a coil circuit."""
     for entry in KINDS:
         circuits = (False,) if entry == "lanes" else (False, True)
         variants = [{} if entry == "lanes" else {"HAS_CIRCUIT": circuit} for circuit in circuits]

@@ -96,7 +96,7 @@ def _cast(context: Any, builder: Any, source: Any, target: Any, value: Any) -> A
 @_infer(operator.not_)
 class _Truth(AbstractTemplate):
     def generic(self, args: Any, kws: Any) -> Any:
-        """Type the truth value of a choice as a boolean."""
+        """Return the type of the truth value of a choice, which is boolean."""
         return _signature(types.boolean, *args) if isinstance(args[0], _ChoiceType) and not kws else None
 
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 FILE: Final = "printhammer-machine-code.json"
 
 LOWERED: Final = "lowered first"
-"""What is added to the kind of code whose modules have to be lowered first, as in a checkout."""
+"""Suffix of the kind of a compilation that first has to lower modules, as in a source checkout."""
 
 _USUAL: Final = {
     "runs": 3.0,
@@ -36,7 +36,7 @@ _USUAL: Final = {
 }
 """Typical compile times of the entry points, s, by kind; used where no time has been recorded."""
 
-_LOWERING: Final = 4.0  # How much longer it takes with modules that have to be lowered first
+_LOWERING: Final = 4.0  # Factor of the compile time if modules have to be lowered first
 
 _ANOTHER: Final = 5.0
 

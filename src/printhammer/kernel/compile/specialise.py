@@ -24,7 +24,7 @@ The hook returns a function that waits until these entry points are compiled.
 """
 
 ENTRIES = ("run", "resample", "quadratures", "peaks", "members")
-"""Entry points of the plain kernel."""
+"""Names of the entry points of the plain kernel, i.e. without lanes and variational equations."""
 
 AHEAD = ("peaks", "quadratures", "resample")
 """Entry points that are usually needed after `run`, and may be compiled ahead in parallel."""

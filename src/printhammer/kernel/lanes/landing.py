@@ -46,7 +46,7 @@ def rises_in_step(pool: Any, i: int, level: float, sign: float) -> int:
 
 @inlined
 def level_part(pool: Any, i: int, level: float, sign: float) -> float:
-    """Return the fraction of the latest step at which sign * x rises through sign * `level`."""
+    """Return the fraction of a lane's latest step at which sign * x rises through sign * `level`."""
     return position_root(*ends_of_step(pool, i, sign), sign * level, 1.0)
 
 

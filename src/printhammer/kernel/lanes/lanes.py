@@ -65,7 +65,7 @@ FINE = 1e-6
 def place_constants(
     pool: Any, i: int, hammer: Hammer, control: Any, bounds: Any, rates: Any, most_steps: float
 ) -> None:
-    """Write the constants of a member's hammer and waveform into a lane."""
+    """Write hammer constants, waveform rates, step-size control and bounds of a member into a lane."""
     for row in range(R.RATES_WIDTH):
         pool[(R.RATES + row) * R.BLOCK + i] = rates[row]
     at = R.HAMMER * R.BLOCK + i

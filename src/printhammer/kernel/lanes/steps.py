@@ -154,7 +154,7 @@ def timed_step(pool: Any, i: int, start: State, h: float, law: ForceLaw) -> tupl
 
 @compiled
 def free_block(pool: Any, begin: int) -> None:
-    """Take a step in each lane of a block of members in free flight."""
+    """Take one step in each lane of a block whose members are in free flight."""
     pool = pool[begin:]
     for i in range(BLOCK):
         start = start_at(pool, i)
@@ -180,7 +180,7 @@ def free_block(pool: Any, begin: int) -> None:
 
 @compiled
 def loading_block(pool: Any, begin: int) -> None:
-    """Take a step in each lane of a block of members on the loading branch of the pack."""
+    """Take one step in each lane of a block whose members are on the loading branch of the pack."""
     pool = pool[begin:]
     for i in range(BLOCK):
         start = start_at(pool, i)
@@ -195,7 +195,7 @@ def loading_block(pool: Any, begin: int) -> None:
 
 @compiled
 def unloading_block(pool: Any, begin: int) -> None:
-    """Take a step in each lane of a block of members on the unloading branch of the pack."""
+    """Take one step in each lane of a block whose members are on the unloading branch of the pack."""
     pool = pool[begin:]
     for i in range(BLOCK):
         start = start_at(pool, i)
@@ -222,7 +222,7 @@ def stiffness(w: float, hammer: Any) -> float:
 
 @compiled
 def contact_block(pool: Any, begin: int) -> None:
-    """Take a step in each lane of a block of members in the backstop, in regularised variables."""
+    """Take one step, in regularised variables, in each lane of a block whose members are in the backstop."""
     pool = pool[begin:]
     for i in range(BLOCK):
         start = start_at(pool, i)

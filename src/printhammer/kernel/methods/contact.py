@@ -29,7 +29,7 @@ ContactState = Any
 """State in the backstop: time [s], w = sqrt(compression) [m^0.5], velocity [m/s], and dv/ds."""
 
 PHASE_LIMIT = 2.0
-"""Largest phase of the contact oscillation in one step; beyond about 5 the method is unstable."""
+"""Largest phase advance [rad] of the contact oscillation in one step; DOP853 is unstable beyond about 5."""
 
 
 @compiled

@@ -33,7 +33,7 @@ def sign_changes(d0: float, d1: float, d2: float, d3: float, d4: float) -> int:
 def control_points(
     x0: float, v0: float, a0: float, x1: float, v1: float, a1: float, h: float
 ) -> tuple[float, float, float, float]:
-    """Return the four inner Bernstein coefficients of the quintic through both ends of a step of `h`."""
+    """Return the four inner Bernstein coefficients of the quintic interpolant of a step of length `h`."""
     p1 = x0 + 0.2 * h * v0
     p2 = p1 + 0.2 * h * v0 + 0.05 * h * h * a0
     p4 = x1 - 0.2 * h * v1
@@ -122,7 +122,7 @@ def position_root(
 
 @compiled
 def velocity_root(v0: float, a0: float, v1: float, a1: float, h: float) -> float:
-    """Return the fraction of the step in (0, 1] at which the cubic of the velocity falls to zero."""
+    """Return the fraction of the step, in (0, 1], at which the cubic interpolant of v falls to zero."""
     c2 = 3.0 * (v1 - v0) - h * (2.0 * a0 + a1)
     c3 = 2.0 * (v0 - v1) + h * (a0 + a1)
     # If the step starts at rest, divide out the root at the start.

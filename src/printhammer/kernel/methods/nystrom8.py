@@ -1,4 +1,4 @@
-"""One step of the Runge-Kutta-Nystrom pair 8(6), for accelerations that do not depend on the velocity."""
+"""Step of the Runge-Kutta-Nystrom pair 8(6), for accelerations that do not depend on the velocity."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""One run of one hammer, its record, and quantities computed from the record."""
+"""Integration of one run of a hammer, the record of the run, and quantities computed from the record."""

@@ -78,7 +78,7 @@ def close_contact(contacts: Rows, used: int, t: float, v: float) -> None:
 
 @compiled
 def carry_contact(contacts: Rows, mode: int) -> int:
-    """Prepare the contact array after a pause: a contact still open stays in row 0; return their number."""
+    """Continue after a pause: keep a contact that is still open in row 0; return the number of contacts."""
     if mode == FREE:
         return 0
     contacts[0, 5] = -1.0

@@ -21,7 +21,7 @@ def rest_ends(
     Returns
     -------
     tuple
-        Whether the acceleration leaves the range, and the time from `t` until it does [s], else `pause`.
+        Whether the acceleration leaves the range, and the time [s] from `t` to the departure, else `pause`.
     """
     mode, memory, hammer, drive = law
     low = 0.0

@@ -1,4 +1,4 @@
-"""One step of a run: in the backstop, at rest, or under a force law that is smooth in time."""
+"""One step of a run, by mode: in the backstop, at rest, or off the backstop."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ def reverse(state: State, setup: Setup) -> None:
 
 @inlined
 def wait(state: State, setup: Setup, t_next: float, still: float, nodes: Any) -> int:
-    """Advance the time of an armature at rest while the forces keep it there; return the event or `HOLDS`."""
+    """Advance the time of an armature that stays at rest; return the event that ends it, or `HOLDS`."""
     mode, t, x = int(state[C.MODE]), state[C.TIME], state[C.POSITION_NOW]
     time_scale = setup.control[0] / setup.control[1]
     pause = t_next - t

@@ -161,7 +161,7 @@ def note_mark(node: Any, initial: Any, setting: Setting, carried: Carried) -> No
 
 @compiled
 def scale_or_note(factor: float, renormalise: bool, columns: Any, setting: Setting, grown: Any) -> None:
-    """Apply a factor, passed as its logarithm, to the columns; with `renormalise`, add it to their growth."""
+    """Multiply the columns by exp(`factor`); with `renormalise`, add `factor` to their growth instead."""
     if renormalise:
         for k in range(columns.shape[1]):
             grown[k] += factor

@@ -53,7 +53,7 @@ def acceleration_at(node: Any, mode: int, kept: float, v: float, hammer: Hammer,
 
 @compiled
 def powers_at(node: Any, mode: int, kept: float, v: float, hammer: Hammer, drive: Drive) -> Any:
-    """Return the powers [W] at a node with the force law of `mode`, with an uncompressed backstop."""
+    """Return the powers [W] at a node with the force law of `mode`, for an uncompressed backstop."""
     return powers(node[0], node[1], v, 0.0, mode, memory_of(mode, kept, hammer), hammer, drive)
 
 
