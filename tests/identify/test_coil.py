@@ -168,6 +168,42 @@ def test_errors_of_a_probe_that_are_stated_or_fitted(
         assert plain.rejected
 
 
+@pytest.mark.slow
+def test_intervals_contain_the_truth_as_often_as_they_say(tmp_path: Path) -> None:
+    """Of 100 records by a probe with stated errors; fewer than 88 would come once in 600 tries."""
+    stated = {"offset": "0 mA +- 5 mA", "delay": "0 us +- 10 us", "gain": "1 +- 0.01"}
+    counts, rejected = {"coil.resistance": 0, "coil.inductance": 0}, 0
+    for seed in range(100):
+        offset, delay, gain = np.random.default_rng(1000 + seed).standard_normal(3) * (5e-3, 1e-5, 0.01)
+        path = probed(tmp_path / "shown.csv", seed, offset=offset, delay=delay, gain=1.0 + gain)
+        fit = ph.fit("coil", path, hammer=driven(resistance="9 ohm", inductance="9 mH"), locked=0.0, **stated)
+        rejected += bool(fit.rejected)
+        for name, value in (("coil.resistance", 10.0), ("coil.inductance", 8e-3)):
+            low, high = fit[name].interval
+            counts[name] += low <= value <= high
+    assert all(count >= 88 for count in counts.values()), counts
+    assert rejected <= 4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "size"), [("offset", 2e-3), ("delay", 1e-6)])
+def test_undeclared_errors_that_move_a_constant_reject_the_law(
+    name: str, size: float, tmp_path: Path
+) -> None:
+    """Of the records that an error moves by more than two standard errors over 90 in 100 are rejected."""
+    guess, keys, moved, rejected = driven(), ("coil.resistance", "coil.inductance"), 0, 0
+    for seed in range(40):
+        error = size * np.exp(np.random.default_rng(seed).uniform(-1.0, 2.0))
+        clean, off = (
+            ph.fit("coil", probed(tmp_path / "shown.csv", seed, **errors), hammer=guess, locked=0.0)
+            for errors in ({}, {name: error})
+        )
+        if max(abs(off[key].value - clean[key].value) / off[key].standard_error for key in keys) > 2.0:
+            moved, rejected = moved + 1, rejected + bool(off.rejected)
+    assert moved >= 10
+    assert rejected > 0.9 * moved
+
+
 def test_readings_in_coarse_steps(tmp_path: Path) -> None:
     """Eight bits: the rounding errors of rows on one step are one error."""
     coarse = {**RECORD, "noise": {"current": "1 mA"}, "resolution": {"current": "10 mA"}}
