@@ -58,6 +58,10 @@ def whole_ticks(
     rounded = {name: np.rint(values / tick) for name, values in times.items()}
     advance, width, delay, brake = (rounded[name] for name in COLUMNS)
     near = NANOSECOND / tick
+    # No pulse may be wider than the widest one of the table, since the current is limited.
+    widest = math.floor(max(float(times[name].max()) for name in ("width", "brake_width")) / tick + near)
+    for pulses in (width, brake):
+        np.minimum(pulses, max(widest, 1), out=pulses)
     # A dot that is fired later may delay the next one.
     for _ in range(gaps + 1):
         for row, rate in enumerate(rates.tolist()):
