@@ -315,7 +315,7 @@ class ImpactTrain(Result):
         return provenance() if self.source is None else self.source.provenance
 
     def notes(self) -> dict[str, Any]:
-        """Return surface and firings of the section, for the attributes of the Dataset."""
+        """Return the Dataset attributes: surface of the section, range of firings, requested touches."""
         return {name: getattr(self.source, name, None) for name in ("surface", "first", "last", "wanted")}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:

@@ -96,7 +96,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 
 
 def run_program(program: typer.Typer, name: str, arguments: Sequence[str] | None = None) -> NoReturn:
-    """Run a program of verbs on arguments, by default those of the process; exit with its status."""
+    """Run a command-line program on arguments, by default sys.argv[1:]; exit with the program's status."""
     allow_any_text()
     try:
         status = program(

@@ -62,7 +62,7 @@ class Option:
     """Role of a hammer: "named" (not loaded), "loaded" (warnings shown), "fired" (must have a waveform)."""
 
     def flag_of(self, name: str) -> str:
-        """Return the flag of the option of a parameter."""
+        """Return the command-line flag that sets a parameter, such as --largest-current."""
         return self.flag or f"--{name.replace('_', '-')}"
 
     def annotation(self, name: str) -> Any:

@@ -48,7 +48,7 @@ class ProbeError(Declared):
 
     @property
     def is_fitted(self) -> bool:
-        """Whether the error is fitted."""
+        """Whether the probe error is a parameter of the fit, not an exact constant."""
         return self.deviation > 0.0
 
     @property

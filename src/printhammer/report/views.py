@@ -62,7 +62,10 @@ def rates_view(report: Report) -> dict[str, Any] | None:
 
 
 def panels_view(report: Report) -> list[dict[str, Any]]:
-    """Return the panels of Fig. 11: printed verdict, computed verdict, and frequency by random hammers."""
+    """Return the panels of Fig. 11: verdict of the paper, computed verdict, fraction of random hammers.
+
+    The fraction counts the random hammers whose computed verdict is that of the paper.
+    """
     verdicts: list[str] = []
     for result in report.results:
         if result.claim.name == "poincare" and result.value is not None:

@@ -270,7 +270,10 @@ class ExtraDots(Result):
 
     @classmethod
     def from_rows(cls, groups: Sequence[tuple[IntArray, Ragged]]) -> ExtraDots:
-        """Concatenate the extra contacts of several groups; each group comes with its members' indices."""
+        """Concatenate the extra pack contacts of groups of ensemble members.
+
+        A group is a pair: indices of its members, and the kernel's dot rows of each member.
+        """
         member = np.concatenate(
             [np.zeros(0, np.int64), *(np.repeat(own, rows.counts) for own, rows in groups)]
         )

@@ -221,7 +221,7 @@ class SchemeProblem(Problem):
 
 
 def _contacts(nodes: FloatArray) -> FloatArray:
-    """Return the contacts of a run recorded at step ends, in the format of the kernel."""
+    """Convert the states at the step ends of a fixed-step run to contacts, in the format of the kernel."""
     surface = np.where(nodes[:, 3] == M.BACKSTOP, M.BACKSTOP_SURFACE, -1)
     surface = np.where((nodes[:, 3] == M.LOADING) | (nodes[:, 3] == M.UNLOADING), M.PACK_SURFACE, surface)
     changes = np.flatnonzero(np.diff(surface)) + 1

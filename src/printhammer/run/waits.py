@@ -66,7 +66,7 @@ def waits_of(
 
 
 def fired_by(drives: Sequence[Drive]) -> list[Waveform]:
-    """Return the longest waveform of each drive."""
+    """Return, for each drive, the waveform with the longest duration."""
     if isinstance(drives, PulseTrains):
         return [drives.pulses[number].waveform for number in drives.pulse_of.tolist()]
     return [longest_of(drive) for drive in drives]

@@ -70,7 +70,7 @@ def read_message(text: str, shelf: Shelf | None = None) -> tuple[str, int, Any]:
 
 
 def _columns(content: Any) -> list[tuple[str, str]] | None:
-    """Parse the declared columns of a dropped table; None if they were not asked for."""
+    """Parse the columns that the user declared for a table dropped on the page; None if undeclared."""
     if content is None:
         return None
     told = []

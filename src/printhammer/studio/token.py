@@ -1,4 +1,4 @@
-"""Token of a user, stored in a private folder, so that links and open pages remain valid."""
+"""Access token of the user, stored in a private folder so that links and open pages survive a restart."""
 
 from __future__ import annotations
 

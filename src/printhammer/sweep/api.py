@@ -116,7 +116,10 @@ def sweep(
 
 
 def _member_table(result: xr.Dataset) -> pd.DataFrame:
-    """Convert a sweep to a table: one row per member, one column per array and firing or time."""
+    """Convert a sweep to a table with one row per member.
+
+    The columns are the status and the elements of every other array, one column for each firing or time.
+    """
     wide = result[["status"]]
     for name, variable in result.data_vars.items():
         further = [dim for dim in variable.dims if dim not in wide["status"].dims]

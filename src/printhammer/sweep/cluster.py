@@ -182,7 +182,7 @@ class _Tasks:
         return self._count
 
     def _watch(self) -> None:
-        """Raise InputError if the scheduler is gone, or no worker has been present for a while."""
+        """Raise an error if the scheduler is unreachable, or has had no worker for `NO_WORKERS` seconds."""
         if self._client.status not in _ALIVE:
             raise _GoneError
         self._idle = 0.0 if self._threads() else self._idle + _INTERVAL

@@ -281,7 +281,7 @@ class _Collected:
         return branch.crossing if event.kind in CROSSINGS else None
 
     def switch(self, level: int) -> None:
-        """Follow the branches that begin at period doublings and crossings of the branches found so far."""
+        """Continue the branches that start at period doublings and branch points of the known branches."""
         for number, branch in enumerate(list(self.found)):
             for place, event in enumerate(branch.events):
                 follow = self.switch_of(branch, event)

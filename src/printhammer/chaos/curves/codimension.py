@@ -12,9 +12,9 @@
 | degenerate grazing | grazing | the acceleration at the touch |
 
 A is the derivative of the strobe map without the touch. At a resonant grazing of a rigid backstop, the
-square-root term of the map over n passages has no effect on the trace (A. P. Ivanov, J. Sound Vib. 162 (1993)
-562; J. Molenaar, J. G. de Weger and W. van de Water, Nonlinearity 14 (2001) 301). At these points, folds and
-doublings of the orbits with one touch in n periods begin.
+square-root term of the map over n periods of the orbit has no effect on the trace (A. P. Ivanov, J. Sound
+Vib. 162 (1993) 562; J. Molenaar, J. G. de Weger and W. van de Water, Nonlinearity 14 (2001) 301). At these
+points, folds and doublings of the orbits with one touch in n periods begin.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from printhammer.chaos.curves.systems import Place, Plane
 
 RESONANCES: Final = 3
-"""Largest number of passages for which a grazing orbit is tested for a resonance."""
+"""Largest number n of orbit periods per touch for which a grazing orbit is tested for a resonance."""
 
 _LEVEL: Final = 1e-3
 """Component of a unit tangent along a parameter below which a curve is stationary in this parameter."""
@@ -60,11 +60,11 @@ class CodimensionTwo(Declared):
     phase: float = part("phase of the section, as a fraction of the period from the firing on")
     multipliers: npt.NDArray[np.complex128] = part("multipliers of the orbit, shape (2,)")
     after: int = part("index of the preceding point of the curve; -1 before the first point")
-    passages: int = part("number n of passages of a resonant grazing; else 1", default=1)
+    passages: int = part("number n of orbit periods per touch at a resonant grazing; else 1", default=1)
 
     @property
     def message(self) -> str:
-        """Kind of the point in a few words, with the number of passages of a resonant grazing."""
+        """Kind of the point as text; for a resonant grazing, with the number of orbit periods per touch."""
         return f"{self.kind} of {self.passages} passages" if self.passages > 1 else self.kind
 
 
@@ -96,7 +96,7 @@ def _along(direction: FloatArray) -> Callable[[Node], float]:
 
 
 def _tests(kind: str, rigid: bool) -> dict[tuple[str, int], Callable[[Node], float]]:
-    """Return the test functions of the points of codimension two, by kind and number of passages."""
+    """Return the test functions of the points of codimension two, by kind and orbit periods per touch."""
     if kind == "fold":
         return {
             ("fold-flip", 1): lambda node: _determinant(node) + 1.0,
@@ -143,7 +143,7 @@ def points_along(
             for (name, passages), test in tests.items()
             if test(here) * test(ahead) < 0.0 and max(abs(test(here)), abs(test(ahead))) > _NOISE
         ]
-        # Tests for several passages also change sign at a point of one passage: report the fewest passages.
+        # The tests for n > 1 also change sign where the test for n = 1 does: report the smallest n.
         first = {name: passages for name, passages, _ in reversed(named)}
         for name, passages, test in named:
             if passages == first[name]:

@@ -242,7 +242,10 @@ class GrazingSystem:
 
 
 class ImpactSystem:
-    """Extended map for rigid impacts and a critical multiplier; unknowns: phase, velocity, parameter."""
+    """Extended map for an orbit that strikes a rigid backstop and has a critical multiplier.
+
+    Unknowns: phase of the impact, velocity after the impact, first parameter.
+    """
 
     def __init__(self, plane: Plane, kind: str) -> None:
         self.plane, self.kind = plane, kind

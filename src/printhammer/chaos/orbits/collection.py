@@ -146,11 +146,11 @@ class Orbits(Result):
 
     @property
     def unseen(self) -> float:
-        """Estimated lower bound of the number of orbits that the search has missed.
+        """Estimated lower bound on the number of orbits that the search has missed.
 
-        The estimate is f1 (f1 - 1) / (2 (f2 + 1)), with f1 orbits reached from one guess and f2 orbits
-        reached from two guesses (A. Chao, Scand. J. Statist. 11 (1984) 265). The estimate is at least 1 for
-        every number of firings over which the indices do not add up to 1.
+        The larger of two bounds: f1 (f1 - 1) / (2 (f2 + 1)), with f1 and f2 the numbers of orbits reached
+        from exactly one and exactly two guesses (A. Chao, Scand. J. Statist. 11 (1984) 265); and the number
+        of periods, in firings, for which the fixed-point indices do not add up to 1.
         """
         once, twice = self.hits.count(1), self.hits.count(2)
         return max(0.5 * once * max(once - 1, 0) / (twice + 1), float(len(self.incomplete)))

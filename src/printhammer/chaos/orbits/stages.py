@@ -265,7 +265,7 @@ class Search:
         return guesses[begin:end]
 
     def _joined(self, different: list[_Known], period: int, stage: tuple[int, int]) -> list[Guess]:
-        """Concatenate pairs of the orbits visible to a stage that no earlier stage has concatenated."""
+        """Concatenate pairs of orbits available to a stage, except pairs that an earlier stage has tried."""
         block, batch = stage
         seen = [orbit for orbit in different if orbit.is_visible(block, batch)]
         before = [

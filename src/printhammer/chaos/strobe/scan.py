@@ -142,7 +142,7 @@ def largest_multiplier(train: Train, states: States, period: int, tolerance: flo
 
 
 def _followed(trains: Sequence[Train], exponents: bool, effort: Effort) -> list[Verdict]:
-    """Classify the trains that were not decided early, by the firings 1001 to 2000."""
+    """Classify trains that the early stages left undecided, from the states at firings 1001 to 2000."""
     judged, tolerance = (FIRST, LAST), effort.tolerance
     states, _ = run_trains(trains, np.arange(FIRST, LAST + 1), None, effort)
     distances = [own.distances(train) for own, train in zip(states, trains, strict=True)]

@@ -187,7 +187,7 @@ def repeats(
 
 
 def period_of(distances: FloatArray) -> int | None:
-    """Return the smallest q for which states q firings apart agree; None if no q is small enough."""
+    """Return the smallest q for which states q firings apart agree; None if they agree for no q tested."""
     agree = np.flatnonzero(distances <= AGREEMENT)
     return int(agree[0]) + 1 if agree.size else None
 

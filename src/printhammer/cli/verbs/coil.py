@@ -175,12 +175,15 @@ def _coil(si: str, metavar: str, what: str) -> Any:
 def duty(
     hammer: str | None = opt.text(
         "HAMMER",
-        "Hammer file, or name of a shipped hammer, whose coil has a resistance; instead of --heat.",
+        "Hammer file, or name of a shipped hammer, that specifies the coil resistance; replaces --heat.",
         argument=True,
         is_input=True,
     ),
     heat: float | None = opt.quantity(
-        "J", "ENERGY", "Heat of one dot with the winding at 20 degC, e.g. '4 mJ'.", positive=True
+        "J",
+        "ENERGY",
+        "Heat dissipated in the coil per dot, with the winding at 20 degC, e.g. '4 mJ'.",
+        positive=True,
     ),
     rates: Path | None = opt.source(
         "Manufacturer's table of permitted rates (.csv), from which the thermal limit is inferred."

@@ -28,7 +28,8 @@ def sweep(
     job: Job,
     spec: Path | None = opt.argument("SPEC", "Specification file of the sweep (.toml).", type=Path),
     out: Path | None = opt.folder(
-        "Result store (Zarr), new or to be resumed; with a .csv name, a table is written beside it.",
+        "Output folder of the result store (.zarr), new or to be resumed; or a .csv file for the table, in"
+        " which case the store has the same name with .zarr.",
         writes=False,
     ),
     threads: int | None = opt.THREADS,

@@ -78,7 +78,9 @@ _MOST_RATES: Final = 2000  # Largest number of rates; arbitrary
             "Longest gap that is distinguished, in slots; longer gaps count as rest.", default=2
         ),
         "brake": opt.switch("Allow brake pulses.", default=True),
-        "robust": opt.switch("Minimise the mean square deviation over perturbed hammers as well."),
+        "robust": opt.switch(
+            "Minimise the mean square deviation of the dots over the nominal and perturbed hammers."
+        ),
         "driver": opt.choice(
             "own|switch",
             "Driver of the coil: the hammer's own pulse (own) or a fast unipolar driver (switch).",
@@ -199,7 +201,7 @@ _PANEL: Final = "The sensor"
         ),
         "forgetting": opt.number("Fraction of the earlier corrections that each stage undoes.", default=0.02),
         "doubt": opt.number(
-            "Largest accepted fraction of likely units that print worse with the table than in open loop.",
+            "Maximum fraction of posterior samples that may print fewer dots with the table than without.",
             default=0.0,
         ),
         "serial": opt.text("TEXT", "Serial number of the unit that learns.", default="unit"),
@@ -233,7 +235,9 @@ def learn(
         panel=_PANEL,
     ),
     signal_noise: str | None = opt.text(
-        "VALUE", "Standard deviation of a coil sample, e.g. '5 mA' or '50 mV'.", panel=_PANEL
+        "VALUE",
+        "Standard deviation of the noise of coil current or voltage samples, e.g. '5 mA' or '50 mV'.",
+        panel=_PANEL,
     ),
     force_noise: float | None = opt.number(
         "Relative standard deviation of measured forces (default: forces are not measured).", panel=_PANEL
@@ -303,7 +307,9 @@ def learn(
     if np.isnan(likely):
         complaint = f"no simulated hammer explains the readings: misfit {result.misfit[-1]:.2f}"
     else:
-        complaint = f"{likely:.0f} % of the likely units print every dot within the limits after learning"
+        complaint = (
+            f"{likely:.0f} % of the posterior samples print every dot within the limits after learning"
+        )
 
     def believed(path: Path) -> None:
         result.believed_hammer.save(path)

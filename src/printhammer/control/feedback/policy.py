@@ -64,12 +64,12 @@ class Fronts:
 
     @property
     def table(self) -> ImpactMap:
-        """Impact map of the nominal hammer."""
+        """Impact map for the nominal distance of the pack: outcome of each action from each touch."""
         return self.maps[MIDDLE]
 
     @property
     def landing(self) -> Landing:
-        """Landings of the nominal hammer."""
+        """Landings for the nominal distance of the pack."""
         return self.landings[MIDDLE]
 
 
@@ -161,7 +161,11 @@ class Policy:
         self._costs = [self._resting()]
 
     def dot_cost(self, force: FloatArray, late: FloatArray) -> FloatArray:
-        """Return the cost of a dot: force relative to the single pulse, lateness in s."""
+        """Return the cost of a dot, a² (1 + k a⁴) + b² (1 + k b⁴), with k = `_STEEP`.
+
+        a = (`force` - 1) / force limit, with `force` relative to the single pulse; b = `late` [s] / arrival
+        limit.
+        """
         a, b = (force - 1.0) / self.limits.force, late / self.limits.arrival
         return np.asarray(a**2 * (1.0 + _STEEP * a**4) + b**2 * (1.0 + _STEEP * b**4))
 

@@ -190,7 +190,7 @@ IN_CYCLE: Final = np.asarray(PRINTED)[JUDGED] < LEAD_IN + 2**SLOTS
 
 
 class Verdict(NamedTuple):
-    """Result of comparing a table with the open loops on samples of the posterior."""
+    """Outcome of comparing a compensation table with open-loop drive on hammers drawn from the posterior."""
 
     gains: bool  # Whether the table is better than both open loops
     loop: OpenLoop  # The open loop that is used otherwise
@@ -366,7 +366,7 @@ class LearningLaw:
         growth = press.multipliers(settings)
         steady = bool(np.quantile(np.nan_to_num(growth), 1.0 - self.doubt) <= 1.0)
         gains = steady and self._leads(table.mean(axis=1), shares)
-        # The open loop that is better over the production, unless no likely unit loses with the other.
+        # The open loop that is better over the production, unless no posterior sample loses with the other.
         loops = self.entries.loops
         chosen = next(k for k, loop in enumerate(loops) if loop.pulse is self.first.pulse)
         chosen = next((k for k in range(len(loops)) if self._leads(shares[k], shares[[chosen]])), chosen)

@@ -153,7 +153,7 @@ class Learning(Result, rows=_DOTS):
     )
     multiplier: FloatArray = column(
         "1",
-        "largest multiplier of rows printed with the table by likely units",
+        "largest multiplier of rows printed with the table by posterior samples",
         "stage",
         more="NaN before there are readings, and where no row is periodic; above 1 no table is used",
     )
@@ -165,7 +165,7 @@ class Learning(Result, rows=_DOTS):
     )
     certainty: FloatArray = column(
         "1",
-        "fraction of likely units that print every dot within limits",
+        "fraction of posterior samples that print every dot within limits",
         "stage",
         more="NaN without an expected fraction",
     )
@@ -246,7 +246,7 @@ class Learning(Result, rows=_DOTS):
 
     @property
     def passed(self) -> bool:
-        """Whether, by the readings, at least half of the likely units print every dot within limits."""
+        """Whether at least half of the posterior samples print every dot within limits."""
         return bool(self.certainty[-1] >= _LIKELY)
 
     def notes(self) -> dict[str, Any]:
@@ -280,17 +280,17 @@ def learn(
     effort: Effort = DEFAULT,
     **_keywords: Unpack[AtFixedTolerance],
 ) -> Learning:
-    """Calibrate the compensation table of an unmeasured unit from run to run, from its impact times.
+    """Calibrate the compensation table of a unit by iterative learning control from its impact times.
 
     The unit prints test lines; a sensor measures the impact time and, optionally, the force of each dot, with
-    noise. The constants of the unit are estimated from the readings by maximum a posteriori estimation with a
-    Laplace approximation, together with offset and gain of the sensor; the priors of offset and gain have
-    standard deviations of 25 us, or the `offset` that the sensor states, and 1 %. Iterative learning control
-    then corrects advance, width and brakes of a table that was tuned for the nominal hammer and the stated
-    variability. The first line is printed in open loop. The table is used only if the posterior explains the
-    readings, and if no sample of it prints fewer dots of the test cycle and of rows of 200 slots with the
-    table, or a row in which errors grow. Otherwise the better of two open loops is used: with the pulse of
-    the driver, or with the hammer's own pulse.
+    noise. From these readings, the constants of the unit and the offset and gain of the sensor are estimated
+    by maximum a posteriori estimation with a Laplace approximation. The prior standard deviation of the
+    offset is the `offset` of the sensor, or 25 us if the sensor has none; that of the gain is 1 %. Iterative
+    learning control then corrects advance, width and brakes of a table that was tuned for the nominal hammer
+    and the variability of the production. The first line is printed in open loop. The table is used only if
+    the posterior explains the readings, and if no posterior sample prints fewer dots of the test cycle and of
+    rows of 200 slots with the table than in open loop, or a row in which errors grow from dot to dot.
+    Otherwise the better of two open-loop drives is used: the pulse of the driver, or the hammer's own pulse.
 
     Parameters
     ----------

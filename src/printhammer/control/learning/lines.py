@@ -77,12 +77,12 @@ class Surrogate:
         )
 
     def value(self, rows: FloatArray) -> FloatArray:
-        """Evaluate the reading for constants (M, constants)."""
+        """Compute the predicted reading of M hammers; `rows` are their constants, shape (M, constants)."""
         bent = 0.5 * np.einsum("mi,ij,mj->m", rows, self.curvature, rows)
         return np.asarray(self.constant + rows @ self.slope + bent)
 
     def gradient(self, rows: FloatArray) -> FloatArray:
-        """Evaluate the derivatives of the reading with respect to the constants, (M, constants)."""
+        """Compute the derivatives of the predicted reading with respect to the constants, (M, constants)."""
         return np.asarray(self.slope + rows @ self.curvature)
 
 

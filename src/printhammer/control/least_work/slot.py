@@ -111,7 +111,7 @@ class Outcomes:
 
 
 def node_times(duration: float, nodes: int) -> FloatArray:
-    """Return the times of the nodes after the start of a slot, s, including the start."""
+    """Return the times of the current nodes of a slot, s, relative to its start; the first is 0."""
     return np.linspace(0.0, duration, nodes + 1)
 
 

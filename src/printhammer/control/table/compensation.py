@@ -317,7 +317,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return {"hammer": self.hammer, "hammer_fingerprint": self.fingerprint, **versions()}
 
     def entries(self) -> Entries:
-        """Return the arrays over the distinct histories, with the gaps as text such as "1-2-rest"."""
+        """Return the Dataset variables, indexed by distinct history; a history is text such as "1-2-rest"."""
         every = histories(self.gaps, self.reach)
         numbers = [number_of(history, self.reach) for history in every]
         arrays = {

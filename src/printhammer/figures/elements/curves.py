@@ -65,7 +65,10 @@ def times_of(motion: Motion, start: float | None = None, end: float | None = Non
 
 
 def orbit(motion: Motion, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return displacement, m, and velocity, m/s, along a motion, before and after each rigid impact."""
+    """Sample displacement, m, and velocity, m/s, of a motion at `times`.
+
+    At each rigid impact, the state before the impact is inserted, so that the jump is drawn.
+    """
     x, v = motion.at(times)
     jumps = [
         (contact.t_in, contact.v_in)

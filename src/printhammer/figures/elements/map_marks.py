@@ -136,9 +136,9 @@ def picture(ax: Axes, chart: xr.Dataset, scales: Scales) -> QuadMesh:
 
 
 def firing_lines(ax: Axes, chart: xr.Dataset, scales: Scales) -> None:
-    """Draw a thin line along each firing, and a bold line along its lost dots.
+    """Draw the time of each firing as a thin curve over the rates, bold at rates where its dot is lost.
 
-    For maps with fewer than 50 rates, the lines are replaced by vertical marks in the row of each rate.
+    For maps with fewer than 50 rates, a vertical mark in the row of each rate replaces the curve.
     """
     if "fired_at" not in chart:
         return

@@ -18,30 +18,30 @@ Name = Literal["displacement", "velocity", "force", "time", "current"]
 
 
 class Scale(Declared):
-    """Scale of an axis: name, SI unit, unit drawn, and unit of the opposite axis."""
+    """Scale of an axis: name, SI unit, display unit, and display unit of the secondary axis."""
 
     label: str = part("name on the axis")
     si: str = part("SI unit of the numbers inside")
-    unit: str = part("unit of the numbers drawn")
-    other: str = part("unit of the opposite axis; empty for none", default="")
+    unit: str = part("display unit of the numbers on the axis")
+    other: str = part("display unit of the secondary axis; empty without such an axis", default="")
 
     @property
     def factor(self) -> float:
-        """Factor from SI to the unit drawn."""
+        """Factor from the SI unit to the display unit."""
         return _factor(self.si, self.unit)
 
     @property
     def ratio(self) -> float:
-        """Factor from the unit drawn to the unit of the opposite axis."""
+        """Factor from the display unit to the unit of the secondary axis."""
         return _factor(self.si, self.other) / self.factor
 
     @property
     def sign(self) -> str:
-        """Symbol of the unit drawn, such as "µm"."""
+        """Symbol of the display unit, such as "µm"."""
         return _SIGNS.get(self.unit, self.unit)
 
     def shown(self, values: npt.ArrayLike) -> FloatArray:
-        """Convert values in SI to the unit drawn."""
+        """Convert values in the SI unit to the display unit."""
         import numpy as np
 
         return np.asarray(values, dtype=np.float64) * self.factor

@@ -199,10 +199,13 @@ _HEAVY: Final = 3.0  # Factor on the stated mass above which an armature of iron
 def implausible(sheet: DataSheet, part: ReluctanceMagnet) -> list[str]:
     """Return one sentence for each physically implausible property of a fitted magnet.
 
-    An iron armature that covers a round pole of that area and carries its flux to the rim is a quarter of the
-    pole diameter thick; it must not be much heavier than the mass on the sheet. The driver must be able to
-    store the field at the current of the forces and full gap within a pulse: half the inductance times the
-    squared current, of at most rail times current times on-time.
+    Two properties are checked:
+
+    - Mass: an iron disc that covers the fitted pole area, taken as a circle, and carries the flux to its rim
+      is a quarter of the circle's diameter thick. The disc must not be much heavier than the armature.
+    - Energy: the driver must be able to supply the field energy at full gap, L I^2 / 2, within one pulse. I
+      is the current at which the sheet specifies the forces, and a pulse supplies at most rail voltage times
+      I times on-time.
     """
     found = []
     diameter = 2.0 * math.sqrt(part.pole_area / math.pi)
@@ -224,7 +227,7 @@ def implausible(sheet: DataSheet, part: ReluctanceMagnet) -> list[str]:
 
 
 RESTITUTION: Final = 0.3
-"""Assumed restitution of a stop: steel on steel with a thin film between."""
+"""Assumed coefficient of restitution of a stop: steel on steel, with a thin film between the surfaces."""
 
 INDENTATION: Final = 0.25
 """Fraction of the remaining gap by which the magnet's work indents the struck object; assumed."""
@@ -238,7 +241,7 @@ def hammer_of(sheet: DataSheet) -> tuple[Hammer, SheetMagnet]:
     Raises
     ------
     InputError
-        The magnet cannot overcome the spring at the current of the forces, or the driver is invalid.
+        The magnet cannot overcome the spring at the current of the data sheet, or the driver is invalid.
     """
     with located(sheet.where):
         return _hammer_of(sheet)
@@ -420,15 +423,18 @@ def _work(sheet: DataSheet, magnet: SheetMagnet, front: float, current: float) -
 
 
 def damping_ratio(restitution: float) -> float:
-    """Return the damping ratio of a spring and dashpot without adhesion that has a given restitution."""
+    """Return the damping ratio of a spring-dashpot contact with a given coefficient of restitution.
+
+    The contact ends when its force falls to zero, before the spring is relaxed.
+    """
 
     def returned(ratio: float) -> float:
         root = math.sqrt(1.0 - ratio * ratio)
         angle = math.pi - math.atan2(2.0 * ratio * root, 1.0 - 2.0 * ratio * ratio)
         return math.exp(-ratio / root * angle) - restitution
 
-    # The restitution at critical damping is exp(-2); a smaller one needs a larger ratio, which is not
-    # modelled.
+    # Critical damping gives a restitution of exp(-2). Smaller values would need overcritical damping, which
+    # is not modelled.
     if restitution <= math.exp(-2.0) or restitution >= 1.0:
         return float(restitution < 1.0)
     return bisect(returned, 0.0, 1.0 - 1e-12)

@@ -1,4 +1,4 @@
-"""Read and validate data sheets of actuators: TOML with the values that a manufacturer prints.
+"""Read and validate data sheets of actuators: TOML files with the values published by a manufacturer.
 
     name = "pull-12v"
     source = "manufacturer's data sheet, page 3"
@@ -8,10 +8,10 @@
     stroke = "4.75 mm"
     mass = "26 g"
 
-These are required. Optional are
+These keys are required. Optional keys:
 
-- `current`, the current of the forces (default: rail over resistance), and `end_gap`, the remaining gap at
-  the end of the stroke (0 mm);
+- `current`, at which the forces are specified (default: `rail` / `resistance`), and `end_gap`, the remaining
+  gap at the end of the stroke (default: 0 mm);
 - `inductance`, with the gap at which it was measured, as ``["45 mH", "4 mm"]``; `turns`; `pole_diameter`;
   `residual_gap`, an air gap in series with the working gap;
 - `spring`, with `preload` at rest and `stiffness`; `target`, the distance to the struck object, if it is not

@@ -76,7 +76,10 @@ def largest_gap(chains: Sequence[Chain], units: FloatArray) -> float:
 
 
 class Approach:
-    """Damped Gauss-Newton minimisation of data, priors and gap penalty; spikes are excluded."""
+    """Damped Gauss-Newton minimisation of data misfit, prior misfit and gap penalty.
+
+    Samples that are spikes of the record are excluded from the data misfit.
+    """
 
     def __init__(
         self,

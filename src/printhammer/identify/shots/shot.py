@@ -346,7 +346,7 @@ def _fitted(
 
 
 def _starts(t: FloatArray, current: FloatArray, values: dict[str, float], top: float) -> list[FloatArray]:
-    """Return two initial guesses: the given constants, and height and width estimated from the record."""
+    """Return two initial guesses: `values`, and the same with amplitude and width from the record."""
     high = t[np.abs(current) > 0.5 * top]
     recorded = dict(values)
     recorded["amplitude"] = top

@@ -38,9 +38,10 @@ _SMALL: Final = 0.02
 
 
 def rebound(z: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Solve the law for the restitution e = y / z; return e and de/dz, for z = (l/k) v_in > -1.
+    """Return the coefficient of restitution e = y / z of the damped Hertz contact, and de/dz, for z > -1.
 
-    The derivative is from dy/dz = z (1 - y) / ((1 + z) y).
+    z = (l/k) v_in and y = (l/k) v_out solve z - ln(1 + z) = -(y + ln(1 - y)), so that dy/dz =
+    z (1 - y) / ((1 + z) y).
     """
     small = np.abs(z) < _SMALL
     wide = np.where(small, 1.0, z)

@@ -169,11 +169,12 @@ def fit_magnet(
 ) -> Fit:
     """Fit the magnet, together with the spring.
 
-    The table has the columns ``displacement``, ``current`` and ``force``, of magnet and spring together;
-    `spring` is a table of the spring alone, without currents, which requires the position b of the backstop,
-    m. `zero` is the sensor reading at x = 0, m; None to fit it. The result has the constants "magnet.F0",
-    "magnet.Am", "magnet.Bm", "spring.Bs" and "spring.As"; without a table of the spring, only "magnet.Am",
-    "magnet.Bm" and the two combinations that the forces determine. See `printhammer.identify.fitting.fit`.
+    The table has the columns ``displacement``, ``current`` and ``force``, of magnet and spring together.
+    `spring` is an optional table of the spring alone, with the columns ``displacement`` and ``force``; it
+    requires `position`, b, the position of the backstop, m. `zero` is the sensor reading at x = 0, m; None to
+    fit it. The result has the constants "magnet.F0", "magnet.Am", "magnet.Bm", "spring.Bs" and "spring.As".
+    Without `spring`, the forces determine only "magnet.Am", "magnet.Bm", F0 + Bs (1 + b / As) and Bs / As.
+    See `printhammer.identify.fitting.fit`.
 
     Raises
     ------

@@ -93,7 +93,7 @@ def _lowered(function: Any, arguments: tuple[Any, ...]) -> tuple[Any, str, Any]:
 
 
 def _types(signature: Any) -> Any:
-    """Return the numba type of an argument, given its signature."""
+    """Return the numba type of a type code, such as "f1"; for a tuple of codes, the tuple of types."""
     if isinstance(signature, str):
         number = _NUMBERS[signature[0]]
         return types.Array(number, int(signature[1]), "C") if len(signature) == 2 else number

@@ -207,7 +207,10 @@ def contact_switch(
     drive: Drive,
     control: Control,
 ) -> tuple[int, ContactState]:
-    """Return the first event in a step `h` in s, and the state there; with `leaves`, w reaches zero."""
+    """Return the first event in a backstop step of length `h` in the variable s, and the state at the event.
+
+    `leaves` states whether w falls to zero within the step, so that the armature leaves the backstop.
+    """
     _t, w, v, kv = start
     switch, upper = M.NO_SWITCH, 1.0
     if leaves:

@@ -194,12 +194,12 @@ class Variability(Declared):
         return Variability(**{name: factor * value for name, value in asdict(self).items()})
 
     def constants(self, hammer: Hammer) -> dict[str, float]:
-        """Return the standard deviation of each varying constant of a hammer, in SI.
+        """Return the standard deviation of each varying constant of a hammer, in SI units.
 
         Raises
         ------
         InputError
-            The hammer has none of the constants of a nonzero standard deviation.
+            A standard deviation is nonzero, but the hammer has none of the constants that it refers to.
         """
         spread: dict[str, float] = {}
         known = hammer.constants

@@ -26,11 +26,12 @@ if TYPE_CHECKING:
     from printhammer.studio.states.state import State
 
 PREVIEW: Final = (64, 128)
-"""Rates and times of the map while a slider moves."""
+"""Numbers of rates and times of the coarse map that is drawn while a slider is dragged."""
 
 PREVIEW_BY_VOLTAGE: Final = (32, 128)
-"""Rates and times of that map if a voltage drives the coil: runs with a circuit take about five times as
-long."""
+"""Numbers of rates and times of the coarse map if a voltage drives the coil.
+
+A run with a circuit takes about five times as long."""
 
 FULL: Final = (512, 512)
 """Rates and times of the full map."""
@@ -73,7 +74,7 @@ def try_map(state: State, known: State | None) -> State:
 
 
 def preview_of(state: State) -> tuple[int, int]:
-    """Return rates and times of the map while a slider moves."""
+    """Return the numbers of rates and times of the coarse map that is drawn while a slider is dragged."""
     return PREVIEW_BY_VOLTAGE if by_voltage(state.fired) else PREVIEW
 
 

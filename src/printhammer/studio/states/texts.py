@@ -75,7 +75,10 @@ def python_of(state: State) -> str:
 
 
 def command_of(state: State) -> str:
-    """Return the command for the same run; changes are read from the files saved by the studio."""
+    """Return the `printhammer run` command that simulates the hammer and drive of a state.
+
+    An edited hammer or drive is passed as the file that the studio saves it to.
+    """
     hammer = (not state.settings and _name(state)) or HAMMER_FILE
     if state.waveform is None and not state.pattern:
         overlap = "" if state.overlap == "add" else f" --overlap {state.overlap}"

@@ -1,6 +1,6 @@
-"""Worker process: runs orders one by one, and listens for newer states meanwhile.
+"""Worker process: runs jobs one by one, and listens for newer states meanwhile.
 
-``python -m printhammer.studio.workers.child`` imports the modules listed as arguments, reads orders from its
+``python -m printhammer.studio.workers.child`` imports the modules listed as arguments, reads jobs from its
 input and writes messages to its output, both pickled; only the studio holds the other ends of the pipes. The
 process ends with its input, so that no computation outlives a killed studio.
 """
@@ -32,13 +32,13 @@ logger = logging.getLogger(__name__)
 
 
 class Workshop:
-    """Runner of orders.
+    """Runner of queued jobs.
 
     Parameters
     ----------
     send : callable
         Sends a message: ``("frame", view, whole, data)``, ``("compiling", sentence)``, with an empty sentence
-        at the end, and ``("done",)`` after every order.
+        at the end, and ``("done",)`` after every job.
     alone : bool, optional
         Whether the process runs nothing else.
     """
@@ -51,17 +51,17 @@ class Workshop:
         self._orders: queue.SimpleQueue[Order | None] = queue.SimpleQueue()
 
     def take(self, order: Order | None) -> None:
-        """Queue an order; None ends the worker."""
+        """Add a job to the queue; None ends the worker."""
         self._newer.clear()
         self._orders.put(order)
 
     def supersede(self) -> None:
-        """Mark the current order as outdated."""
+        """Signal to the running job that a newer state has arrived."""
         self._newer.set()
 
     def run(self) -> None:
-        """Run orders until the end."""
-        # Load heavy modules before the first order arrives.
+        """Run queued jobs in order of arrival, until the queue delivers None."""
+        # Load heavy modules before the first job arrives.
         from printhammer.studio.workers.jobs import ROLES
 
         compiling.listen(lambda sentence: self._send(("compiling", sentence)))
