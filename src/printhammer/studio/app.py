@@ -1,4 +1,4 @@
-"""Web application of the studio: the page, its files, and one socket."""
+"""Web application of the studio: the page, its files, and the WebSocket of each page."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 
 REFUSED: Final = 1008
 BUSY: Final = 1013
-"""Close codes of a socket, RFC 6455, section 7.4, and its registry."""
+"""WebSocket close codes: access refused, too many pages (RFC 6455, section 7.4, and the IANA registry)."""
 
 _PATIENCE: Final = 20.0
 
 
 def application(guard: Guard, shelf: Shelf, crew: Crew) -> Starlette:
-    """Return the application.
+    """Build the web application (Starlette).
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ async def _listen(connection: WebSocket, session: Session) -> None:
 
 
 def _sender(connection: WebSocket) -> Callable[[bytes], None]:
-    """Return a blocking sender of frames: it waits for the browser to accept one, which avoids a queue."""
+    """Return a function that sends a frame and waits until the browser has accepted it, to avoid a queue."""
     loop = asyncio.get_running_loop()
 
     def send(data: bytes) -> None:

@@ -44,7 +44,7 @@ export default {
 
 @lru_cache
 def module() -> str:
-    """Return one module: the modules of the page as texts, in order of dependence, and their loader."""
+    """Return one ES module that contains the modules of the page as texts, and loads them in order."""
     return _sources("mount.js") + _WIDGET
 
 
@@ -67,7 +67,7 @@ def _sources(wanted: str) -> str:
 
 @lru_cache
 def style() -> str:
-    """Return the combined style sheet."""
+    """Return all style sheets of the page as one text."""
     sheets = page_files()
     return "\n".join(sheets[name].decode() for name in ("vendor/uPlot.min.css", "studio.css"))
 

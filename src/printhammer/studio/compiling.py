@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 class _Gauge:
-    """Time spent on compilation in this process, and the listener."""
+    """Clock of the compilation time in this process, with the listener to notify."""
 
     def __init__(self) -> None:
         self.spent = 0.0

@@ -1,4 +1,4 @@
-"""Files of the page."""
+"""Static files of the studio page."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ KINDS: Final = {".js": "text/javascript", ".css": "text/css", ".html": "text/htm
 
 @lru_cache
 def page_files() -> dict[str, bytes]:
-    """Return the files of the page by request path."""
+    """Load the static files of the page; return their content by request path."""
     contents: dict[str, bytes] = {}
     root = files("printhammer.studio").joinpath("web")
     for folder, place in ((root, ""), (root.joinpath("vendor"), "vendor/")):

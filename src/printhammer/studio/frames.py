@@ -1,4 +1,4 @@
-"""Frames: the binary messages that the studio sends.
+"""Frames: the binary messages that the studio sends to a page.
 
 A frame is the length of its heading (4 bytes, little-endian), the heading (JSON in UTF-8, padded with spaces
 to a multiple of 8 bytes), and arrays in sequence, each padded likewise. The heading has ``kind``, ``serial``
@@ -24,7 +24,7 @@ _DTYPES: Final = {"f4": "<f4", "f8": "<f8", "u2": "<u2", "i4": "<i4", "u1": "|u1
 
 
 def frame(kind: str, serial: int, arrays: Mapping[str, Any] | None = None, **entries: Any) -> bytes:
-    """Encode a frame.
+    """Encode a heading and arrays as a frame.
 
     Parameters
     ----------
@@ -57,17 +57,17 @@ def frame(kind: str, serial: int, arrays: Mapping[str, Any] | None = None, **ent
 
 
 def nothing(view: str, serial: int, reason: object) -> bytes:
-    """Return a frame that a view is empty, with the reason."""
+    """Encode a frame that tells the page to leave a view empty, with the reason."""
     return frame(view, serial, reason=str(reason), **_NOTHING.get(view, {}))
 
 
 def refusal(serial: int, reason: str) -> bytes:
-    """Return a frame that a request is refused, with the reason."""
+    """Encode a frame that refuses a request, with the reason."""
     return frame("refusal", serial, reason=reason[:LONGEST_REASON])
 
 
 def unframe(data: bytes) -> tuple[dict[str, Any], dict[str, np.ndarray[Any, Any]]]:
-    """Decode a frame into heading and arrays."""
+    """Decode a frame; return the heading, and the arrays by name."""
     (length,) = struct.unpack_from("<I", data)
     heading = json.loads(data[4 : 4 + length])
     arrays = {}
@@ -79,7 +79,7 @@ def unframe(data: bytes) -> tuple[dict[str, Any], dict[str, np.ndarray[Any, Any]
 
 
 def plain(value: Any) -> Any:
-    """Convert a value to JSON: NaN and infinity to None, NumPy numbers to those of Python."""
+    """Convert a value to plain data for JSON: NaN and infinity to None, NumPy numbers to Python numbers."""
     # Test for numbers first: most values are numbers, and this takes a third of the time.
     if type(value) is float:
         return value if math.isfinite(value) else None

@@ -1,4 +1,4 @@
-"""Access control of the studio: its own pages, with its token, on this machine."""
+"""Access control of the studio: only its own pages, with the user's token, from this machine."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 HOSTS: Final = ("127.0.0.1", "localhost")
-"""Names of this machine in the address of the page."""
+"""Host names by which a browser on this machine may address the page."""
 
 HEADERS: Final = {
     "Content-Security-Policy": (
@@ -20,11 +20,11 @@ HEADERS: Final = {
     "X-Content-Type-Options": "nosniff",
     "Cache-Control": "no-store",
 }
-"""Headers of every answer: no external resources, no embedding in other pages."""
+"""HTTP headers of every response: no external resources, no embedding in other pages."""
 
 
 class Guard:
-    """Access checks of a server.
+    """Access checks of the studio's server.
 
     Parameters
     ----------

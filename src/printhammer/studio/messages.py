@@ -1,4 +1,4 @@
-"""Messages from a page, and answers to its questions."""
+"""Parsing of the messages from a page, and answers to its questions on files and hammers."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from printhammer.studio.states.shelf import Shelf
 
 LONGEST_UNIT: Final = 40
-"""Largest length of a unit, characters."""
+"""Largest length of the unit of a column, characters."""
 
 
 def read_message(text: str, shelf: Shelf | None = None) -> tuple[str, int, Any]:
-    """Parse a message: its kind, the serial number of the page, and its content.
+    """Parse a message from the page: kind, serial number and content.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def _columns(content: Any) -> list[tuple[str, str]] | None:
 
 
 def answer(kind: str, serial: int, content: Any, shelf: Shelf) -> bytes:
-    """Answer a question on a link, a file, a hammer, or a state as texts."""
+    """Return the answer frame to a question on a link, a dropped file, a hammer, or a state as texts."""
     from printhammer.studio.bundle import page
     from printhammer.studio.states.controls import describe, vocabulary
     from printhammer.studio.states.drops import dropped
@@ -103,7 +103,7 @@ def answer(kind: str, serial: int, content: Any, shelf: Shelf) -> bytes:
             }
             return frame("hammer", serial, hammer=describe(hammer), **heading)
         if kind == "open":
-            # A page without a state opens with that of the studio.
+            # A page whose link contains no state opens with the start state of the studio.
             table, notes = taken(content, shelf) if content else shelf.start
             return frame("open", serial, state=table, notes=notes)
         if kind == "page":

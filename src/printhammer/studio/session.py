@@ -1,4 +1,4 @@
-"""Session of one page: the latest state wins, and slow work delays nothing else.
+"""Session of one studio page: only the latest state is served, and slow jobs do not delay fast ones.
 
 Requests about hammers and files are answered in this process, by a dedicated thread. Requests about states
 that are not displayed, and states themselves, go to worker processes: first the curves and dots of a state,
@@ -44,7 +44,7 @@ _MOST_QUESTIONS: Final = 16
 
 
 class Session:
-    """Work for one page.
+    """Jobs and answers for one page, until the page closes.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class Session:
             thread.start()
 
     def receive(self, text: str) -> None:
-        """Handle a message of the page.
+        """Queue a message from the page: the latest state replaces earlier ones; questions wait in line.
 
         Raises
         ------
@@ -102,7 +102,7 @@ class Session:
             self._change.notify_all()
 
     def close(self) -> None:
-        """Close the session: cancel the work, and send nothing more."""
+        """Close the session: cancel the running jobs, and send no further frame."""
         with self._change:
             self._closed = True
             self._change.notify_all()
@@ -110,7 +110,7 @@ class Session:
             self._crew.close()
 
     def join(self, timeout: float | None = None) -> None:
-        """Wait for all threads."""
+        """Wait until all threads of the session have ended, at most `timeout` seconds each."""
         for thread in self._threads:
             thread.join(timeout)
 
@@ -153,7 +153,7 @@ class Session:
             self._safely(Order("asked", serial, content, (kind,), {}))
 
     def _serve(self, role: str) -> None:
-        """Wait for a state that a role has not served yet, and serve it."""
+        """Wait for a state that `role` has not served yet; run a job for the views that changed."""
         with self._change:
             self._change.wait_for(lambda: self._closed or self._waiting(role))
             taken = self._waiting(role)
@@ -169,7 +169,7 @@ class Session:
             self._change.notify_all()
 
     def _safely(self, order: Order) -> None:
-        """Run an order; report an unexpected failure to the page, which continues."""
+        """Run a job; report an unexpected exception to the page, and keep the session alive."""
         try:
             self._work(order)
         except OSError:
@@ -188,7 +188,7 @@ class Session:
         return None if behind else latest
 
     def _outdated(self, state: State) -> dict[str, str]:
-        """Return the reasons why displayed views do not belong to a state."""
+        """Return, for each displayed view that does not show `state`, the reason, by view."""
         return {
             view: _BEFORE if view in self._shown else _NOT_YET
             for view in _computed(state)
@@ -196,7 +196,7 @@ class Session:
         }
 
     def _work(self, order: Order) -> None:
-        """Let a worker run an order, and forward its messages."""
+        """Run a job on a worker, and forward the messages of the worker to the page."""
         role, serial = order.role, order.serial
 
         def newer() -> bool:
@@ -207,7 +207,7 @@ class Session:
         try:
             key = kernel_key(order.state)
         except InputError as error:
-            # The worker would detect the same.
+            # The worker would raise the same error.
             self._tell(refusal(serial, str(error)))
             return
 
@@ -231,7 +231,7 @@ class Session:
         self._end_progress(order)
 
     def _follow(self, order: Order, worker: Worker, newer: Callable[[], bool]) -> bool:
-        """Forward a worker's messages on an order; return whether it is done, not terminated or left."""
+        """Forward a worker's messages until its job ends; return False if it was terminated or left behind."""
         role = order.role
         worker.begin(order)
         superseded, ahead = False, role == "curves"
@@ -270,7 +270,7 @@ class Session:
                 self._end_progress(order)
 
     def _tell_ahead(self, order: Order) -> None:
-        """Send the precomputed pictures of a state, if it is the opening of a hammer."""
+        """Send precomputed pictures if the state is the opening state of a shipped hammer."""
         for data in frames_ahead(order.state, order.serial):
             self._tell(data)
 
@@ -282,7 +282,7 @@ class Session:
             self._progress(order, "")
 
     def _note(self, order: Order, view: str, whole: bool) -> None:
-        """Record the view that the page now displays."""
+        """Record that the page now displays `view` for the state of a job."""
         with self._change:
             if view in KEYS:
                 self._shown[view] = KEYS[view](order.state)
@@ -293,7 +293,7 @@ class Session:
             self._change.notify_all()
 
     def _ends(self, order: Order, worker: Worker) -> bool:
-        """Terminate or leave a worker that does not stop; return whether it is gone."""
+        """Terminate a worker that does not stop, or leave it to compile; return whether it was given up."""
         if self._closed and self._owns_crew:
             return True
         if worker.compiling:
@@ -325,5 +325,5 @@ class Session:
 
 
 def _computed(state: State) -> list[str]:
-    """Return the views of a state that are computed separately from its curves; an empty line is not."""
+    """Return the views of a state that need a job of their own; a printed line without text needs none."""
     return [view for view in KEYS if view in state.views and (view != "line" or state.line.strip())]

@@ -1,4 +1,4 @@
-"""Studio in a notebook: the same page, computed by the notebook's Python."""
+"""Studio in a notebook: the page of the studio, with computations in the notebook's Python process."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def widget(hammer: Hammer | None = None, *, state: str = "", height: str = "760px") -> Any:
-    """Return the studio as a widget for Jupyter, marimo and the like.
+    """Return the studio as a notebook widget (anywidget), for Jupyter and marimo.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def widget(hammer: Hammer | None = None, *, state: str = "", height: str = "760p
     shelf = Shelf(hammer)
 
     class StudioWidget(anywidget.AnyWidget):
-        """Page and its session."""
+        """Notebook widget: the page, and the session that computes its views."""
 
         _esm = module()
         _css = style()

@@ -28,18 +28,18 @@ STEP_LIMIT: Final = "step limit"
 
 
 class GivenUp(Exception):
-    """A newer state has arrived."""
+    """Raised to stop a job because a newer state has arrived."""
 
 
 class Patience:
-    """Time limit of the work on a view, checked from time to time.
+    """Time limit of the computation of one view, checked at intervals.
 
     Parameters
     ----------
     newer : callable
-        Whether a newer state has come.
+        Whether a newer state has arrived.
     what : str
-        Name of the work, for the message.
+        Name of the view, for the error message.
     seconds : float, optional
         Time limit.
     """
@@ -53,7 +53,7 @@ class Patience:
 
     @property
     def spent(self) -> float:
-        """Elapsed time, s, excluding compilation, which is needed only once."""
+        """Elapsed time of the computation, s, without compilation, which happens only once."""
         return time.monotonic() - compiling.seconds() - self._begun
 
     def check(self, more: float = 0.0) -> None:
@@ -74,7 +74,7 @@ class Patience:
             )
 
     def progress(self, _done: int, _all: int) -> None:
-        """Call `check`; a progress callback."""
+        """Call `check`, as a progress callback of a computation."""
         self.check()
 
 
@@ -88,7 +88,7 @@ def try_out(
     through: bool = False,
     most: int = 0,
 ) -> Motion:
-    """Run a drive once with a step limit, and refuse a view that needs many such runs.
+    """Simulate a drive once with a step limit, as a test of the cost of a view that needs many such runs.
 
     The default limit is `bounds.MOST_MAP_STEPS`.
 
@@ -109,7 +109,7 @@ def try_out(
 
 
 def alike(one: State, other: State) -> bool:
-    """Whether a map of two states needs about the same computation time."""
+    """Whether the frequency-time maps of two states need about the same computation time."""
     keys = ("hammer", "text", "pulses", "pattern", "overlap", "low", "high")
     if any(getattr(one, key) != getattr(other, key) for key in keys):
         return False

@@ -38,7 +38,7 @@ START: Final[dict[str, Any]] = {
 """Opening state of the page, as in `state.js`, except for the hammer."""
 
 SIZE: Final = (128, 192)
-"""Rates and times of a precomputed map."""
+"""Numbers of rates and times of a precomputed map."""
 
 _FIRED: Final = ("constants", "waveform", "rate", "pulses", "pattern", "overlap", "low", "high")
 
@@ -50,13 +50,13 @@ def opening(name: str) -> State:
 
 
 def key_of(state: State) -> str:
-    """Return a digest of the inputs of a state's pictures."""
+    """Return a digest of hammer and drive of a state, which identifies its precomputed pictures."""
     content = [state.base.fingerprint, *(getattr(state, name) for name in _FIRED)]
     return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
 
 
 def frames_ahead(state: State, serial: int) -> list[bytes]:
-    """Return the precomputed frames of a state; empty unless it is the opening of a shipped hammer."""
+    """Return the precomputed frames of the opening state of a shipped hammer; empty for other states."""
     if state.constants or state.text:
         return []
     key, parts = _kept(state.base.name)
@@ -72,7 +72,7 @@ def frames_ahead(state: State, serial: int) -> list[bytes]:
 
 @lru_cache(maxsize=8)
 def _kept(name: str) -> tuple[str | None, list[tuple[dict[str, Any], dict[str, Any]]]]:
-    """Return the stored key and frames of a hammer; the headings lack the entries of a state."""
+    """Load the stored key and frames of a hammer; the headings lack `serial`, which varies by request."""
     place = files("printhammer.studio").joinpath("ahead", f"{name}.gz")
     if not place.is_file():
         return None, []
@@ -90,7 +90,7 @@ def _kept(name: str) -> tuple[str | None, list[tuple[dict[str, Any], dict[str, A
 
 
 def draw(name: str) -> bytes:
-    """Compute the file of a hammer."""
+    """Compute the content of the file with a hammer's precomputed pictures."""
     from printhammer.studio.pictures.chart import map_frame
     from printhammer.studio.pictures.engine import dots_frame, motion_frame
 
@@ -102,7 +102,7 @@ def draw(name: str) -> bytes:
 
 
 def main() -> None:
-    """Compute the files of all shipped hammers."""
+    """Compute and write the precomputed pictures of all shipped hammers."""
     from printhammer.hammer.hammer import shipped
     from printhammer.support.files import write_file
 

@@ -34,19 +34,19 @@ PREVIEW_BY_VOLTAGE: Final = (32, 128)
 A run with a circuit takes about five times as long."""
 
 FULL: Final = (512, 512)
-"""Rates and times of the full map."""
+"""Numbers of rates and times of the full map."""
 
 GAP: Final = 65535
-"""Code of a missing displacement."""
+"""Integer code of a map cell without a displacement."""
 
 _RATES_OF_PIECE: Final = {False: 64, True: 16}
-"""Rates between two checks for a newer state, by whether a voltage drives the coil."""
+"""Number of rates computed between two checks for a newer state, by whether a voltage drives the coil."""
 _TRIED: Final = 9
 _STEEPEST: Final = 1e38
 
 
 def try_map(state: State, known: State | None) -> State:
-    """Estimate the work of a map from runs at some of its rates; return the state that was tested.
+    """Check by runs at some rates that the map of a state can be computed in time; return the tested state.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def map_frame(
     newer: Callable[[], bool],
     threads: int | None = None,
 ) -> bytes:
-    """Return the displacement against time and rate, as 16-bit codes between two displacements.
+    """Return the frame of the map: displacement against time and rate, as 16-bit codes.
 
     Raises
     ------
@@ -147,7 +147,7 @@ def _end(state: State) -> float:
 
 @lru_cache(maxsize=64)
 def _trains(waveform: Waveform, rates: tuple[float, ...], slots: str, overlap: Overlap) -> PulseTrains:
-    """Return a train for each rate, cached, since trains do not depend on constants of the hammer."""
+    """Build a pulse train for each rate; cached, since trains do not depend on the hammer's constants."""
     if "0" not in slots:
         return PulseTrains.at_rates(waveform, rates, len(slots), overlap)
     fired = np.flatnonzero([mark == "1" for mark in slots])
@@ -155,7 +155,7 @@ def _trains(waveform: Waveform, rates: tuple[float, ...], slots: str, overlap: O
 
 
 def codes_of(x: Any, low: float, high: float) -> Any:
-    """Encode displacements as integers from 0 (low) to 65534 (high), and 65535 for missing ones."""
+    """Encode displacements as integers from 0 (at `low`) to 65534 (at `high`); 65535 if missing."""
     # Without motion, both ends are adjacent floats.
     steep = np.float32(min((GAP - 1) / (high - low), _STEEPEST))
     scaled = np.minimum(x - np.float32(low), np.float32(high - low)) * steep

@@ -1,4 +1,4 @@
-"""Curves of the single run of a state, its dots and energies."""
+"""Frames of the single run of a state: curves, dots and energies."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
 
 POINTS: Final = 1600
-"""Smallest number of points of a curve."""
+"""Smallest number of points of a plotted curve."""
 
 MOST_ENDS: Final = 20_000
 """Largest number of step ends among the points of a curve."""
@@ -34,7 +34,7 @@ MOST_ENDS: Final = 20_000
 def motion_frame(
     state: State, serial: int, outdated: Mapping[str, str] | None = None
 ) -> tuple[bytes, Motion]:
-    """Return the curves of a single run, and the run, limited to `bounds.MOST_STEPS` steps.
+    """Simulate the single run of a state, up to `bounds.MOST_STEPS` steps; return its curves and motion.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def points_of(ends: FloatArray) -> FloatArray:
 
 
 def pulse_of(waveform: Waveform) -> dict[str, list[float]]:
-    """Return the curve of one pulse for the waveform editor, s and A, N or V."""
+    """Return times, s, and values, A, N or V, of one pulse, for the waveform editor."""
     shown = waveform.support
     width, decay = getattr(waveform, "width", None), getattr(waveform, "decay", None)
     # An exponential decay extends beyond the visible range; that of a driver only names a path.
@@ -131,7 +131,7 @@ def pulse_of(waveform: Waveform) -> dict[str, list[float]]:
 
 
 def dots_frame(serial: int, motion: Motion) -> bytes:
-    """Return the dots of the run and its energies."""
+    """Return the frame with the dots and the energies of a run."""
     dots = motion.dots
     struck = [dot for dot in dots if dot.struck]
     forces, flights = [dot.peak_force or 0.0 for dot in struck], [dot.flight_time or 0.0 for dot in struck]

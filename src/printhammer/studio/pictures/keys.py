@@ -1,4 +1,4 @@
-"""Cache keys of the pictures of a state: an unchanged key means an unchanged picture."""
+"""Cache keys of the pictures of a state: a picture is computed again only if its key changes."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ KEYS: Final[dict[str, Callable[[State], Any]]] = {
     "line": attrgetter("hammer", "text", "constants", "waveform", "rate", "line"),
     "strobe": attrgetter("hammer", "text", "constants", "waveform", "rate", "overlap"),
 }
-"""Key of each picture that is drawn again only after a change, by view."""
+"""Function that returns the cache key of a view for a state, by view."""
 
 
 def kernel_key(state: State) -> tuple[Any, ...]:
-    """Return the key of the machine code that a state needs.
+    """Return a key that identifies the machine code needed to simulate a state.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Printed line: a text with the position and darkness of each of its dots."""
+"""Frame of the printed line: position and darkness of each dot of a text."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _TRIED: Final = 16
 
 
 def check_line(state: State, pattern: Pattern) -> None:
-    """Check the work of a line by a run in which every slot is fired.
+    """Check that a line can be printed in time, by a run that fires in every slot.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Questions of the page about states that it does not show: pins, and rates in a search."""
+"""Answers to questions about states that a page does not display: pinned states, and rates in a search."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ if TYPE_CHECKING:
     from printhammer.studio.states.state import State
 
 SCREENED: Final = 200
-"""Number of firings for an exponent in a search over many rates; the later half counts."""
+"""Number of firings for the exponent at one rate of a search; the average is over the later half."""
 
 
 def curves(state: State, serial: int) -> bytes:
-    """Return the curves of the single run."""
+    """Return the frame with the curves of the single run of a state."""
     return motion_frame(state, serial)[0]
 
 
 def dots(state: State, serial: int) -> bytes:
-    """Return the dots of the single run."""
+    """Return the frame with the dots of the single run of a state."""
     return dots_frame(serial, motion_frame(state, serial)[1])
 
 
 def exponent(state: State, serial: int) -> bytes:
-    """Return the largest exponent of an endless train over some firings; None if it cannot be computed."""
+    """Return a frame with the largest exponent of an endless train, null if it cannot be computed."""
     try:
         check_strobe(state)
     except InputError as error:
@@ -39,7 +39,7 @@ def exponent(state: State, serial: int) -> bytes:
 
 
 def verdict(state: State, serial: int) -> bytes:
-    """Return the strobe section of an endless train with its verdict."""
+    """Return the frame of the strobe section of an endless train, with its classification."""
     check_strobe(state)
     return strobe_frame(state, serial, LATER[-1], judged=True)
 
@@ -50,4 +50,4 @@ QUESTIONS: Final[dict[str, Callable[[State, int], Any]]] = {
     "exponent": exponent,
     "verdict": verdict,
 }
-"""Function for each kind of question in `ASKED`; raises `InputError` for an invalid state."""
+"""Function that answers each kind of question in `ASKED`; it raises `InputError` for an invalid state."""

@@ -1,4 +1,4 @@
-"""Strobe section of a state: points as they arrive, with a running exponent, and the verdict."""
+"""Strobe section of a state: growing numbers of points, a running exponent, and the classification."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ if TYPE_CHECKING:
     from printhammer.studio.states.state import State
 
 AT_ONCE: Final = (25, 50, 100)
-"""Numbers of points that are shown in succession."""
+"""Numbers of strobe points in the frames that are sent at once, one frame after the other."""
 
 LATER: Final = (150, 200, 300, 400)
-"""Numbers of points that follow if no newer state arrives, with the exponent over their later half."""
+"""Numbers of strobe points in later frames, which include the exponent over the later half of the firings."""
 
 
 VERDICT_WORK: Final = 16.0
-"""Work of the verdict relative to that of all points before: five times the firings, and the exponent."""
+"""Computation time of the classification, relative to the last frame of points with its exponent."""
 
 
 def check_strobe(state: State) -> None:
-    """Check the work of a section by the run to its first points.
+    """Check that a strobe section can be computed in time, by a run up to its first points.
 
     Raises
     ------
@@ -50,7 +50,7 @@ def strobe_frame(
     exponent: bool = False,
     judged: bool = False,
 ) -> bytes:
-    """Return strobe points of an endless train at the rate; exponent so far and verdict if requested.
+    """Return a frame of strobe points of an endless train; optionally with exponent or classification.
 
     Raises
     ------
@@ -71,7 +71,7 @@ def strobe_frame(
 
 
 def exponent_so_far(state: State, points: int) -> dict[str, Any] | None:
-    """Return the largest exponent over the later half of some firings; None if it cannot be computed."""
+    """Estimate the largest exponent over the later half of `points` firings; None if not computable."""
     from printhammer.derivatives.states import strobe_exponent
 
     period = 1.0 / state.rate

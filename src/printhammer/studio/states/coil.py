@@ -21,16 +21,16 @@ if TYPE_CHECKING:
 _SOURCE: Final = "not in the file of the hammer; taken where a voltage drives the coil"
 
 _RESISTANCE: Final = 28.6
-"""Resistance of a coil without a stated one, ohm; arbitrary."""
+"""Resistance of a coil if the hammer file states none, ohm; arbitrary."""
 
 _LAST: Final = 1.19
-"""Time constant of coil and magnet as a multiple of the pulse width; arbitrary."""
+"""Ratio of the time constant of coil and magnet to the pulse width; arbitrary."""
 
 _REACH: Final = 1.0 / (1.0 - math.exp(-1.0 / _LAST))
-"""Rail voltage as a multiple of peak current times resistance: an inductance behind a resistance."""
+"""Ratio of rail voltage to peak current times resistance, for a current that rises exponentially."""
 
 _PULSE: Final = (1.97, 177e-6)
-"""Current, A, and width, s, of a pulse without stated ones: those of the shipped hammer."""
+"""Current, A, and width, s, of the pulse if the hammer has no current pulse; as for the shipped hammer."""
 
 
 def has_rail(hammer: Hammer) -> bool:
@@ -74,7 +74,7 @@ TEMPERATURES: Final = Range(-40.0, 180.0, logarithmic=False)
 
 
 def span_of(hammer: Hammer, key: str, factor: float) -> Range | None:
-    """Return the range of a constant, possibly one that the file leaves open; None if it does not exist."""
+    """Return the control range of a constant, including open coil constants; None if it does not exist."""
     if key.startswith("waveform."):
         return None
     if (further := open_constants(hammer).get(key)) is not None:
@@ -88,7 +88,7 @@ def span_of(hammer: Hammer, key: str, factor: float) -> Range | None:
 
 
 def rail_of(hammer: Hammer) -> dict[str, Any] | None:
-    """Return the rail for a hammer that has none of its own; None if no voltage can drive it."""
+    """Return the default rail driver for a hammer without a driver; None if no voltage can drive the coil."""
     if not has_rail(hammer):
         return None
     current, width = _pulse(hammer)

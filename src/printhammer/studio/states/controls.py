@@ -35,10 +35,10 @@ SHOWN: Final = {
 """Units in which a quantity is shown, by its SI unit: metric, inch-pound; otherwise the SI unit itself."""
 
 _SLOW: Final = 2e-3
-"""Pulse width from which times are shown in ms, s."""
+"""Pulse width above which the page shows times in ms, s."""
 
 _WIDE: Final = 3e-3
-"""Stroke from which lengths are shown in mm, m."""
+"""Stroke above which the page shows lengths in mm, m."""
 
 EQUATIONS: Final = {
     "mass": "m x'' = Fm + Fs + Fp + Fb + Fe",

@@ -20,7 +20,7 @@ _MOST_NOTES: Final = 6
 
 
 def taken(content: Any, shelf: Shelf) -> Told:
-    """Return the valid entries of a state, and a sentence for each invalid one.
+    """Validate a state from a link; return its valid entries, and one sentence for each invalid entry.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def taken(content: Any, shelf: Shelf) -> Told:
 
 
 def _hammer(table: dict[str, Any], shelf: Shelf, notes: list[str]) -> Hammer:
-    """Return the hammer of a table; invalid entries are replaced."""
+    """Determine the hammer of a state table; invalid entries are replaced by defaults."""
     try:
         if table.get("text"):
             return dropped_hammer(table["text"])
@@ -107,7 +107,7 @@ _PLAIN: Final[dict[str, Any]] = {
 
 
 def read_file(text: str, where: str, shelf: Shelf) -> Told:
-    """Return the valid entries of the text of a state file, and a sentence for each invalid one.
+    """Parse the text of a state file; return its valid entries, and one sentence for each invalid entry.
 
     Raises
     ------

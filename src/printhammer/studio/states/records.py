@@ -31,7 +31,7 @@ MOST_COLUMNS: Final = 16
 
 
 class Column(NamedTuple):
-    """Column of a table: its heading, and its quantity as far as known."""
+    """Column of a table: its heading and, if identified, its quantity."""
 
     name: str
     unit: str
@@ -47,7 +47,7 @@ class Record(NamedTuple):
 
 
 def read_record(text: str, where: str, told: list[tuple[str, str]] | None = None) -> Record | list[Column]:
-    """Read a table of curves.
+    """Read a table of measured curves.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def read_record(text: str, where: str, told: list[tuple[str, str]] | None = None
 
 
 def _filled(table: Table) -> list[list[str]]:
-    """Return the first three rows with all their cells."""
+    """Return the first three rows of a table, padded with empty cells to the number of columns."""
     width = len(table.columns)
     return [[*row[:width], *[""] * (width - len(row))] for row in table.rows[:3]]
 

@@ -1,4 +1,4 @@
-"""Hammers that a studio offers by name: the shipped ones, and the one that it opened with."""
+"""Hammers that a studio offers by name: shipped hammers, and the hammer with which it was opened."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
 
 Told = tuple[dict[str, Any], list[str]]
-"""Valid entries of a state, and sentences about the invalid ones."""
+"""Valid entries of a state, and one sentence for each invalid entry."""
 
 DEFAULT: Final = "hendriks-1983"
 """Default hammer of a studio."""
 
 
 class Shelf:
-    """Hammers by name, never by path; `start` is the state of a page without one.
+    """Hammers by name, never by path; `start` is the state of a page whose link contains none.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class Shelf:
 
     @property
     def names(self) -> list[str]:
-        """Names of all hammers, the one that the studio opened with first."""
+        """Names of all hammers; the hammer with which the studio was opened comes first."""
         from printhammer.hammer.hammer import shipped
 
         others = sorted(shipped(), key=lambda name: (name != DEFAULT, name))
@@ -45,13 +45,13 @@ class Shelf:
         return self.guest is not None and name == self.guest.name
 
     def is_shipped(self, name: str) -> bool:
-        """Whether the hammer of a name is a shipped one, unmodified."""
+        """Whether the hammer with a given name is an unmodified shipped hammer."""
         from printhammer.hammer.hammer import shipped
 
         return name in shipped() and self.hammer(name).fingerprint == _shipped(name).fingerprint
 
     def hammer(self, name: str) -> Hammer:
-        """Return a hammer.
+        """Return the hammer with a given name.
 
         Raises
         ------

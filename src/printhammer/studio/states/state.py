@@ -34,7 +34,7 @@ class ProtocolError(Exception):
 
 
 class State(Declared):
-    """Settings of the user; all numbers SI."""
+    """Settings of a studio page, as the user has made them; all numbers in SI."""
 
     hammer: str = part("name of a hammer that the studio offers; not looked at where `text` is given")
     text: str = part("text of a hammer file that was dropped, or empty")
@@ -59,7 +59,7 @@ class State(Declared):
 
     @cached_property
     def base(self) -> Hammer:
-        """Hammer before any change."""
+        """Hammer without the user's changes."""
         return dropped_hammer(self.text) if self.text else self.shelf.hammer(self.hammer)
 
     @cached_property
@@ -123,7 +123,7 @@ class State(Declared):
 
     @cached_property
     def drive(self) -> PulseTrain:
-        """Drive of the state."""
+        """Drive that the settings describe."""
         if not self.pattern:
             return PulseTrain(self.fired, rate=self.rate, pulses=self.pulses, overlap=self.overlap)
         times = [slot / self.rate for slot, mark in enumerate(self.pattern) if mark == "1"]
@@ -131,7 +131,7 @@ class State(Declared):
 
 
 def check_constant(base: Hammer, key: str, value: float) -> None:
-    """Check that a hammer has a constant, and that the value is near its own.
+    """Check that a hammer has a constant, and that a new value is within the range of its control.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""State as texts that leave the studio: hammer file, drive file, Python, command."""
+"""Export of a state as text: hammer file, drive file, Python script, command line."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ DRIVE_FILE: Final = "studio-drive.toml"
 
 
 def texts_of(state: State) -> dict[str, str]:
-    """Return a state as texts.
+    """Export a state as texts, by kind.
 
     "hammer" and "drive" are TOML; "python" and "command" produce the same run; "state" is a file that the
     studio opens.
@@ -36,7 +36,7 @@ def texts_of(state: State) -> dict[str, str]:
 
 
 def python_of(state: State) -> str:
-    """Return a script that builds the same hammer, drive and motion."""
+    """Return a Python script that builds the hammer and the drive of a state and simulates the motion."""
     lines = ["import printhammer as ph", ""]
     if name := _name(state):
         lines.append(f"hammer = ph.load({name!r})")

@@ -81,14 +81,14 @@ class Workshop:
             self._send(("done",))
 
     def _step_back(self) -> None:
-        """Lower the priority of this process in favour of the views that are looked at first."""
+        """Lower the priority of this process, so that the curves and the map are computed first."""
         if self._alone:
             self._alone = False
             with suppress(AttributeError, OSError):
                 os.nice(5)
 
     def tell(self, data: bytes, view: str, *, whole: bool = True) -> None:
-        """Send a frame."""
+        """Send a frame of a view; `whole` states that no more accurate frame of the view follows."""
         self._send(("frame", view, whole, data))
 
     def newer(self) -> bool:
@@ -96,12 +96,12 @@ class Workshop:
         return self._newer.is_set()
 
     def rest(self, seconds: float) -> bool:
-        """Wait for a newer state; return whether one arrived."""
+        """Wait up to `seconds` for a newer state; return whether one arrived."""
         return self._newer.wait(seconds)
 
 
 def main() -> None:
-    """Work for the process that holds the other ends of the pipes."""
+    """Run the jobs that arrive on the standard input, and write messages to the standard output."""
     with suppress(ValueError, AttributeError):
         # Ctrl-C is meant for the studio, which ends its workers.
         signal.signal(signal.SIGINT, signal.SIG_IGN)

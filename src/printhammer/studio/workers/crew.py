@@ -1,4 +1,4 @@
-"""Pool of workers, lent to the pages for one order at a time, and terminated if they do not return."""
+"""Pool of workers, lent to the pages for one job at a time, and terminated if they do not return."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MOST: Final = 3
 
 
 class Crew:
-    """Workers by role.
+    """Pool of workers, free and busy, by role.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class Crew:
                 self._idle.setdefault(role, []).append(self._hire())
 
     def lend(self, role: str, key: Any, wanted: Callable[[], bool]) -> Worker | None:
-        """Return a free worker, possibly after a wait; None once it is no longer needed.
+        """Return a free worker, waiting for one if necessary; None if the job is no longer wanted.
 
         Parameters
         ----------
@@ -48,7 +48,7 @@ class Crew:
         key
             Key of the machine code; while another worker compiles it, wait.
         wanted : callable
-            Whether the worker is still needed.
+            Whether the job still needs a worker.
         """
         with self._change:
             while wanted() and not self._closed:
@@ -67,7 +67,7 @@ class Crew:
         return None
 
     def give_back(self, role: str, worker: Worker) -> None:
-        """Take back a worker that has finished its order."""
+        """Return a worker that has finished its job to the pool."""
         with self._change:
             if worker in self._busy[role]:
                 self._busy[role].remove(worker)
@@ -85,7 +85,7 @@ class Crew:
             self._change.notify_all()
 
     def leave(self, role: str, worker: Worker) -> None:
-        """Let a worker finish its compilation, whose result will be needed, and then stop."""
+        """Let a worker finish its compilation, whose code will be needed, then return it to the pool."""
 
         def wait() -> None:
             worker.supersede()
@@ -111,4 +111,4 @@ class Crew:
 
 
 PATIENT: Final = 1.5
-"""Time after which a worker that was told to stop, and does not compile, is terminated, s."""
+"""Time after which a worker is terminated if it was asked to stop and is not compiling, s."""

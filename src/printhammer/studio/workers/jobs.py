@@ -29,27 +29,27 @@ if TYPE_CHECKING:
     from printhammer.studio.workers.order import Order
 
 REST: Final = 0.3
-"""Time without a newer state after which further strobe points and the verdict follow, s."""
+"""Time to wait for a newer state before further strobe points and the classification are computed, s."""
 
 
 class Desk(Protocol):
-    """Environment of a job."""
+    """Interface between a job and the worker that runs it: frames to send, and newer states."""
 
     tried: State | None
-    """State whose map was found to be fast enough."""
+    """Last state for which a test showed that its map can be computed in time."""
 
     def tell(self, data: bytes, view: str, *, whole: bool = True) -> None:
-        """Send a frame; `whole` if no better one of the view follows."""
+        """Send a frame of a view; `whole` states that no more accurate frame of the view follows."""
 
     def newer(self) -> bool:
         """Whether a newer state has arrived."""
 
     def rest(self, seconds: float) -> bool:
-        """Wait for a newer state; return whether one arrived."""
+        """Wait up to `seconds` for a newer state; return whether one arrived."""
 
 
 def curves(order: Order, desk: Desk) -> None:
-    """Send the curves of the single run, then its dots; or the reason to refuse the state."""
+    """Send the curves of the single run, then its dots; or a refusal if the state is invalid."""
     try:
         data, motion = motion_frame(order.state, order.serial, order.outdated)
     except InputError as error:
@@ -119,4 +119,4 @@ ROLES: Final[dict[str, Callable[[Order, Any], None]]] = {
     "detail": detail,
     "asked": asked,
 }
-"""Jobs by role."""
+"""Function that runs a job, by role."""

@@ -1,4 +1,4 @@
-"""Orders for workers."""
+"""Jobs that a session sends to its workers, and the questions that a page may ask."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ if TYPE_CHECKING:
 
 
 ASKED: Final = ("curves", "dots", "exponent", "verdict")
-"""Questions of a page about a state that it does not show."""
+"""Kinds of question that a page may ask about a state that it does not display."""
 
 
 class Order(NamedTuple):
-    """Order for a worker."""
+    """Job for a worker: views of one state to compute, or one question to answer."""
 
     role: str
-    """Role: "curves", "map" or "detail"; "asked" for a question, whose kind is the only view."""
+    """Role of the job: "curves", "map" or "detail"; "asked" for a question, whose kind is the only view."""
     serial: int
     state: State
     views: tuple[str, ...]
-    """Views of the role to be drawn again."""
+    """Names of the views to compute."""
     outdated: dict[str, str]
-    """Reasons why displayed views do not belong to this state, by view."""
+    """Reasons why displayed views do not show this state yet, by view."""

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Worker:
-    """Worker that runs one order at a time; its messages are described in `workers.child`.
+    """Worker that runs one job at a time; its messages are described in `workers.child`.
 
     A worker that ended by itself sends a message ``("ended",)``.
     """
@@ -32,11 +32,11 @@ class Worker:
         self.heard = time.monotonic()
 
     def begin(self, order: Order) -> None:
-        """Start an order."""
+        """Send a job to the worker, which starts it at once."""
         raise NotImplementedError
 
     def supersede(self) -> None:
-        """Tell the worker that its order is outdated."""
+        """Tell the worker that a newer state has arrived, so that it stops its job."""
         raise NotImplementedError
 
     def end(self) -> None:
@@ -56,7 +56,7 @@ class Worker:
 
     @property
     def compiled(self) -> float:
-        """Time for which the worker has been compiling, s."""
+        """Duration of the compilation in progress, s; 0 if the worker is not compiling."""
         return time.monotonic() - self._since if self.compiling else 0.0
 
     @property
@@ -94,12 +94,12 @@ class ProcessWorker(Worker):
         threading.Thread(target=self._listen, name="studio-worker", daemon=True).start()
 
     def begin(self, order: Order) -> None:
-        """Start an order."""
+        """Send a job to the worker, which starts it at once."""
         self.heard = time.monotonic()
         self._write(order)
 
     def supersede(self) -> None:
-        """Tell the worker that its order is outdated."""
+        """Tell the worker that a newer state has arrived, so that it stops its job."""
         self._write(None)
 
     def end(self) -> None:
@@ -127,7 +127,7 @@ class ProcessWorker(Worker):
 
 
 class ThreadWorker(Worker):
-    """Worker in a thread of this process, which ends when its work checks whether to continue."""
+    """Worker in a thread of this process; to stop, its job has to check for newer states."""
 
     def __init__(self) -> None:
         from printhammer.studio.workers.child import Workshop
@@ -137,16 +137,16 @@ class ThreadWorker(Worker):
         threading.Thread(target=self._workshop.run, name="studio-worker", daemon=True).start()
 
     def begin(self, order: Order) -> None:
-        """Start an order."""
+        """Send a job to the worker, which starts it at once."""
         self.heard = time.monotonic()
         self._workshop.take(order)
 
     def supersede(self) -> None:
-        """Tell the worker that its order is outdated."""
+        """Tell the worker that a newer state has arrived, so that it stops its job."""
         self._workshop.supersede()
 
     def end(self) -> None:
-        """Ask the thread to end."""
+        """Ask the thread to end after its current job."""
         self._workshop.take(None)
         self._workshop.supersede()
 
