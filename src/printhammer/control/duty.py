@@ -53,12 +53,12 @@ FEEDS: Final = ("voltage", "current", "energy")
 
 @dataclass(frozen=True)
 class DotHeat:
-    """Heat of one dot as a function of the winding temperature."""
+    """Heat dissipated in the coil per dot, as a function of the winding temperature."""
 
     temperature: tuple[float, ...]
     """Temperatures, degC, ascending; one or more."""
     heat: tuple[float, ...]
-    """Heat of one dot at these temperatures, J."""
+    """Coil heat per dot at each temperature, J."""
     feed: str
     """Quantity that the driver keeps constant, from `FEEDS`; selects how the heat is interpolated."""
     on_time: float = 0.0
@@ -72,7 +72,7 @@ class DotHeat:
         return 1.0 / self.on_time if self.on_time > 0.0 else math.inf
 
     def at(self, temperature: float) -> float:
-        """Return the heat of one dot, J, at a winding temperature, degC."""
+        """Return the coil heat per dot, J, at a winding temperature, degC."""
         shares = [
             heat / _share(self.feed, place) for heat, place in zip(self.heat, self.temperature, strict=True)
         ]
@@ -80,7 +80,7 @@ class DotHeat:
 
 
 def dot_heat(heat: float | str, feed: str = "voltage") -> DotHeat:
-    """Build the heat of one dot from its value at 20 degC, J, and the quantity that is held constant."""
+    """Build the coil heat per dot from its value at 20 degC, J, and the quantity that the driver keeps."""
     if feed not in FEEDS:
         raise InputError.of("feed", feed, f"one of {', '.join(FEEDS)}")
     return DotHeat((REFERENCE,), (read_positive(heat, "J", "heat"),), feed)
@@ -101,7 +101,7 @@ def read_temperature(value: float | str, name: str) -> float:
 
 
 def _share(feed: str, temperature: float) -> float:
-    """Return the ratio of the heat of one dot at a temperature, degC, to the heat at 20 degC."""
+    """Return the ratio of the coil heat per dot at a temperature, degC, to that at 20 degC."""
     warm = 1.0 + COPPER * (temperature - REFERENCE)
     return {"voltage": 1.0 / warm, "current": warm, "energy": 1.0}[feed]
 
@@ -127,7 +127,7 @@ class ThermalCoil:
 
     @property
     def whole(self) -> float:
-        """Thermal resistance from the winding to the ambient temperature, K/W."""
+        """Thermal resistance from the winding to ambient, K/W."""
         return self.resistance + self.body_resistance
 
 
@@ -351,7 +351,7 @@ _DOUBLINGS: Final = 8  # Iteration limit of the doublings of the simulated time
 
 
 def heat_of(hammer: Hammer) -> DotHeat:
-    """Compute the heat of one dot of a hammer as a function of the winding temperature.
+    """Compute the coil heat per dot of a hammer as a function of the winding temperature.
 
     A driver is simulated from rest at the coil temperatures `TEMPERATURES`; a waveform that is a current is
     assumed to be regulated, whatever the resistance.

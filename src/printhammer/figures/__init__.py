@@ -33,7 +33,7 @@ class PaperFigure:
     place: str
     """Module in `printhammer.figures.paper` and function that draws the figure, separated by a dot."""
     title: str
-    """Title of the figure in a few words."""
+    """Short title of the figure."""
     caption: str
     """Caption that describes the figure in one or two sentences."""
 

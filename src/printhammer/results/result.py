@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     Entries = dict[str, tuple[Column, Any]]
 
 RESULTS: dict[str, type[Result]] = {}
-"""Result classes imported so far, by name."""
+"""Result classes that have been imported, by name."""
 
 
 @dataclass_transform(

@@ -60,7 +60,7 @@ def styled(style: Style, said: object) -> str:
 
 
 def judged(good: bool, said: object, otherwise: Style = "poor") -> str:
-    """Mark words with the style "good" or, if `good` is false, with the other style."""
+    """Mark words with the style "good" or, if `good` is false, with the style `otherwise`."""
     return styled("good" if good else otherwise, said)
 
 

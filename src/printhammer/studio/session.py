@@ -231,7 +231,7 @@ class Session:
         self._end_progress(order)
 
     def _follow(self, order: Order, worker: Worker, newer: Callable[[], bool]) -> bool:
-        """Forward a worker's messages until its job ends; return False if it was terminated or left behind."""
+        """Forward a worker's messages until its job ends; return False if it was terminated or left."""
         role = order.role
         worker.begin(order)
         superseded, ahead = False, role == "curves"

@@ -152,7 +152,7 @@ Work: TypeAlias = Generator[list[A], list[B], T]
 
 
 def together(works: Sequence[Work[A, B, T]]) -> Work[A, B, list[T]]:
-    """Run works concurrently, merging the queries of all unfinished works; return the results in order."""
+    """Run several `Work` coroutines together, answering the queries of all at once; return their results."""
     ends: dict[int, T] = {}
     answers: dict[int, list[B] | None] = dict.fromkeys(range(len(works)))
     while answers:

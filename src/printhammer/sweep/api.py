@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from printhammer.sweep.work import Results
 
 Progress = Callable[[float, int, int], None]
-"""Progress callback: members done so far, members done before this run, total members."""
+"""Progress callback, called with the numbers of members done, done before this run, and in total."""
 
 
 def sweep(
@@ -55,7 +55,7 @@ def sweep(
     dask : str or distributed.Client, optional
         Address of the scheduler of a dask cluster, or a client, to run there instead.
     progress : callable, optional
-        Called from time to time with three numbers of members: done so far, done before this run, total.
+        Called at intervals with three numbers of members: done, done before this run, and total.
 
     Returns
     -------

@@ -66,7 +66,7 @@ class Cloud(NamedTuple):
 
     @classmethod
     def of(cls, points: FloatArray) -> Cloud:
-        """Build the cloud of successive points (n, 2); its reach is that of one half to the other."""
+        """Build the cloud of successive points (n, 2); the reach is computed between its two halves."""
         half = len(points) // 2
         apart, _ = cKDTree(points[:half]).query(points[half:])
         return cls(cKDTree(points), float(np.quantile(apart, REACH)))
@@ -82,7 +82,7 @@ class Cloud(NamedTuple):
 
 
 class Attractors:
-    """Attractors found so far, in order of discovery.
+    """Attractors of the trains examined up to now, in order of discovery.
 
     Differences of displacement, velocity, memory and current are divided by the `scales`, shape (4,).
     """

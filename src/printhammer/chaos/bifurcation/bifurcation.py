@@ -152,7 +152,7 @@ def bifurcation(
 
 
 def _result(builder: DiagramBuilder) -> Bifurcation:
-    """Build the diagram from the trains that have been run so far."""
+    """Build the diagram from the trains computed before the end or an interrupt."""
     order = np.argsort(builder.values, kind="stable")
     rows = (len(builder.ways) * order + np.arange(len(builder.ways))[:, np.newaxis]).astype(np.int64)
     table = builder.table

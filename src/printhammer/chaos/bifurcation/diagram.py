@@ -1,4 +1,4 @@
-"""Bifurcation diagram: states at the firings, windows of equal motion, and routes to strange trains.
+"""Bifurcation diagram: states at the firings, windows of equal motion, and routes to chaos.
 
 A window is an interval of the parameter in which all trains that were run have the same classification. A
 value stands for the interval half-way to its neighbours, so that widths of windows add up to the whole range.
@@ -39,7 +39,7 @@ SERIES: Final = (2, 4, 8)
 """Orbit periods, in firings, of successive windows that count as a series of period doublings."""
 
 MOST_UNDECIDED: Final = 32
-"""Maximum number of undecided aperiodic trains on a route before the search for a strange train stops."""
+"""Maximum number of undecided aperiodic trains on a route before the search for chaos stops."""
 
 
 class Window(Declared):
@@ -54,7 +54,7 @@ class Window(Declared):
 
 
 class Route(Declared):
-    """Route to chaos: the windows between one end of the parameter range and the first strange train."""
+    """Route to chaos: windows from one end of the parameter range to the first train classified "strange"."""
 
     way: Literal["rising", "falling"] = part("direction in which the parameter is followed")
     before: tuple[Window, ...] = part(
@@ -81,11 +81,11 @@ class Route(Declared):
 
     @property
     def sentence(self) -> str:
-        """Sentence that states the first strange train and the windows before it, with values in SI."""
+        """Sentence that states the first chaotic train and the windows before it, with values in SI."""
         return self.worded("{:.9g}".format)
 
     def worded(self, shown: Callable[[float], str]) -> str:
-        """Return the sentence on the first strange train, with values formatted by `shown`."""
+        """Return the sentence on the first chaotic train, with parameter values formatted by `shown`."""
         values = f"With {self.way} values"
         way = ", ".join(window.verdict for window in self.before)
         if not self.complete:
@@ -203,7 +203,7 @@ class Bifurcation(Result, rows="direction column"):
         return f"bifurcation diagram of {self.regime.hammer.name} in {self.parameter}"
 
     def summary(self) -> Summary:
-        """Summarise windows, routes to strange trains, hysteresis, and undecided trains of all directions."""
+        """Summarise windows, routes to chaos, hysteresis, and undecided trains of all directions."""
         several = len(self.directions) > 1
         value, unit = self._value_text()
         lines = [""]
@@ -321,7 +321,7 @@ class Bifurcation(Result, rows="direction column"):
         return self._grouped(self._row(direction), range(len(self.values)))
 
     def routes(self, direction: str | None = None) -> tuple[Route, Route]:
-        """Compute the routes to the first strange train, for rising and for falling parameter values.
+        """Compute the routes to the first chaotic train, for rising and for falling parameter values.
 
         `direction` is as for `windows`. Missing exponents of aperiodic trains are computed here, from one end
         of the range up to the first strange train.
@@ -371,7 +371,7 @@ class Bifurcation(Result, rows="direction column"):
         return windows
 
     def _is_strange(self, row: int, k: int) -> bool:
-        """Whether an aperiodic train is strange, by the exponent computed from its last point on."""
+        """Whether an aperiodic train is chaotic, by the Lyapunov exponent computed from its last point on."""
         x, v = (float(states[row, k, -1]) for states in (self.x, self.v))
         regime = self.regime.with_(self.parameter, float(self.values[k]))
         front = regime.hammer.front

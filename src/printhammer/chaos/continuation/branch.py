@@ -71,7 +71,7 @@ class BranchEvent(Declared, eq=False):
 
     @property
     def message(self) -> str:
-        """Description of the event in a few words, e.g. "grazing: a pack contact appears"."""
+        """Short description of the event, such as "grazing: a pack contact appears"."""
         if self.kind == "section":
             return f"a contact nears the section, which moves to the phase {self.phase:.4g}"
         if self.kind != "grazing":

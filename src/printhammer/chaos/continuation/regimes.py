@@ -227,7 +227,7 @@ def follow_doublings(
 
 
 class _Collected:
-    """Collection of the branches found so far in a search, and methods that extend it."""
+    """Branches collected during a search, and methods that add further branches."""
 
     def __init__(self, bounds: tuple[float, float], steps: Steps, effort: Effort) -> None:
         self.bounds, self.steps, self.effort = bounds, steps, effort
@@ -241,7 +241,7 @@ class _Collected:
 
     @contextmanager
     def kept_at_interrupt(self) -> Iterator[None]:
-        """Context that raises `InterruptedBranches` with the branches found so far if it is interrupted."""
+        """Context that turns an interrupt into `InterruptedBranches` with the branches collected."""
         try:
             yield
         except KeyboardInterrupt:

@@ -59,7 +59,7 @@ CYCLES: Final = 5
 """Number of cycles over which growth must occur to count as chaos; within one cycle, any path may grow."""
 
 FOLLOWS: Final = 0.7
-"""Mean distance of images of neighbours, relative to any two, below which a series is deterministic."""
+"""Mean distance of images of neighbours, relative to arbitrary pairs, that proves a deterministic series."""
 
 _CUT: Final = 10  # Ratio of the series length to the largest lag of the displacement (Gottwald and Melbourne)
 _PASSES: Final = 4  # Smallest number of cycles in a series for a cycle to be considered

@@ -85,10 +85,10 @@ _EVEN: Final = 8
 _JOINED: Final = 48
 """Maximum number of guesses per stage and period that are concatenations of two shorter orbits."""
 _TOUCHES: Final = 4
-"""Number of spread states per state just after a touch of a rigid backstop, among the starts."""
+"""Ratio, among the starts, of evenly spread states to states just after a touch of a rigid backstop."""
 _COMPLETED: Final = 6
 _MORE: Final = 512
-"""Largest period, in firings, for which further returns are tried if the indices show a gap; their number."""
+"""Largest period, in firings, that is searched again if its index sum is not 1; number of further guesses."""
 _SAME: Final = 1e-6
 """Distance, in half-widths of the strobe window, below which two orbits share a state."""
 _FAST: Final[dict[str, Any]] = {"goal": 1e-9, "enough": 1e-7, "iterations": 30}
@@ -248,7 +248,7 @@ class Search:
                 self._try(fast, different, more, (len(self.blocks) - 1, last))
 
     def _complete(self, fast: FastMaps, different: list[_Known], records: Records) -> None:
-        """Try more close returns for each period whose indices do not add up to 1: orbits are missing."""
+        """Try more close returns for each period whose fixed-point indices do not sum to 1."""
         stage = len(self.blocks) - 1, len(self.batches) - 1
         for period in range(1, min(self.longest, _COMPLETED) + 1):
             own = [

@@ -167,7 +167,7 @@ def strobe(
     tolerance : float, optional
         As for `printhammer.simulate`.
     verdict : bool, optional
-        Whether to classify the motion, by the firings 1001 to 2000, independent of the points and their
+        Whether to classify the motion, from firings 1001 to 2000, independent of the points and their
         phase; see `printhammer.chaos.strobe.verdict`.
     **firing
         How the hammer is fired: period or rate, waveform, drive, overlap and phase of the points, as for

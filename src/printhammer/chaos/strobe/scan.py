@@ -41,7 +41,7 @@ LARGEST_MULTIPLIER: Final = 0.99
 
 _SHORT: Final = 301
 _SURE: Final = 5.0
-"""Firings of the first, short exponent, and standard errors by which it has to be positive."""
+"""Number of firings for a first estimate of the exponent; standard errors above 0 at which it is accepted."""
 
 
 @computation
@@ -97,7 +97,7 @@ def scan(
 def _settled(
     trains: Sequence[Train], states: Sequence[States], firings: tuple[int, int], effort: Effort
 ) -> list[Verdict | None]:
-    """Classify the trains that have settled to a stable period early; None for all others."""
+    """Classify the trains that have settled early to a stable periodic motion; None for all other trains."""
     distances = [own.distances(train) for own, train in zip(states, trains, strict=True)]
     periods: dict[int, int] = {}
     for i, row in enumerate(distances):

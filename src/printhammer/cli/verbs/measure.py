@@ -172,7 +172,7 @@ def _options(kinds: list[str], bench: dict[str, str]) -> dict[str, dict[str, Any
 
 
 def _possible(kinds: list[str], hammer: Hammer) -> list[str]:
-    """Return the kinds that the hammer allows; announce the others ("current" needs a voltage drive)."""
+    """Return the kinds of measurement that the hammer allows; report kinds omitted for lack of a part."""
     waveform = hammer.waveform
     if waveform is None or waveform.unit != "V":
         kinds = [kind for kind in kinds if kind != "current"]

@@ -109,11 +109,11 @@ def tune(
     budget: int | None = opt.whole("Maximum size of the arrays in the C header, bytes."),
     along: str | None = opt.text(
         "AXIS LOW, HIGH, N",
-        "Quantity in which several tables are tuned, with its values, e.g. 'rail 90 V, 110 V, 3': rail"
+        "Quantity and range of values, for each of which a table is tuned, e.g. 'rail 90 V, 110 V, 3': rail"
         " (voltage), temperature (of the coil), gap (added distance of the pack) or forms (relative change of"
         " the thickness of the pack).",
     ),
-    variability: bool = opt.switch("Select the entries that are best over the production spread."),
+    variability: bool = opt.switch("Minimise the RMS deviation over the production spread of the constants."),
     tolerance: float | None = opt.TOLERANCE,
     threads: int | None = opt.THREADS,
     units: Units = opt.UNITS,
@@ -204,7 +204,7 @@ _PANEL: Final = "The sensor"
             "Maximum fraction of posterior samples that may print fewer dots with the table than without.",
             default=0.0,
         ),
-        "serial": opt.text("TEXT", "Serial number of the unit that learns.", default="unit"),
+        "serial": opt.text("TEXT", "Serial number of the calibrated unit.", default="unit"),
         "seed": opt.whole(
             "Seed for the simulated hammers, and for the test unit if --unit is not given.", default=1983
         ),

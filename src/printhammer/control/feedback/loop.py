@@ -89,7 +89,7 @@ class Touched:
 
 @dataclass(frozen=True)
 class Printed:
-    """Contact as predicted when its pulse was chosen, before its samples corrected the pack front."""
+    """Contact as predicted when its pulse was chosen, before its samples corrected the estimated front."""
 
     # Time, s, speed, m/s, and kind of the touch
     touch: float
@@ -134,7 +134,7 @@ class Loop:
         return float(self.due[dot + 1] - self.due[dot]) if dot + 1 < len(self.due) else np.inf
 
     def drive(self, edge: float) -> PulseSequence:
-        """Return the drive that consists of all firings so far."""
+        """Return the drive that consists of all firings decided up to now."""
         return PulseSequence([pulse.waveform(edge) for pulse in self.pulses], [p.fired for p in self.pulses])
 
     def recent(self, driver: Driver) -> BoundedSequence:

@@ -102,7 +102,7 @@ class Adjustable:
 
     @property
     def loops(self) -> list[OpenLoop]:
-        """Open loops that a table is compared with: with the task's pulse and, if any, the hammer's own."""
+        """Open-loop drives to compare a table with: the task's pulse and, if any, the hammer's own pulse."""
         plain = OpenLoop(self.open_loop, self.task.pulse)
         return [plain] if self.own is None else [plain, self.own]
 
@@ -353,7 +353,7 @@ class LearningLaw:
         return np.asarray((off[1:] - off[0]).T)
 
     def _compared(self, alike: Sequence[Hammer], corrections: FloatArray) -> Printing[Verdict]:
-        """Compare a table with the open loops on samples of the posterior; return the verdict.
+        """Compare a table with open-loop drive on samples of the posterior; return the outcome.
 
         The table gains if the samples print more dots with the table than in either open loop, and if no
         sample, except for a fraction `doubt`, prints fewer dots or has a row in which errors grow from dot to
@@ -375,7 +375,7 @@ class LearningLaw:
         return Verdict(gains, loops[chosen], float(np.fmax.reduce(growth)), float(good.mean()), every)
 
     def _leads(self, share: FloatArray, others: FloatArray) -> bool:
-        """Whether a drive prints more dots (M,) than others (drives, M) on average, on no hammer fewer."""
+        """Whether a drive prints more dots (M,) on average than others (drives, M), and on no hammer fewer."""
         harmless = np.quantile(share - others.max(axis=0), self.doubt) >= 0.0
         return bool(harmless and share.mean() - others.mean(axis=1).max() >= _GAIN)
 

@@ -9,8 +9,8 @@ the estimated single-pulse force, averaged over the production (greedy A-optimal
 Design of Experiments*, 2006, chapter 6). A greedy choice can miss a better combination of rungs.
 
 `Surrogate` approximates a reading by a quadratic function of the constants, to plan the ladder and to start
-searches. Learners are coroutines that yield orders; `printed` runs all pending orders in few ensembles. The
-results do not depend on how orders are grouped.
+searches. Learners are coroutines that yield print jobs; `printed` runs pending jobs in few ensembles. The
+results do not depend on how jobs are grouped.
 """
 
 from __future__ import annotations
@@ -204,7 +204,7 @@ LINE: Final = slots_of(cycle_with_lead_in(5, 0))
 
 
 class Order(NamedTuple):
-    """Order to print: hammers, a drive for each hammer, and the end time of the simulation, s."""
+    """Print job: hammers, a drive for each hammer, and the end time of the simulation, s."""
 
     hammers: Sequence[Hammer]  # (M,)
     drives: Sequence[PulseSequence]  # One drive per hammer, (M,)
@@ -212,7 +212,7 @@ class Order(NamedTuple):
 
 
 class Printed(NamedTuple):
-    """Printed order: the dots of each hammer, and a mask of the completed simulations."""
+    """Result of a print job: the dots of each hammer, and a mask of the completed simulations."""
 
     dots: DotTable  # (M, largest number of firings of a drive)
     ok: BoolArray  # Mask of the runs that completed, (M,)
@@ -258,7 +258,7 @@ class Press:
         return np.asarray(np.fmax.reduce(np.abs(growth).reshape(len(_STEPS), count)))
 
     def order_ladder(self, rungs: Sequence[Rung]) -> Printing[tuple[FloatArray, FloatArray]]:
-        """Coroutine of `ladder`: yields the order to print, and returns the result from the printed order."""
+        """Coroutine version of `ladder`: yields the print job, and computes the readings from its result."""
         task, count = self.task, len(self.hammers)
         drives = []
         for rung in rungs:
@@ -284,7 +284,7 @@ class Press:
         slots: Sequence[int] = LINE,
         pulses: Sequence[Waveform] | None = None,
     ) -> Printing[tuple[DotTable, Judgement]]:
-        """Coroutine of `line`: yields the order to print, and returns the result from the printed order."""
+        """Coroutine version of `line`: yields the print job, and computes the dots from its result."""
         task, due = self.task, slot_times(slots, self.rate)
         fired = [task.pulse] * len(settings) if pulses is None else pulses
         known: dict[int, dict[tuple[float, float, float], Waveform]] = {id(pulse): {} for pulse in fired}
@@ -302,12 +302,12 @@ class Press:
 
 
 def printed(work: Printing[T], task: Task) -> T:
-    """Run a coroutine to its end: simulate the orders that it yields, and return the result."""
+    """Run a coroutine to its end: simulate the print jobs that it yields, and return the result."""
     return answered(work, partial(_run, effort=task.effort))
 
 
 def _run(orders: Sequence[Order], effort: Effort) -> list[Printed]:
-    """Simulate orders in as few ensembles of at most `_MOST` hammers as possible."""
+    """Simulate print jobs in as few ensembles of at most `_MOST` hammers as possible."""
     done: list[Printed] = []
     while len(done) < len(orders):
         batch: list[Order] = []

@@ -224,7 +224,7 @@ class LeastWork(Result, rows="node"):
         return float(motion.t[min(place, motion.t.size - 1)])
 
     def under_supply(self, changes: npt.ArrayLike = SUPPLY) -> SupplyCheck:
-        """Simulate the same drive, as one ensemble, with every current scaled by 1 + `changes`."""
+        """Simulate the drive of the burst with all currents scaled by 1 + `changes`, as one ensemble."""
         factors = 1.0 + np.atleast_1d(np.asarray(changes, dtype=np.float64))
         if factors.ndim != 1 or not (np.isfinite(factors) & (factors > 0.0)).all():
             raise InputError.of("changes", changes, "relative changes of the current above -1")

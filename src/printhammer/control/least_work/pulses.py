@@ -34,7 +34,7 @@ _WRONG: Final = 10.0  # Penalty for an extra contact or a failed simulation, in 
 
 
 class PulsePlan:
-    """Plan of a burst of pulses: the firings so far, and the state of the armature after them.
+    """Plan of a burst of pulses: the firings planned, and the state of the armature after them.
 
     The widths of `waveform` are optimised; the slope limit of the task is ignored. `period`, `past` (from a
     touch to the end of its slot), `lead` (length of the first slot) and `landing` (length of the landing) are

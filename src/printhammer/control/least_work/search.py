@@ -107,7 +107,7 @@ _INSIDE: Final = 1.0 - 1e-9  # Factor on a limit that keeps rounding errors with
 
 
 class NodePlan:
-    """Plan of a burst with piecewise linear current: the currents so far, and the state after them.
+    """Plan of a burst with piecewise linear current: the currents planned, and the state after them.
 
     `period`, `past` (from a touch to the end of its slot), `spacing` (between nodes) and `flight` (of the
     single pulse) are times, s.

@@ -1,4 +1,4 @@
-"""Compensation tables: feedforward for a dot that follows others before the hammer is at rest."""
+"""Compensation tables: feedforward for dots fired before the hammer has settled after earlier dots."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ SHADES: Final = {
 """Colour of the bands, by the classification of the motion."""
 
 WAYS: Final = {"from rest": style.INK, "up": style.ORANGE, "down": "#7b3fa0"}
-"""Colours of points reached in one direction only, by direction; distinct from the band colours."""
+"""Colours of points that occur in one direction of the parameter only; distinct from the band colours."""
 
 _POINT: Final = 0.7  # Size of a point, points
 _MOST: Final = 3_000_000
@@ -227,7 +227,7 @@ def _kind(verdict: str, stopped: bool) -> str:
 
 
 def _key(strip: Axes, diagram: Bifurcation) -> None:
-    """Draw the legend of the bands that occur, and of the points reached in one direction only."""
+    """Draw the legend of the bands, and of the points that occur in one direction of the parameter only."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 

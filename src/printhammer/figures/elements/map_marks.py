@@ -235,7 +235,7 @@ def failures(chart: xr.Dataset) -> str:
 
 
 def sign_map(figure: Figure, chart: xr.Dataset, *remarks: str) -> None:
-    """Write the origin of a map below the figure, and remarks above it."""
+    """Write name and fingerprint of a map's hammer below the figure, and remarks above the figure."""
     origin = [str(chart.attrs.get("hammer", chart.attrs.get("source", "")))]
     origin.append(str(chart.attrs.get("hammer_fingerprint", ""))[:8])
     constants = str(chart.attrs.get("hammer_constants", ""))

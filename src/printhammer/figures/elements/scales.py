@@ -67,7 +67,7 @@ def scale(name: Name, largest: float = 0.0) -> Scale:
 
 
 def label(ax: Axes, side: Literal["x", "y"], shown: Scale, name: str = "") -> SecondaryAxis | None:
-    """Label an axis with its unit; return the opposite axis in the other unit system, or None.
+    """Label an axis with its unit; return the secondary axis in the other unit system, or None.
 
     The data of the axes are in `shown.unit`; `name` overrides the name of the scale.
     """

@@ -149,7 +149,7 @@ def with_strip(figure: Figure, ratio: float = 5.5) -> tuple[Axes, Axes]:
 
 
 def sign(figure: Figure, hammer: Hammer, *remarks: str) -> None:
-    """Write name and fingerprint of the hammer and status of its constants below a figure, remarks above."""
+    """Write hammer name, fingerprint and status of constants below a figure, and remarks above the figure."""
     statuses = {constant.status for constant in hammer.constants.values()}
     known = [status for status in ("reconstructed", "assumed") if status in statuses]
     origin = [hammer.name, hammer.fingerprint[:8]]
@@ -160,7 +160,7 @@ def sign(figure: Figure, hammer: Hammer, *remarks: str) -> None:
 
 
 def foot(figure: Figure, origin: str, remark: str = "") -> None:
-    """Write the origin of a figure below it, and a remark above it."""
+    """Write the origin of the data below a figure, and a remark above the figure."""
     text = figure.supxlabel(origin, x=0.99, ha="right", fontsize=TINY, color=MUTED)
     text.set_in_layout(True)
     if remark:

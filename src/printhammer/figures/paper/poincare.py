@@ -124,7 +124,7 @@ def _strobed(
 
 
 def _edge(ax: Axes, side: Literal["x", "y"], shown: Scale, here: bool, opposite: bool) -> None:
-    """Label the axis of a panel at the figure's edge, and the axis in the other unit system opposite."""
+    """Label the axis of a panel at the figure's edge, and its secondary axis in the other unit system."""
     other = label(ax, side, shown)
     if not here:
         ax.set(**{f"{side}label": ""})

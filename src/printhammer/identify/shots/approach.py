@@ -29,7 +29,7 @@ _TRIES: Final = 2
 
 
 class Prior(Declared, eq=False):
-    """Gaussian prior of some of the fitted parameters: mean and covariance."""
+    """Gaussian prior of a subset of the fitted parameters: mean and covariance."""
 
     which: IntArray = part("indices of the parameters, shape (k,)")
     mean: FloatArray = part("mean, SI, shape (k,)")

@@ -356,7 +356,7 @@ def new_edge(
 
 @compiled
 def close_member(pool: Any, i: int, which: int, slot: Any, dots: Any, hammer: Hammer) -> None:
-    """Record the largest depth so far of a pack contact that is still open at the end of a run."""
+    """Record the largest depth of a pack contact that is still open at the end of a run."""
     dot = int(slot[R.DOT])
     if which == R.LOADING_POOL and dot >= 0:
         deepen_dot(dots, dot, pool[R.X * R.BLOCK + i], hammer)

@@ -134,7 +134,7 @@ EVENT_TIME = 13
 EVENTS = 14
 """Column of the number of consecutive events that did not advance the time."""
 EXTRA = 15
-"""Column of the number of extra contacts so far."""
+"""Column of the number of extra contacts up to the present time."""
 SLOT_WIDTH = 16
 
 # Bit flags of the events of a lane, to be added.

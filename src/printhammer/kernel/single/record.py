@@ -56,7 +56,7 @@ def relabel_node(nodes: Rows, used: int, mode: int) -> None:
 def open_contact(
     contacts: Rows, used: int, surface: int, t: float, v: float, node: int, initial: bool
 ) -> int:
-    """Record the start of a contact at time `t` with velocity `v`; return the number of contacts so far."""
+    """Record the start of a contact at time `t` with velocity `v`; return the number of recorded contacts."""
     i = min(used, contacts.shape[0] - 1)
     contacts[i, 0] = surface
     contacts[i, 1] = t

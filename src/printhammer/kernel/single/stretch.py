@@ -110,7 +110,7 @@ def note_dots(
 ) -> int:
     """Write the pack contacts of one segment of a run to the rows of dots of a member.
 
-    Returns the number of extra contacts of the member so far; `extra` is the number before this segment.
+    Returns the number of extra contacts of the member including this segment; `extra` is the number before.
     """
     for number in range(contacts.shape[0]):
         contact = contacts[number]

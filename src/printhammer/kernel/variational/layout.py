@@ -35,7 +35,7 @@ FIRST_COLUMN = TIME + 1
 DUE = 0
 """Index of the element that counts the marks already passed."""
 SMOOTH = 1
-"""Index of the flag, 1 or 0, that the motion so far depends differentiably on the initial state."""
+"""Index of a flag: 1 if the present state depends differentiably on the initial state, else 0."""
 GROWN = 2
 """Index of the first column's logarithm of growth since the latest mark; further columns follow."""
 

@@ -261,7 +261,7 @@ def _leaving(motion: Motion) -> float | None:
 
 
 class _Search:
-    """Search for a buzz printing train of one hammer: its settings, and the best train so far."""
+    """Search for a buzz printing train of one hammer: settings of the search, and the best train found."""
 
     def __init__(
         self, hammer: Hammer, pulses: int, fewest: int, forces: tuple[float, float], max_current: float

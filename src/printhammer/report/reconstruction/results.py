@@ -59,7 +59,7 @@ class _Panel(_Counted):
 
 
 class BaseRates(_Table):
-    """Frequency of each claim among random plausible hammers."""
+    """Fraction of random plausible hammers for which each claim holds."""
 
     format: Literal[1] = Field(description="1, the version of the format")
     hammers: _Some = Field(description="the number of random hammers")
@@ -78,7 +78,7 @@ class BaseRates(_Table):
 
     @property
     def panels(self) -> dict[str, Share]:
-        """Frequency, among random hammers, of the paper's classification of each panel of Fig. 11."""
+        """Fraction of random hammers that reproduce the paper's classification, by panel of Fig. 11."""
         shares = {name: _share(panel) for name, panel in self.poincare_panels.items()}
         return {name: share for name, share in shares.items() if share is not None}
 
@@ -160,7 +160,7 @@ class Conclusion(_Table):
 
 
 class Family(_Table):
-    """Distinct hammers that satisfy the claims about as well as the shipped one."""
+    """Distinct hammers that satisfy the claims about as well as the shipped hammer does."""
 
     format: Literal[1] = Field(description="1, the version of the format")
     hammers: list[FamilyMember] = Field(min_length=1, description="the hammers")
@@ -180,7 +180,7 @@ class FamilyPanels(_Table):
 
 
 class Change(_Table):
-    """Frequency with which two computations classify the same panel of Fig. 11 differently."""
+    """Fraction of panels of Fig. 11 that two computations classify differently."""
 
     first: str = Field(description="the first computation, such as 'exact'")
     second: str = Field(description="the other")

@@ -30,9 +30,9 @@ if TYPE_CHECKING:
     from printhammer.kernel.compile.calls import Signature
 
 SECTION: Final = "printhammer"
-"""Name of the custom section."""
+"""Name of the custom section of a WebAssembly module that holds the description of its entry points."""
 MAGIC: Final = b"\0asm\1\0\0\0"
-"""First bytes of a module of WebAssembly."""
+"""First bytes of a WebAssembly module: magic number and version."""
 
 _FEATURES: Final = "+bulk-memory,+mutable-globals,+nontrapping-fptoint,+sign-ext,+simd128"
 """Features of WebAssembly 2.0, which browsers have had since 2023."""
@@ -55,7 +55,7 @@ def _machine() -> Any:
 
 
 def emit(module: Any, name: str) -> bytes:
-    """Return the object of a linked module, whose function `CALL` gets the symbol `name`."""
+    """Compile a linked module to a WebAssembly object file, with `CALL` renamed to the symbol `name`."""
     module.get_function(link.CALL).name = name
     machine = _machine()
     layout = str(machine.target_data)
@@ -68,7 +68,7 @@ def emit(module: Any, name: str) -> bytes:
 
 
 def join(objects: Mapping[str, bytes], description: Mapping[str, Any]) -> bytes:
-    """Return the module of WebAssembly of objects by name, with its description.
+    """Link object files, by entry-point name, into one WebAssembly module; append its description.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def join(objects: Mapping[str, bytes], description: Mapping[str, Any]) -> bytes:
 
 
 def description_of(signature: Signature) -> Any:
-    """Return a signature for JSON: letters, lists, and objects for tuples whose elements have names."""
+    """Convert a signature to JSON data: type codes, lists, and objects for named tuples."""
     if isinstance(signature, str):
         return signature
     if hasattr(signature, "_asdict"):
@@ -110,14 +110,14 @@ def description_of(signature: Signature) -> Any:
 
 
 def _section(name: str, content: bytes) -> bytes:
-    """Return a custom section, in the binary format of WebAssembly."""
+    """Encode a custom section of a WebAssembly module."""
     text = name.encode()
     payload = _unsigned(len(text)) + text + content
     return b"\0" + _unsigned(len(payload)) + payload
 
 
 def _unsigned(number: int) -> bytes:
-    """Return a number as LEB128."""
+    """Encode an unsigned integer as LEB128."""
     encoded = bytearray()
     while number > 0x7F:
         encoded.append(number & 0x7F | 0x80)
