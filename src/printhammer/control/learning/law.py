@@ -375,7 +375,7 @@ class LearningLaw:
         return Verdict(gains, loops[chosen], float(np.fmax.reduce(growth)), float(good.mean()), every)
 
     def _leads(self, share: FloatArray, others: FloatArray) -> bool:
-        """Whether a drive prints more dots (M,) on average than others (drives, M), and on no hammer fewer."""
+        """Whether a drive prints more dots (M,) on average than others (drives, M), on no hammer fewer."""
         harmless = np.quantile(share - others.max(axis=0), self.doubt) >= 0.0
         return bool(harmless and share.mean() - others.mean(axis=1).max() >= _GAIN)
 
