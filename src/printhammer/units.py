@@ -211,7 +211,7 @@ def _scaled(value: object, factor: Fraction, unit: str) -> float:
     try:
         number = float(value)
         if math.isfinite(number):
-            # What is in SI already needs no exact product.
+            # A number that is already in SI needs no exact product.
             zero = _zero(unit)
             return number + 0.0 if factor == 1 else float((Fraction(repr(number)) - zero) * factor)
     except OverflowError:

@@ -94,7 +94,7 @@ def row_multipliers(
         step = (np.linalg.pinv(np.eye(2) - jacobian[open_]) @ defect[:, :, np.newaxis])[:, :, 0]
         contracts = np.abs(jacobian[open_]).max(axis=(1, 2)) < _CONTRACTING
         longest = np.abs(step).max(axis=1, keepdims=True)
-        # A map that contracts may go all the way, as far as from a bounce to rest.
+        # For a contracting map the full Newton step is safe, even if it leads from a bounce to rest.
         allowed = np.where(contracts, np.inf, _LONGEST_STEP)[:, np.newaxis]
         z[open_] += step * np.minimum(1.0, allowed / np.maximum(longest, _CLOSED))
     if closed:

@@ -32,7 +32,7 @@ _SETTLED: Final = 0.05  # Distance from rest at the end of a window, as a fracti
 _PATIENCE: Final = 16.0  # Largest window of a device that does not settle, in flight times
 _LONGEST: Final = 64.0  # Largest window of a device that makes no dot, in time scales
 _LAST: Final = 1.0  # Upper limit of a window, s
-TOLERANCE: Final = 5e-7  # The result depends on thresholds only
+TOLERANCE: Final = 5e-7  # Tolerance of the single pulse, whose outcome is only compared with thresholds
 MOST_STEPS: Final = 500_000  # Largest number of steps of a single pulse
 _MOST_KEPT: Final = 512  # Number of cached windows at which the cache is emptied
 

@@ -119,7 +119,7 @@ class Session:
             while not self._closed:
                 work()
         except OSError:
-            # The page is gone.
+            # The browser has closed the page.
             self.close()
 
     def _tell(self, data: bytes) -> None:

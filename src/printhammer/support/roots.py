@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-_PIECES: Final = 16  # Pieces of an interval in each round; arbitrary
-_ROUNDS: Final = 16  # Rounds of refinement: 16 pieces in 16 rounds exhaust the bits of a float
+_PIECES: Final = 16  # Number of subintervals per round of refinement; arbitrary
+_ROUNDS: Final = 16  # Number of rounds: 16 rounds of 16 subintervals exhaust the bits of a float
 _PROBE: Final = 1e-6  # Distance of a probe from a root at a grid point, as a fraction of the cell; arbitrary
 _SLOPE: Final = 1e-3  # Step of the slope at the ends of a cell, as a fraction of the cell; arbitrary
 # Rounding turns a root into a short stretch of zeros.

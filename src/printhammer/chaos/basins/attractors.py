@@ -61,7 +61,7 @@ class Attractor(Declared):
 class Cloud(NamedTuple):
     """Points of a strange attractor, and the distance within which further points lie on it."""
 
-    tree: cKDTree  # Of points (n, 2)
+    tree: cKDTree  # Search tree of the points, (n, 2)
     reach: float
 
     @classmethod
@@ -185,7 +185,7 @@ class Attractors:
             if followed in self._clouds:
                 left = self._within(points, left, followed, places)
                 if followed < known:
-                    # The other trains may converge to it too: they are continued for a round first.
+                    # Other trains may converge to the same attractor: they are continued for a round first.
                     break
 
     def _within(self, points: FloatArray, rows: IntArray, place: int, places: IntArray) -> IntArray:

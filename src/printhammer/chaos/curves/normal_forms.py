@@ -82,7 +82,7 @@ def doubling_coefficient(plane: Plane, place: Place) -> float:
     for spacing in _SPACINGS:
         whole, half = coefficient(spacing), coefficient(0.5 * spacing)
         if abs(half - whole) <= _AGREE * abs(half):
-            # The error goes with the square of the spacing.
+            # The error is proportional to the square of the spacing.
             return (4.0 * half - whole) / 3.0
     return math.nan
 

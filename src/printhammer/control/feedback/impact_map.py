@@ -42,7 +42,8 @@ _WIDTHS: Final = (0.85, 1.0, 1.2)
 _RELEASES: Final = np.linspace(0.0, 0.85, 29)
 _EARLY: Final = np.linspace(0.14, 1.07, 38)
 _LATE: Final = np.linspace(1.1, 2.9, 48)
-_WATCHED, _WAIT = 3.0, 1.7  # Lengths of force simulations, and after the throw, flight times
+# Durations of force simulations, and of simulations after a throw, in single-pulse flight times
+_WATCHED, _WAIT = 3.0, 1.7
 # Time after which a change of the current has decayed, in time constants of the driver
 _FADED: Final = 2.5
 _LARGEST_FORCE: Final = 1.15  # Force above which an action is inadmissible, relative to the single pulse
@@ -56,7 +57,7 @@ class ForceMap:
     speed: FloatArray  # Speed of the touch, m/s; evenly spaced within a kind, (T,)
     back: FloatArray  # Return currents, A, (B,)
     release: FloatArray  # Time after the touch at which the push ends, s, (R,)
-    force: FloatArray  # Relative to the single pulse, (T, B, R)
+    force: FloatArray  # Peak force relative to the single pulse, (T, B, R)
     front: float  # Front of the pack, m
 
     @property

@@ -95,7 +95,7 @@ class Printed:
     touch: float
     speed: float
     kind: int
-    front: float  # Distance of the front beyond nominal, as then estimated, as a fraction of the stroke
+    front: float  # Distance of the front beyond nominal, estimated at that time, as a fraction of the stroke
     # Force relative to the single pulse, and its derivative with respect to the distance of the front
     force: float
     slope: float
@@ -110,7 +110,7 @@ class Loop:
     due: FloatArray  # Requested touch times, s, (dots,)
     key: int  # Key of the sensor noise of this run
     state: FloatArray  # Displacement, m, velocity, m/s, mode, memory, (4,)
-    pulses: list[Pulse] = field(default_factory=list)  # All firings so far
+    pulses: list[Pulse] = field(default_factory=list)  # All firings decided up to now
     # Expected coming touch: time, s, speed, m/s, and kind
     touch: float = 0.0
     speed: float = 0.0

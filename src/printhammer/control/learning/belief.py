@@ -82,7 +82,7 @@ class Belief:
     """Posterior distribution of a unit's constants: modes, the most probable first, and probabilities."""
 
     modes: tuple[Mode, ...]
-    weights: FloatArray  # (modes,)
+    weights: FloatArray  # Probabilities of the modes, (modes,)
 
     @classmethod
     def of(cls, ends: Sequence[Mode]) -> Belief:
@@ -136,7 +136,7 @@ def believe(
 class _Place(NamedTuple):
     """Current iterate of a Levenberg-Marquardt search."""
 
-    constants: FloatArray  # (constants,)
+    constants: FloatArray  # Constants, in prior standard deviations, (constants,)
     shown: FloatArray  # Predicted readings, (readings,)
     slopes: FloatArray  # Jacobian of the readings, (readings, constants); NaN where a dot is lost
     fresh: bool  # Whether the Jacobian is by finite differences at this iterate, without Broyden updates

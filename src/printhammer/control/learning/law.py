@@ -192,8 +192,8 @@ IN_CYCLE: Final = np.asarray(PRINTED)[JUDGED] < LEAD_IN + 2**SLOTS
 class Verdict(NamedTuple):
     """Outcome of comparing a compensation table with open-loop drive on hammers drawn from the posterior."""
 
-    gains: bool  # Whether the table is better than both open loops
-    loop: OpenLoop  # The open loop that is used otherwise
+    gains: bool  # Whether the table is better than both open-loop drives
+    loop: OpenLoop  # Open-loop drive to use if the table is not better
     multiplier: float  # Largest absolute multiplier of rows printed with the table; NaN if no row is periodic
     expected: float  # Mean fraction of dots within limits, with the drive that is used
     certainty: float  # Fraction of the samples that print every dot within limits with the drive that is used
@@ -211,8 +211,8 @@ class Update(NamedTuple):
 class _Unit(NamedTuple):
     """Posterior modes of a unit's constants, as hammers with weights and model error."""
 
-    hammers: Sequence[Hammer]  # The most probable first
-    weights: FloatArray  # Their probabilities
+    hammers: Sequence[Hammer]  # Hammers with the constants of the modes, the most probable first
+    weights: FloatArray  # Posterior probabilities of the modes
     more: FloatArray  # Deviations due to the model error, (2 dots,)
 
 
@@ -223,15 +223,15 @@ class LearningLaw:
     entries: Adjustable
     production: Production
     forgetting: float
-    # Fraction of the posterior samples that may print fewer dots with the table than in an open loop
+    # Fraction of the posterior samples that may print fewer dots with the table than in open loop
     doubt: float
     seed: int
     rungs: tuple[Rung, ...]
     # Surrogates of the readings of the ladder and of a line in open loop, times before forces
     shown: tuple[Surrogate, ...]
     rows: FloatArray  # Constants of simulated hammers, (members, size): starting points of searches
-    seen: FloatArray  # Readings of these hammers, (members, readings)
-    first: OpenLoop  # Open loop with the larger mean fraction of good dots over the production
+    seen: FloatArray  # Readings of the simulated hammers, (members, readings)
+    first: OpenLoop  # Open-loop drive with the larger mean fraction of good dots over the production
 
     def update(self, belief: Belief, corrections: FloatArray, unexplained: FloatArray) -> Printing[Update]:
         """Compute the corrections after a stage; yield the lines that simulated hammers have to print.
@@ -366,7 +366,7 @@ class LearningLaw:
         growth = press.multipliers(settings)
         steady = bool(np.quantile(np.nan_to_num(growth), 1.0 - self.doubt) <= 1.0)
         gains = steady and self._leads(table.mean(axis=1), shares)
-        # The open loop that is better over the production, unless no posterior sample loses with the other.
+        # The open-loop drive that is better over the production, unless the other leads on the posterior.
         loops = self.entries.loops
         chosen = next(k for k, loop in enumerate(loops) if loop.pulse is self.first.pulse)
         chosen = next((k for k in range(len(loops)) if self._leads(shares[k], shares[[chosen]])), chosen)

@@ -206,15 +206,15 @@ LINE: Final = slots_of(cycle_with_lead_in(5, 0))
 class Order(NamedTuple):
     """Print job: hammers, a drive for each hammer, and the end time of the simulation, s."""
 
-    hammers: Sequence[Hammer]  # (M,)
+    hammers: Sequence[Hammer]  # Hammers to simulate, (M,)
     drives: Sequence[PulseSequence]  # One drive per hammer, (M,)
-    end: float  # s
+    end: float  # End time of the simulation, s
 
 
 class Printed(NamedTuple):
     """Result of a print job: the dots of each hammer, and a mask of the completed simulations."""
 
-    dots: DotTable  # (M, largest number of firings of a drive)
+    dots: DotTable  # Dots, (M, largest number of firings of a drive)
     ok: BoolArray  # Mask of the runs that completed, (M,)
 
 

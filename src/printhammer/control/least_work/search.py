@@ -25,7 +25,7 @@ from printhammer.drive.waveforms.shapes import Sampled
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.support.arrays import FloatArray
 
-PRINTING_SHARES, LANDING_SHARES = 5, 4  # Number of shares of a profile
+PRINTING_SHARES, LANDING_SHARES = 5, 4  # Number of parameters of a profile, each in [0, 1]
 _SPREAD: Final = 512  # Number of Sobol profiles
 _KEPT: Final = 16  # Number of profiles refined
 _CLOUD: Final = 32  # Number of points in a cloud
@@ -36,8 +36,9 @@ _REACH, _SHRINKS = 0.25, 0.7  # Half-width of the first cloud, and factor on the
 def printing_profile(
     shares: FloatArray, largest: float, duration: float, arrival: float, nodes: int
 ) -> FloatArray:
-    """Return currents (n, nodes), A, that brake, wait and throw, for shares (n, `PRINTING_SHARES`).
+    """Return currents (n, nodes), A, that brake, wait and throw, from parameters in [0, 1].
 
+    `shares`, shape (n, `PRINTING_SHARES`), are the parameters: three current levels and two switching times.
     `largest` is the current limit, A; the slot lasts `duration`, and its dot is due at `arrival`, both in s.
     """
     low, high = np.array([0.0, 0.0, 0.3]), np.array([1.0, 0.6, 1.0])

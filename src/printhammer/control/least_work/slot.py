@@ -49,7 +49,7 @@ class SlotState:
     x: float
     v: float
     branch: int  # Mode code, as in `Strobes`, or -1 for none
-    memory: float  # As in `Strobes`, m
+    memory: float  # Memory of the pack, m, as in `Strobes`
     current: float  # Coil current, A
 
     @property

@@ -121,7 +121,7 @@ SPREAD: Final = (
 _USABLE: Final = 0.9
 _GAP: Final = 6
 """Largest gap of unusable rates that is tuned again, in rates; arbitrary: each rate takes some seconds."""
-_TRIES: Final = 4  # Most times that a rate is searched again, without the candidates that failed
+_TRIES: Final = 4  # Maximum number of times to search a rate again, without the candidates that failed
 _POOR: Final = 0.5  # Deviation, as a fraction of the limits, above which a requested rate is tuned again
 # Offsets of additional periods at which candidates are then searched, s
 _AROUND: Final = 1e-6 * np.arange(-60.0, 61.0, 15.0)

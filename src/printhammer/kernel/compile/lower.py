@@ -141,10 +141,10 @@ def _lanes() -> dict[str, Any]:
 def _execute_lanes(plain: dict[str, Any], vector: dict[str, Any]) -> dict[str, Any]:
     """Execute the templates of lanes, bound to laws without branches or calls.
 
-    Total force and step functions are those of the plain kernel, with :mod:`printhammer.kernel.lanes.math` in
-    place of :mod:`math`, the drive in closed form, the constants of a hammer as a tuple, and all functions
-    inlined. The functions that handle events are scalar and use the plain kernel. `plain` holds the names of
-    the plain templates, `vector` the laws for lanes and the choices.
+    Total force and step functions are those of the scalar kernel, with :mod:`printhammer.kernel.lanes.math`
+    in place of :mod:`math`, the drive in closed form, the constants of a hammer as a tuple, and all functions
+    inlined. The functions that handle events are scalar and use the scalar kernel. `plain` holds the names of
+    the templates of the scalar kernel, `vector` the laws for lanes and the choices.
     """
     scalar, vector = ({**names, "lane_math": _lane_math()} for names in (plain, vector))
 

@@ -24,7 +24,7 @@ The hook returns a function that waits until these entry points are compiled.
 """
 
 ENTRIES = ("run", "resample", "quadratures", "peaks", "members")
-"""Names of the entry points of the plain kernel, i.e. without lanes and variational equations."""
+"""Names of the entry points of the scalar kernel, i.e. without lanes and variational equations."""
 
 AHEAD = ("peaks", "quadratures", "resample")
 """Entry points that are usually needed after `run`, and may be compiled ahead in parallel."""
@@ -33,7 +33,7 @@ AHEAD = ("peaks", "quadratures", "resample")
 class Kernel:
     """Entry points of the kernel for one combination of laws, as Python functions.
 
-    The plain kernel has the entry points `run`, `resample`, `quadratures`, `peaks` and `members`, defined in
+    The scalar kernel has the entry points `run`, `resample`, `quadratures`, `peaks` and `members`, defined in
     its template modules. The kernels for lanes and for variational equations have a single entry point,
     `lanes` and `flow`. `label` describes the laws in messages.
     """
@@ -128,7 +128,7 @@ def _specialised(laws: Laws) -> Kernel:
 
 
 def variational(plain: Kernel, *, forced: bool) -> Kernel:
-    """Return the kernel of the variational equations for the laws of a plain kernel; entry point `flow`.
+    """Return the kernel of the variational equations for the laws of a scalar kernel; entry point `flow`.
 
     See :mod:`printhammer.kernel.variational.flow`. With `forced`, derivatives with respect to constants are
     computed. The kernel is separate, so that runs without derivatives compile nothing for them.

@@ -37,7 +37,7 @@ MODE_OF = (M.FREE, M.LOADING, M.UNLOADING, M.BACKSTOP)
 
 STAYS = -1
 LEAVES = -2
-"""Code returned in place of a pool: the member leaves the lanes, and the plain kernel repeats its run."""
+"""Code returned in place of a pool: the member leaves the lanes, and the scalar kernel repeats its run."""
 DONE = -3
 
 
@@ -267,7 +267,7 @@ def turn_in_pack(
     The rule is the one of :func:`printhammer.kernel.single.around.reversed_mode`. A member whose armature
     would rest leaves the lanes.
     """
-    # As in the plain kernel, oscillations too small to distinguish from rest would never end.
+    # As in the scalar kernel, oscillations too small to distinguish from rest would never end.
     still = R.STILL * control[1] * control[1] / control[0]
     inward = lane_acceleration(pool, i, t, x, 0.0, M.LOADING, 0.0) > 0.0
     if (inward and which == R.LOADING_POOL) or (RELOAD_ALONG_UNLOADING and which == R.UNLOADING_POOL):
@@ -366,7 +366,7 @@ def close_member(pool: Any, i: int, which: int, slot: Any, dots: Any, hammer: Ha
 def locate(
     pool: Any, i: int, which: int, hammer: Hammer, live: Drive, control: Control
 ) -> tuple[int, float, float, float]:
-    """Locate the event in a lane's latest step with the plain kernel; return code, time, position, velocity.
+    """Locate the event in a lane's latest step with the scalar kernel; return code, time, position, velocity.
 
     In the contact pool, w replaces the position. The code is NO_SWITCH if the step contains no event,
     UNRESOLVED if the step must be halved.

@@ -1,7 +1,7 @@
 """Event location in lanes: estimate the event, step to the estimate, and close the remainder.
 
 The quintic interpolant of the step that contains the event gives the estimate. The next step of the lane ends
-at the estimate, and a Taylor expansion closes the remainder. If that is not accurate enough, the plain kernel
+at the estimate, and a Taylor expansion closes the remainder. If that is too inaccurate, the scalar kernel
 locates the event.
 """
 

@@ -13,7 +13,7 @@ BLOCK = 16
 MANY_STEPS, SHORT = 2e4, 1e-12
 """Number of steps and ratio of step size to elapsed time at which a member leaves the lanes.
 
-In a runaway, steps become ever shorter without underflow; the plain kernel then determines the status.
+In a runaway, steps become ever shorter without underflow; the scalar kernel then determines the status.
 """
 
 STALLED = 200.0
@@ -124,7 +124,7 @@ DOT = 7
 """Column of the row of dot data of the open pack contact; -1 if no pack contact is open."""
 END = 8
 CAREFUL = 9
-"""Column of the flag that the plain kernel locates the next switching event."""
+"""Column of the flag that the scalar kernel locates the next switching event."""
 ATTEMPTS = 10
 SAVED_STEP = 11
 NEXT_TIME = 12

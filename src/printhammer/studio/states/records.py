@@ -139,7 +139,7 @@ def _record(table: Table, known: list[str]) -> Record:
         name, unit = headings[place]
         sources[quantity] = Source(place + 1)
         if unit[:1].isdigit() or unit[:1] in {"-", "+", "."}:
-            # What 1 stands for.
+            # The unit of the heading is an amount, such as "10 A": the value of a cell with the number 1.
             factor, unit = split(unit, QUANTITIES[quantity])
             sources[quantity] = Source(place + 1, factor, unit)
             headings[place] = Heading(name)
