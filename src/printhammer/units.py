@@ -88,7 +88,7 @@ def to_si(value: float, unit: str, si_unit: str) -> float:
     Returns
     -------
     float
-        Correctly rounded.
+        Value in `si_unit`, correctly rounded.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def factor_of(unit: str, si_unit: str) -> float:
     Raises
     ------
     InputError
-        Also for a unit whose zero differs from the zero of the SI unit, such as "degF".
+        As for `to_si`; also if the zero of the unit differs from the zero of the SI unit, as for "degF".
     """
     if _zero(unit):
         raise InputError.of("unit", unit, f"a multiple of {si_unit}")

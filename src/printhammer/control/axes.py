@@ -223,7 +223,7 @@ def tune_along(
     hammer, rate, driver, largest_current, progress, options
         As for `printhammer.tune`.
     axis : str
-        A name of `AXES`.
+        Name of the axis, a key of `AXES`.
     values : sequence of float or str
         Ascending values, SI, or text with units; at least two.
 

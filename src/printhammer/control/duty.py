@@ -6,7 +6,7 @@ B.
       C dT/dt  = f E(T) - (T - B) / R          winding, heat capacity C, thermal resistance R to the body
       C' dB/dt = (T - B) / R - (B - A) / R'    body, heat capacity C', R' to the ambient temperature A
 
-f is the dot rate and E(T) the heat of one dot (`dot_heat`, `heat_of`); with one mass, B = A. In the steady
+f is the dot rate and E(T) the coil heat per dot (`dot_heat`, `heat_of`); with one mass, B = A. In the steady
 state the winding is f E(T) (R + R') above ambient, so the largest rate at a limit L is (L - A) / (E(L) (R +
 R')): for a given limit it decreases linearly with the ambient temperature, whatever the rail and the driver.
 
@@ -14,7 +14,7 @@ Source: the lumped thermal network of any text on heat transfer. Validity: pulse
 the warming of the winding, so that their heat is averaged over time. Weakness: the winding has one
 temperature, whereas a real winding is hotter inside.
 
-Heat of one dot: the resistance of copper rises by 0.393 % per kelvin of its value at 20 degC. A pulse on a
+Coil heat per dot: the resistance of copper rises by 0.393 % per kelvin of its value at 20 degC. A pulse on a
 rail that is long compared with L / R draws less current through a warm winding and heats it less; a driver
 that regulates the current heats it more; a driver that regulates the energy of a dot heats a warm and a cold
 winding alike.
@@ -135,9 +135,9 @@ class ThermalDuty(Result, rows="ambient burst"):
     """Largest continuous rates of a coil, and the allowed bursts at higher rates."""
 
     coil: ThermalCoil = part("thermal model")
-    heat: DotHeat = part("heat of one dot")
+    heat: DotHeat = part("coil heat per dot")
     limit: float = scalar("degC", "temperature limit of the winding")
-    limit_heat: float = scalar("J", "heat of one dot at that temperature")
+    limit_heat: float = scalar("J", "coil heat per dot at the temperature limit")
     ambient: FloatArray = coordinate("degC", "ambient temperature", "ambient")
     rate: FloatArray = column(
         "Hz",
@@ -193,7 +193,7 @@ class ThermalDuty(Result, rows="ambient burst"):
         ]
         facts = [
             ("limit of the winding", f"{self.limit:g} °C"),
-            ("heat of one dot at the limit", f"{1e3 * self.limit_heat:.4g} mJ"),
+            ("coil heat per dot at the limit", f"{1e3 * self.limit_heat:.4g} mJ"),
             (
                 "driver on",
                 f"{1e3 * self.heat.on_time:.4g} ms a dot, at most {self.heat.most:.4g} Hz"
@@ -222,7 +222,7 @@ def thermal_duty(
     Parameters
     ----------
     heat : float, str or DotHeat
-        Heat of one dot with the winding at 20 degC, J or text with a unit; or a function of the winding
+        Coil heat per dot with the winding at 20 degC, J or text with a unit; or a function of the winding
         temperature, see `printhammer.control.duty.heat_of`.
     thermal_resistance : float or str
         Thermal resistance from the winding to ambient, or to the body if there is one, K/W.

@@ -209,11 +209,11 @@ class SineForce(Drive):
     Parameters
     ----------
     amplitude
-        N.
+        Amplitude of the force, N.
     frequency
-        Hz.
+        Frequency of the force, Hz.
     phase
-        Phase at t = 0, rad.
+        Phase of the force at t = 0, rad.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Measured frequency-time maps: displacement records at several firing rates, from CSV, NetCDF or Zarr.
 
-Hendriks (1983) hoped for them: "It is hoped that similar plots, derived from experimental displacement plots,
-will become available in the future."
+Hendriks (1983) suggested such maps: "It is hoped that similar plots, derived from experimental displacement
+plots, will become available in the future."
 
 Two layouts of CSV tables are accepted, each with units in the heading, SI or any other:
 

@@ -3,13 +3,13 @@
 | key | |
 |---|---|
 | `hammer`, `hammer_fingerprint` | name of the hammer and fingerprint of its constants |
-| `drive`, `drive_fingerprint` | the drive in words, and its fingerprint, where there is one drive |
+| `drive`, `drive_fingerprint` | description and fingerprint of the drive, for results with one drive |
 | `waveform` | waveform of every firing, as the ``[waveform]`` table of a drive file, on one line of TOML |
 | `overlap` | rule for overlapping pulses, "add" or "replace" |
 | `period` | time between the firings of a regime, s |
 | `scheme` | the integration scheme of a single run |
 | `tolerance` | error allowed in one step |
-| `status` | how the run ended, where there is one run |
+| `status` | outcome of the run, for results of a single run |
 | `printhammer`, `numpy`, `numba`, `scipy` | versions on which the bits depend |
 
 Keys that do not apply to a result are omitted; the versions are always present.

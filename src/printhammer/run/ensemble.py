@@ -353,7 +353,7 @@ class Ensemble:
         Returns
         -------
         EnsembleResult
-            With a status for each member; a run that ends early is not an exception.
+            Results with a status for each member; a run that ends early raises no exception.
         """
         if engine not in ENGINES:
             raise InputError.of("engine", engine, f"one of {', '.join(ENGINES)}")

@@ -385,7 +385,7 @@ class Fired:
     Attributes
     ----------
     drives : sequence of Drive
-        The drives themselves.
+        Drives of all members.
     forms, form_of : list of Form; int array, shape (members,)
         Distinct forms, and the index for each member.
     firings : Ragged

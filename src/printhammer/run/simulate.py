@@ -80,7 +80,7 @@ def simulate(
     Returns
     -------
     Motion
-        With a status; a run that ends early is not an exception.
+        Motion with a status; a run that ends early raises no exception.
     """
     if scheme not in SCHEMES:
         raise InputError.of("scheme", scheme, f"one of {', '.join(SCHEMES)}")

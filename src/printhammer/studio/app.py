@@ -40,7 +40,7 @@ def application(guard: Guard, shelf: Shelf, crew: Crew) -> Starlette:
     guard : Guard
         Access control.
     shelf : Shelf
-        Hammers on offer.
+        Hammers that the studio offers.
     crew : Crew
         Workers of all pages.
     """

@@ -51,7 +51,7 @@ class Guard:
         headers : mapping
             Headers of the request.
         token : str, optional
-            Token in its address; None if none is required.
+            Token in the address of the request; None if the request needs no token.
         origin : bool, optional
             Whether the request must come from a page of this server.
         """

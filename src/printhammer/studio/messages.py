@@ -25,7 +25,7 @@ def read_message(text: str, shelf: Shelf | None = None) -> tuple[str, int, Any]:
     Raises
     ------
     ProtocolError
-        The page never sends such a message.
+        The message is not one that the page can send.
     """
     if len(text) > LARGEST_MESSAGE:
         raise ProtocolError(f"the message has {len(text)} characters, expected at most {LARGEST_MESSAGE}")

@@ -49,9 +49,9 @@ class Session:
     Parameters
     ----------
     send : callable
-        Sends a frame to the page and returns when it is sent; raises if the page is gone.
+        Sends a frame to the page and returns when it is sent; raises if the page has been closed.
     shelf : Shelf, optional
-        Hammers on offer; by default the shipped ones.
+        Hammers that the studio offers; by default the shipped hammers.
     crew : Crew, optional
         Workers; by default private workers that end with the session.
     """
@@ -89,7 +89,7 @@ class Session:
         Raises
         ------
         ProtocolError
-            The page never sends such a message.
+            The message is not one that the page can send.
         """
         kind, serial, content = read_message(text, self._shelf)
         with self._change:

@@ -57,8 +57,8 @@ def run_dask(
     Raises
     ------
     InputError
-        The scheduler or the last worker is gone, a worker has other software versions or cannot do the work,
-        or `write` raises the error.
+        The scheduler is unreachable, no worker is left, a worker has other software versions or cannot do the
+        work, or `write` raises the error.
     """
     tasks = _Tasks(client, plan)
     try:

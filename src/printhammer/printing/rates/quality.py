@@ -316,7 +316,7 @@ def quality(
     Returns
     -------
     Quality
-        The dots, their spreads, wear and energy; with a status.
+        Report with the dots, their spreads, wear, energy and a status.
     """
     slot_rate = read_positive(rate, "Hz", "rate")
     slot_pitch = read_positive(pitch, "m", "pitch")

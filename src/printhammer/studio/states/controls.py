@@ -93,10 +93,10 @@ def describe(hammer: Hammer) -> dict[str, Any]:
     Returns
     -------
     dict
-        `name`, `title`, `note`, `constants` (a list), `open` (those of the coil that the file leaves open),
-        `rail` (what it is first driven by, or None), `combined` (controls that move several constants),
-        `waveform` (shape and constants, or None), `start` (what to fire a hammer with that has none, else
-        empty), `places`.
+        `name`, `title`, `note`, `constants` (a list), `open` (coil constants that the file leaves open),
+        `rail` (default rail driver, or None), `combined` (controls that move several constants),
+        `waveform` (shape and constants, or None), `start` (entries of the opening state that differ from the
+        default), `places`.
     """
     constants = []
     for key, constant in hammer.constants.items():
@@ -137,7 +137,7 @@ def _control(hammer: Hammer, constant: Constant, span: Range) -> dict[str, Any]:
 
 
 def opening_of(hammer: Hammer) -> dict[str, Any]:
-    """Return the entries of a state for a hammer without a pulse, or with other time scales."""
+    """Return the entries of the opening state of a hammer without a pulse, or with other time scales."""
     if hammer.waveform is not None:
         return OPENINGS.get(hammer.name, {})
     quantity = "current" if "magnet" in hammer.parts else "force"

@@ -21,13 +21,13 @@ def dropped(
     Parameters
     ----------
     serial : int
-        Number of the question.
+        Serial number of the question.
     name, text : str
         Name and text of the file.
     columns : list of tuple, optional
         Quantity and unit of each column of a table, if the page asked for them.
     shelf : Shelf, optional
-        Hammers on offer.
+        Hammers that the studio offers.
 
     Returns
     -------
@@ -38,7 +38,7 @@ def dropped(
     Raises
     ------
     InputError
-        The file is none of these.
+        The file is neither a state, nor a hammer file, nor a table of curves.
     """
     where = name[-80:] or "dropped file"
     if name.lower().endswith(".json"):

@@ -27,7 +27,7 @@ def taken(content: Any, shelf: Shelf) -> Told:
     content
         Content of a link or a file; missing entries are allowed.
     shelf : Shelf
-        Hammers on offer.
+        Hammers that the studio offers.
     """
     if not isinstance(content, dict):
         return {}, ["a state is expected to be a table"]

@@ -1,7 +1,7 @@
 """Measured curves from oscilloscopes and spreadsheets: time, and the quantities of `QUANTITIES`.
 
-Tables are read as everywhere, see `printhammer.support.tables`. Where heading and units do not say what a
-column holds, it is asked for. A curve keeps its times before the firing, which is at time 0.
+Tables are read by `printhammer.support.tables`. If heading and unit do not identify the quantity of a column,
+the page asks the user for it. Times before the firing, which is at time 0, are kept.
 """
 
 from __future__ import annotations
@@ -54,20 +54,20 @@ def read_record(text: str, where: str, told: list[tuple[str, str]] | None = None
     text : str
         The table.
     where : str
-        What messages call it.
+        Name of the table in error messages.
     told : list of tuple, optional
-        What each column holds, see `QUANTITIES`, or nothing, and its unit, or what 1 stands for, such as
-        "10 A"; by default as its heading says.
+        Quantity of each column, from `QUANTITIES` or empty, and its unit, or the value of the number 1, such
+        as "10 A"; by default from the heading.
 
     Returns
     -------
     Record or list of Column
-        The curves, or the columns where it has to be asked what these hold.
+        The curves; or the columns, if the page has to ask the user for their quantities.
 
     Raises
     ------
     InputError
-        It is no such table.
+        The text is not a table of measured curves.
     """
     table = layout_of(with_line_ends(text.removeprefix("\ufeff")), where)
     if not any(is_number(cell.strip()) for row in table.rows[:1] for cell in row):

@@ -56,7 +56,7 @@ class Shelf:
         Raises
         ------
         InputError
-            The hammer is not on offer.
+            The studio offers no hammer with this name.
         """
         if self.guest is not None and name == self.guest.name:
             return self.guest

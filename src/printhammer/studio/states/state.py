@@ -193,7 +193,7 @@ def read_state(content: Any, shelf: Shelf | None = None) -> State:
     content
         Content of the message.
     shelf : Shelf, optional
-        Hammers on offer; by default the shipped ones.
+        Hammers that the studio offers; by default the shipped hammers.
 
     Raises
     ------
