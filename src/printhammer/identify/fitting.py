@@ -19,7 +19,7 @@ KINDS: Final = ("magnet", "solenoid", "spring", "pack", "backstop", "motion", "c
 def fit(
     kind: str, path: str | Path | Sequence[str | Path], *, hammer: Hammer | None = None, **options: Any
 ) -> Fit:
-    """Fit constants to a measurement.
+    """Fit constants of a hammer to a measurement.
 
     Parameters
     ----------

@@ -40,7 +40,7 @@ class Guard:
 
     @property
     def address(self) -> str:
-        """Address of the page."""
+        """Address of the studio page, with the token."""
         return f"http://{HOSTS[0]}:{self.port}/?token={self.token}"
 
     def refuse(self, headers: Mapping[str, str], token: str | None = None, origin: bool = False) -> str:

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from printhammer.chaos.strobe.train import State
 
 STRAND: Final = 16
-"""Number of values in a strand."""
+"""Number of successive parameter values in a strand."""
 
 SAME: Final = 1e-3
 """Largest distance, in half-widths of the strobe window, of periodic orbits that count as the same."""

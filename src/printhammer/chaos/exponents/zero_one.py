@@ -30,7 +30,7 @@ from printhammer.run.regime import Firing, Regime
 from printhammer.support.arrays import FloatArray
 
 ANGLES: Final = 100
-"""Default number of angles c."""
+"""Default number of random angles c of the 0-1 test."""
 
 RANGE: Final = (math.pi / 5.0, 4.0 * math.pi / 5.0)
 """Range of the angles c, rad; closer to 0 or pi, short cycles resonate."""

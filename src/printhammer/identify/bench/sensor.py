@@ -167,7 +167,7 @@ NONE: Final = "none"
 """Text for an unlimited bandwidth."""
 
 PARTS: Final = ("noise", "resolution", "offset")
-"""Settings that every quantity has."""
+"""Settings that every measured quantity has."""
 
 _OTHERS: Final = ("exact", "sampling_rate", "bandwidth", "outliers")
 

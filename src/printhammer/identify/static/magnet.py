@@ -167,7 +167,7 @@ def fit_magnet(
     robust: bool = True,
     columns: str | None = None,
 ) -> Fit:
-    """Fit the magnet, together with the spring.
+    """Fit the constants of magnet and spring to measured forces.
 
     The table has the columns ``displacement``, ``current`` and ``force``, of magnet and spring together.
     `spring` is an optional table of the spring alone, with the columns ``displacement`` and ``force``; it

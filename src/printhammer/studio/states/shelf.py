@@ -14,7 +14,7 @@ Told = tuple[dict[str, Any], list[str]]
 """Valid entries of a state, and one sentence for each invalid entry."""
 
 DEFAULT: Final = "hendriks-1983"
-"""Default hammer of a studio."""
+"""Name of the hammer that a studio page displays by default."""
 
 
 class Shelf:

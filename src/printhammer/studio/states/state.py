@@ -1,4 +1,4 @@
-"""State of a studio: hammer, changes, drive, and displayed views.
+"""State of a studio page: hammer, changes, drive, and displayed views.
 
 The browser sends the state, keeps it in its history and writes it into the address; the server stores none.
 """
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from printhammer.drive.base import Overlap
 
 VIEWS: Final = ("motion", "forces", "loops", "phase", "sketch", "map", "strobe", "energy", "line")
-"""Names of the views."""
+"""Names of the views that a studio page can display."""
 
 
 class ProtocolError(Exception):
@@ -64,7 +64,7 @@ class State(Declared):
 
     @cached_property
     def changed(self) -> Hammer:
-        """Hammer with its changed constants.
+        """Hammer with the user's changes of its constants.
 
         Raises
         ------
