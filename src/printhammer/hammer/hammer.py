@@ -41,7 +41,7 @@ def shipped() -> tuple[str, ...]:
 
 
 def load(name_or_path: str | Path) -> Hammer:
-    """Load a hammer.
+    """Load a shipped hammer by name, or a hammer file by path.
 
     Parameters
     ----------

@@ -87,7 +87,7 @@ class Motion(Result, fields=False):
 
     @property
     def drive(self) -> Drive:
-        """Drive that was applied."""
+        """Drive under which the motion was simulated."""
         return self._problem.drive
 
     @property

@@ -39,7 +39,7 @@ History = tuple[int, ...]
 
 
 def checked_size(gaps: int, reach: int) -> tuple[int, int]:
-    """Validate the number of gaps and the reach."""
+    """Validate the number of gaps and the reach of a compensation table."""
     for name, value, most in (("history", gaps, MOST_GAPS), ("reach", reach, MOST_REACH)):
         if isinstance(value, bool) or not 1 <= value <= most:
             raise InputError.of(name, value, f"a whole number from 1 to {most}")
@@ -284,7 +284,7 @@ _ROUNDS: Final = 7  # Rounds; each subdivides the bracketing interval of the pre
 
 
 def checked_driver(driver: str) -> Driver:
-    """Validate the name of a driver."""
+    """Return the name of a driver, or raise InputError if there is no such driver."""
     if driver not in DRIVERS:
         raise InputError.of("driver", driver, f"{', '.join(DRIVERS[:-1])} or {DRIVERS[-1]}")
     return driver  # type: ignore[return-value]

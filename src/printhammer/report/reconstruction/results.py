@@ -126,7 +126,7 @@ class Failing(_Table):
 
 
 class Search(_Table):
-    """Searches that found the shipped hammer."""
+    """Record of the searches that found the shipped hammer."""
 
     format: Literal[1] = Field(description="1, the version of the format")
     shipped: str = Field(description="the fingerprint of the shipped hammer")

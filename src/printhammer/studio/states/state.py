@@ -123,7 +123,7 @@ class State(Declared):
 
     @cached_property
     def drive(self) -> PulseTrain:
-        """Drive that the settings describe."""
+        """Drive that the state describes."""
         if not self.pattern:
             return PulseTrain(self.fired, rate=self.rate, pulses=self.pulses, overlap=self.overlap)
         times = [slot / self.rate for slot, mark in enumerate(self.pattern) if mark == "1"]
