@@ -7,7 +7,7 @@ from tests.hammers import crude
 
 import printhammer as ph
 from printhammer.control.table.compensation import CompensationTable
-from printhammer.control.table.drive import COLUMNS
+from printhammer.control.table.drive import COLUMNS, driven_by, print_pulse
 from printhammer.control.table.report import PERTURBATIONS, SETS, STRATEGIES, between, random_patterns
 from printhammer.printing.dots.nominal import nominal
 from printhammer.printing.dots.strategy import slot_times
@@ -81,6 +81,22 @@ def test_the_current_keeps_to_its_bound_also_with_brake_pulses() -> None:
         drive = found.drive(hammer, SLOTS, rate)
         times = np.linspace(0.0, float(drive.times[-1]) + 1e-3, 200_001)
         assert np.abs(drive.value(times)).max() <= 1.3
+
+
+@pytest.mark.parametrize("driver", ["switch", "bridge"])
+def test_a_driver_that_saturates_at_the_limit_may_be_on_for_longer(driver: str) -> None:
+    """Its current never exceeds the limit, however wide the pulse; dots that lose energy need that."""
+    hammer = ph.load("hendriks-1983")
+    driven = driven_by(hammer, driver, 2.0)
+    own, widest = print_pulse(driven, 2.0)
+    assert own.peak == pytest.approx(2.0, rel=1e-6)
+    assert widest == pytest.approx(2.0 * own.width, rel=1e-12)
+    rate = 1.5 * 815.0
+    table = ph.tune(hammer, rate=rate, driver=driver, history=1)
+    assert table.width.max() > 1.2 * own.width
+    assert table.deviation.max() < 0.1
+    drive = table.strategy(hammer)(hammer, [SLOTS], rate)[0]
+    assert drive.peak <= 2.0
 
 
 def test_a_rate_at_which_nothing_prints() -> None:
