@@ -181,10 +181,10 @@ def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
             key="waveform",
             expected=f"at most {largest:g} A, or a larger largest_current (--largest-current)",
         )
-    if peak_of(of_width(pulse, WIDEST * width)) <= largest * (1.0 + ROUNDING):
-        # A switch saturates at the limit, which leaves no margin at any width; `clearance` allows for tails.
-        return pulse, WIDEST * width
     bound = max(peak, largest * (1.0 - MARGIN))
+    if peak == bound:
+        # A pulse that saturates at the limit has no margin at any width; `clearance` allows for the tails.
+        bound = largest * (1.0 + ROUNDING)
     halvings = _HALVINGS if pulse.quantity == "current" else _FEWER
     return pulse, widest(pulse, bound, width, WIDEST * width, halvings, peak_of)
 
