@@ -121,6 +121,9 @@ def pattern_of(history: Sequence[int], before: Sequence[int] = ()) -> tuple[int,
 
 
 ROUNDING: Final = 1e-9  # Relative rounding tolerance of a bound
+# Largest width of a pulse whose current saturates at the limit, as a multiple of the hammer's own; rows of
+# the shipped hammer need 1.36, and a wider range makes the grid of starts coarser
+_SATURATED: Final = 1.5
 _HALVINGS: Final = 50  # Bisections of a width: about the number of bits in a double
 _FEWER: Final = 12  # Bisections of a width for a driver, each of which needs a simulation
 _SAMPLES: Final = 4001  # Samples of a decaying pulse; arbitrary
@@ -182,11 +185,16 @@ def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
             expected=f"at most {largest:g} A, or a larger largest_current (--largest-current)",
         )
     bound = max(peak, largest * (1.0 - MARGIN))
-    if peak == bound:
-        # A pulse that saturates at the limit has no margin at any width; `clearance` allows for the tails.
-        bound = largest * (1.0 + ROUNDING)
     halvings = _HALVINGS if pulse.quantity == "current" else _FEWER
-    return pulse, widest(pulse, bound, width, WIDEST * width, halvings, peak_of)
+    found = widest(pulse, bound, width, WIDEST * width, halvings, peak_of)
+    if pulse.quantity == "current" and peak == bound:
+        # A current that saturates at the limit has no margin at any width. It may last longer where the next
+        # pulse need not wait longer for its tail.
+        longer = _SATURATED * width
+        waits = (clearance(hammer, pulse, each, largest) for each in (found, longer))
+        if peak_of(of_width(pulse, longer)) <= largest * (1.0 + ROUNDING) and len(set(waits)) == 1:
+            found = longer
+    return pulse, found
 
 
 def fading(hammer: Hammer, pulse: Waveform, share: float) -> float:
