@@ -174,7 +174,7 @@ def test_markdown_has_all_rows(report: Report) -> None:
         (["--peers", "nowhere"], "peers = nowhere: expected a folder"),
         (["--threads", "many"], "whole number"),
         (["--out", "nowhere/at/all.json"], "folder that exists"),
-        (["--out", "x.json", "--out", "x.json"], "written twice"),
+        (["--out", "x.json", "--out", "x.json"], "occurs twice"),
     ],
 )
 def test_bad_input_is_refused_before_any_work(

@@ -60,7 +60,7 @@ def test_a_motion_that_forgets_its_past_is_drawn_without_its_exponents(found: Ly
     drawn = gone.plot()
     drawn.draw_without_rendering()
     assert all(x.size == 0 for x, _y in lines(drawn, "running"))
-    assert "without velocity" in words(drawn)
+    assert "at zero velocity" in words(drawn)
 
 
 def test_many_trains(chart: LyapunovChart) -> None:

@@ -212,4 +212,4 @@ def test_a_bent_spring_is_rejected(tmp_path: Path) -> None:
     u = columns["displacement"] / 1e-4
     noise = 0.02 * np.random.default_rng(4).standard_normal(len(u))
     columns["force"] = columns["force"] + 0.1 * u * u + noise
-    assert "straight" in fit_spring(write(tmp_path / "s.csv", columns), position=lab.B).rejected
+    assert "linear" in fit_spring(write(tmp_path / "s.csv", columns), position=lab.B).rejected

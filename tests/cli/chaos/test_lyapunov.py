@@ -72,7 +72,7 @@ def test_a_run_that_stops_is_told(cli: Callable, tmp_path: Path) -> None:
         (("--period", "1 ms", "--from", "1 ms", "--to", "2 ms"), "--period"),
         (("--from", "1 ms"), "--to"),
         (("--to", "1 ms"), "--from"),
-        (("--from", "2 ms", "--to", "1 ms"), "longer"),
+        (("--from", "2 ms", "--to", "1 ms"), "above"),
         (("--from", "1 ms", "--to", "2 ms", "--steps", "1"), "--steps"),
         (("--period", "1 ms", "--steps", "5"), "--steps"),
         (("--period", "1 ms, 2 kg"), "--period"),
