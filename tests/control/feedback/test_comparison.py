@@ -19,7 +19,7 @@ from printhammer.control.feedback.plant import driver_of
 from printhammer.drive.file import read_drive
 from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.pieces import simulate_pieces
-from printhammer.printing.dots.strategy import eight_slot_patterns, slots_of
+from printhammer.printing.dots.strategy import eight_slot_patterns, slot_times, slots_of
 from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.variability import Perturbation, perturbed
 
@@ -245,6 +245,21 @@ def test_hammers_that_cannot_be_driven_are_refused() -> None:
 def test_bad_gaps_are_refused(gaps: list[float]) -> None:
     with refused("gaps"):
         ph.feedback(hammers.crude(), 1e3, gaps=gaps)
+
+
+@pytest.mark.slow
+def test_dots_that_follow_a_landing_are_within_limits() -> None:
+    """The backstop of the shipped hammer is soft: pressed against it, the armature is thrown when let go."""
+    hammer = ph.load("hendriks-1983")
+    controller = Controller(hammer, driver_of(hammer))
+    single, way = controller.single, FeedbackStrategy(controller)
+    for gap in (0.88e-3, 0.97e-3, 1.05e-3, 1.15e-3, 1.3e-3):
+        dots = ph.simulate(hammer, way(hammer, [(0, 1, 2, 3)], 1.0 / gap)[0]).dots
+        force = np.array([dot.peak_force for dot in dots], dtype=float) / single.force - 1.0
+        touched = np.array([dot.fired_at + (dot.flight_time or np.nan) for dot in dots])
+        late = touched - slot_times((0, 1, 2, 3), 1.0 / gap) - single.flight_time
+        assert np.abs(force).max() < 0.1
+        assert np.abs(late).max() < 50e-6
 
 
 @pytest.mark.slow
