@@ -239,7 +239,7 @@ def files(here: Path) -> Path:
         ("ship search.jsonl search.jsonl", "search.jsonl, line 1: constants = None, expected the constants"),
         ("ship none.jsonl search.jsonl", "none.jsonl: expected judged candidates, and there are none"),
         ("ship judged.jsonl notes.txt", "notes.txt, line 1: expected the heading of the log of a search"),
-        ("ship judged.jsonl search.jsonl --out notes.txt", "notes.txt: expected a folder"),
+        ("ship judged.jsonl search.jsonl --out notes.txt", "notes.txt: expected a writable folder"),
         ("ship judged.jsonl search.jsonl --name ../a", "--name = '../a', expected a short name"),
         ("ship judged.jsonl search.jsonl --name ''", "--name = '', expected a short name"),
         ("ship judged.jsonl search.jsonl --core-hours inf", "--core-hours = inf, expected a finite number"),
@@ -259,7 +259,7 @@ def test_bad_input_is_one_sentence(refused: Callable, words: str, said: str) -> 
 def test_a_family_needs_a_folder(cli: Callable) -> None:
     done = cli("family", "judged.jsonl", "--out", "notes.txt")
     assert done.status == 2
-    assert "notes.txt: expected a folder" in done.err
+    assert "notes.txt: expected a writable folder" in done.err
 
 
 @pytest.mark.slow
