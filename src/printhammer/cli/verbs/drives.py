@@ -57,7 +57,7 @@ def energy(
     pulses: bool = opt.switch(
         "Use only pulses of the hammer's waveform, and optimise their firing times and widths."
     ),
-    supply: bool = opt.switch("Also show the dots of the burst with all currents scaled by 0.97 to 1.03."),
+    supply: bool = opt.switch("Show the dots of the burst for currents scaled by 0.97 to 1.03 as well."),
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:

@@ -144,7 +144,7 @@ def begin_member(
 
 @inlined
 def step_block(which: int, pool: Any, begin: int) -> None:
-    """Take one step in every lane of a block, including idle lanes, with the function of the pool."""
+    """Advance every lane of a block by one step, idle lanes included, with the step function of its pool."""
     if which == R.FREE_POOL:
         free_block(pool, begin)
     elif which == R.LOADING_POOL:

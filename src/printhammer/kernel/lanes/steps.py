@@ -132,7 +132,7 @@ def start_at(pool: Any, i: int) -> State:
 
 @inlined
 def timed_step(pool: Any, i: int, start: State, h: float, law: ForceLaw) -> tuple[float, State, float, bool]:
-    """Take a step of `h` [s] off the backstop, shortened to end at the next edge of the drive at the latest.
+    """Advance a lane off the backstop by `h` [s], or to the next edge of the drive if that is earlier.
 
     Returns
     -------
@@ -154,7 +154,7 @@ def timed_step(pool: Any, i: int, start: State, h: float, law: ForceLaw) -> tupl
 
 @compiled
 def free_block(pool: Any, begin: int) -> None:
-    """Take one step in each lane of a block whose members are in free flight."""
+    """Advance each lane of a block by one step in free flight."""
     pool = pool[begin:]
     for i in range(BLOCK):
         start = start_at(pool, i)
@@ -180,7 +180,7 @@ def free_block(pool: Any, begin: int) -> None:
 
 @compiled
 def loading_block(pool: Any, begin: int) -> None:
-    """Take one step in each lane of a block whose members are on the loading branch of the pack."""
+    """Advance each lane of a block by one step on the loading branch of the pack."""
     pool = pool[begin:]
     for i in range(BLOCK):
         start = start_at(pool, i)
@@ -195,7 +195,7 @@ def loading_block(pool: Any, begin: int) -> None:
 
 @compiled
 def unloading_block(pool: Any, begin: int) -> None:
-    """Take one step in each lane of a block whose members are on the unloading branch of the pack."""
+    """Advance each lane of a block by one step on the unloading branch of the pack."""
     pool = pool[begin:]
     for i in range(BLOCK):
         start = start_at(pool, i)
@@ -222,7 +222,7 @@ def stiffness(w: float, hammer: Any) -> float:
 
 @compiled
 def contact_block(pool: Any, begin: int) -> None:
-    """Take one step, in regularised variables, in each lane of a block whose members are in the backstop."""
+    """Advance each lane of a block by one step in the backstop, in regularised variables."""
     pool = pool[begin:]
     for i in range(BLOCK):
         start = start_at(pool, i)

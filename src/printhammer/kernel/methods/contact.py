@@ -242,7 +242,7 @@ def electric_in_contact(
 def advance_contact(
     start: ContactState, h: float, t_next: float, hammer: Hammer, drive: Drive, control: Control
 ) -> tuple[int, ContactState, float, Electric]:
-    """Take one accepted step in the backstop that ends at the first switching event or at time `t_next` [s].
+    """Integrate over one accepted step in the backstop, up to the first switching event or `t_next` [s].
 
     Returns
     -------

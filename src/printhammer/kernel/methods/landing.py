@@ -51,7 +51,7 @@ def takes_velocity(mode: int) -> bool:
 def plain_step(
     t: float, x: float, v: float, a: float, h: float, law: ForceLaw
 ) -> tuple[float, float, float, float, float]:
-    """Take a step of `h` [s]: by DOP853 if the force depends on the velocity, else by Runge-Kutta-Nystrom."""
+    """Compute a step of `h` [s], by DOP853 if the force depends on velocity, else by Runge-Kutta-Nystrom."""
     if takes_velocity(law.mode):
         return time_step(t, x, v, a, h, law)
     return nystrom_step(t, x, v, a, h, law)
@@ -61,7 +61,7 @@ def plain_step(
 def whole_step(
     t: float, x: float, v: float, a: float, h: float, law: ForceLaw
 ) -> tuple[float, float, float, float, float, Electric, float]:
-    """Take a step like `plain_step`; return also the electric state and its normalised error estimate."""
+    """Compute `plain_step` with the electric state and its normalised error estimate as further results."""
     if HAS_CIRCUIT:
         return whole_time_step(t, x, v, a, h, law)
     x1, v1, a1, error_x, error_v = plain_step(t, x, v, a, h, law)
@@ -291,7 +291,7 @@ def first_switch(
 def advance(
     start: State, h: float, t_next: float, law: ForceLaw, peak: float, control: Control
 ) -> tuple[int, State, float, Electric]:
-    """Take one accepted step off the backstop that ends at the first switching event or at time `t_next`.
+    """Integrate over one accepted step off the backstop, up to the first switching event or `t_next` [s].
 
     Returns
     -------

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def nystrom_step(
     t0: float, x0: float, v0: float, a1: float, h: float, law: ForceLaw
 ) -> tuple[float, float, float, float, float]:
-    """Take a Runge-Kutta-Nystrom step of `h` [s] from a state whose acceleration is `a1` [m/s^2].
+    """Compute a Runge-Kutta-Nystrom step of `h` [s] from a state with acceleration `a1` [m/s^2].
 
     Returns
     -------

@@ -47,7 +47,7 @@ def stillness(control: Any) -> float:
 
 @inlined
 def take_step(state: State, setup: Setup, t_next: float, nodes: Any) -> tuple[int, int]:
-    """Take one step, which ends at `t_next` [s] at the latest, with the method for the present mode.
+    """Integrate over one step, up to `t_next` [s] at most, with the method of the current mode.
 
     Returns the switching event that ends the step, or `HOLDS`, and the status of the run.
     """
@@ -83,7 +83,7 @@ def circuit_is_quiet(state: State, setup: Setup) -> bool:
 
 @inlined
 def backstop_step(state: State, setup: Setup, t_next: float, still: float, nodes: Any) -> int:
-    """Take a step in the backstop in regularised variables; return the switching event that ends it."""
+    """Integrate over one step in the backstop, in regularised variables; return the event that ends it."""
     hammer, control, live = setup.hammer, setup.control, setup.train.live
     if state[C.ENTERED] != 0.0:
         rate_in_backstop(state, setup)
@@ -198,7 +198,7 @@ def step_at_rest(state: State, setup: Setup, t_next: float, nodes: Any) -> int:
 
 @inlined
 def smooth_step(state: State, setup: Setup, t_next: float) -> tuple[int, int]:
-    """Take a step off the backstop; return the switching event that ends it, and the status of the run."""
+    """Integrate over one step off the backstop; return the event that ends the step, and the run status."""
     hammer, control, bounds = setup.hammer, setup.control, setup.bounds
     mode, h = int(state[C.MODE]), state[C.STEP]
     fresh = int(state[C.STARTED]) != mode
