@@ -218,6 +218,10 @@ def test_a_module_computes_many_runs(name: str, tmp_path: Path) -> None:
                 web = computed()
             np.testing.assert_array_equal(web.status, machine.status)
             np.testing.assert_allclose(web.x, machine.x, rtol=0.0, atol=1e-6 * np.ptp(machine.x))
+            assert web.strobes is not None
+            assert machine.strobes is not None
+            for found, expected in ((web.strobes.x, machine.strobes.x), (web.strobes.v, machine.strobes.v)):
+                np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-11 * np.ptp(expected))
             for column in ("flight_time", "impact_speed", "peak_force"):
                 found, expected = getattr(web.dots, column), getattr(machine.dots, column)
                 np.testing.assert_allclose(found, expected, rtol=1e-11)

@@ -148,7 +148,10 @@ def longest_step(mode: int, memory: float, peak: float, work: Any, setting: Sett
 def column_step(
     length: float, columns: Any, work: Any, mode: int, memory: float, peak: float, setting: Setting
 ) -> None:
-    """Integrate state and tangent columns over one step of `length`, in t [s] or s, from row START of `work`."""
+    """Integrate state and tangent columns over one step of `length`, in t [s] or s, from row START of `work`.
+
+    `s` is the regularised time of the backstop.
+    """
     count = V.FIRST_COLUMN + CHANGING * columns.shape[1]
     if HAS_CIRCUIT:
         count = work.shape[1]
