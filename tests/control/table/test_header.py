@@ -132,6 +132,7 @@ def test_pulses_that_touch_do_not_overlap_in_whole_ticks(seed: int) -> None:
             each = getattr(whole, name)
             assert np.abs(each / tick - np.rint(each / tick)).max() < 1e-6
             assert np.abs(each - getattr(exact, name)).max() <= 2.5 * tick
+            np.testing.assert_array_equal(getattr(whole.quantised(tick), name), each)
         # The current of the widest pulse may be the largest that is allowed.
         widest = max(float(exact.width.max()), float(exact.brake_width.max()))
         assert max(float(whole.width.max()), float(whole.brake_width.max())) <= widest + 1e-9
