@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from measured import MOTION, Cell, Column, read, write
-from tables import tuned
+from tables import finite, tuned
 
 import printhammer as ph
 from printhammer.control.table.compensation import CompensationTable
@@ -71,15 +71,22 @@ def measure(hammer: ph.Hammer, units: list[ph.Hammer], rate: float, kept: Path |
         safe = ph.safe_rate(
             hammer, fired.strategy(hammer), last=float(whole.rates[-1]), tolerance=DISPLAY_TOLERANCE
         )
-        row: list[Cell] = ["exact" if tick is None else tick, float(safe.rate)]
+        row: list[Cell] = ["exact" if tick is None else tick, finite(safe.rate)]
         row.append(whole.size() if tick is None else whole.size(tick))
         for table in ticked.values():
             good = printed(units, hammer, table, rate).judgement
             share = good.good.sum() / good.wanted.sum()
-            row += [worst(printed([hammer], hammer, table, rate)), 100.0 * float(share)]
+            row += [finite(worst(printed([hammer], hammer, table, rate))), 100.0 * float(share)]
         rows.append(row)
         print(*row, flush=True)
     return rows
+
+
+def known(ticks: list[float], rows: list[list[Cell]], column: int) -> tuple[list[float], list[float]]:
+    """Return the ticks at which a column has a number, and the numbers."""
+    points = [(tick, row[column]) for tick, row in zip(ticks, rows, strict=True)]
+    numbers = [(tick, value) for tick, value in points if isinstance(value, float)]
+    return [tick for tick, _ in numbers], [value for _, value in numbers]
 
 
 def curves(path: Path) -> None:
@@ -91,13 +98,13 @@ def curves(path: Path) -> None:
     with style.in_style():
         figure = style.new_figure(3.2)
         left, right = figure.subplots(1, 2)
-        left.plot(ticks, [row[1] for row in rows], color=style.BLUE, marker="o")
+        left.plot(*known(ticks, rows, 1), color=style.BLUE, marker="o")
         left.axhline(safe, color=style.MUTED, linestyle="--")
         left.annotate("open loop", (ticks[-1], safe), ha="right", va="bottom", fontsize=style.SMALL)
         left.set_ylim(0.0, None)
         left.set_ylabel("Safe rate of a table over all rates  [Hz]")
         for column, name, colour in ((3, "own pulse", style.ORANGE), (5, "fast switch", style.BLUE)):
-            right.plot(ticks, [row[column] for row in rows], color=colour, marker="o", label=name)
+            right.plot(*known(ticks, rows, column), color=colour, marker="o", label=name)
         right.axhline(1.0, color=style.MUTED, linestyle="--")
         right.set_ylim(0.0, None)
         right.set_ylabel(f"Worst dot at {rate:,g} Hz  [limits]")
