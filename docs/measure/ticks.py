@@ -100,7 +100,9 @@ def curves(path: Path) -> None:
         left, right = figure.subplots(1, 2)
         left.plot(*known(ticks, rows, 1), color=style.BLUE, marker="o")
         left.axhline(safe, color=style.MUTED, linestyle="--")
-        left.annotate("open loop", (ticks[-1], safe), ha="right", va="bottom", fontsize=style.SMALL)
+        left.annotate(
+            "open loop", (known(ticks, rows, 1)[0][-1], safe), ha="right", va="bottom", fontsize=style.SMALL
+        )
         left.set_ylim(0.0, None)
         left.set_ylabel("Safe rate of a table over all rates  [Hz]")
         for column, name, colour in ((3, "own pulse", style.ORANGE), (5, "fast switch", style.BLUE)):
