@@ -96,8 +96,8 @@ def rounded_up(rate: float) -> float:
 def asked_for(hammer: ph.Hammer, controller: Controller, own: float) -> list[Cell]:
     """Return the results of feedback at the requested rate, and on perturbed hammers."""
     strategy, rate = FeedbackStrategy(controller), rounded_up(ASKED * own)
-    cells: list[Cell] = [own, rate if not passes(hammer, strategy, controller, rate) else None]
-    cells.append(round(rate / own, 2))
+    whole = not passes(hammer, strategy, controller, rate)
+    cells: list[Cell] = [own, *((rate, round(rate / own, 2)) if whole else (f"not all at {rate:g}", None))]
     for group in OFF.values():
         driven = [perturbed(hammer, by) for by in group]
         whole = not any(passes(other, strategy, controller, rounded_up(HARDER * own)) for other in driven)
