@@ -151,6 +151,9 @@ COLUMNS: Final = Settings._fields  # Names of the times of an entry
 def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
     """Return the pulse of a hammer, and the largest width, s, at which its current stays within a limit, A.
 
+    The width is at most `WIDEST` times the hammer's own, or `_SATURATED` times if the current has reached the
+    limit at its own width already.
+
     Raises
     ------
     InputError

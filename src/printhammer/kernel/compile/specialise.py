@@ -70,15 +70,13 @@ class Kernel:
         """Whether an entry point is compiled in this process or has machine code on disk."""
         return name not in self._entries or self._entries[name].is_ready()
 
-    def web_module(self, names: Sequence[str] = ENTRIES, *others: Kernel) -> WebModule:
-        """Return the WebAssembly module of the entry points `names`, and of all entry points of `others`.
+    def web_module(self, names: Sequence[str] = ENTRIES) -> WebModule:
+        """Return the WebAssembly module of the entry points `names`.
 
         The calling convention is described in :mod:`printhammer.kernel.compile.web.build`. The content is
         shipped for the laws of shipped hammers; building other modules needs the extra `page`.
         """
-        entries = [self._entries[name] for name in names]
-        entries += [entry for other in others for entry in other._entries.values()]
-        return web_module_of(entries)
+        return web_module_of([self._entries[name] for name in names])
 
     @functools.cached_property
     def namespace(self) -> dict[str, Any]:
