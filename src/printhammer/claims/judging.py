@@ -52,7 +52,7 @@ class JudgedClaim(Declared):
 
     @property
     def statements(self) -> tuple[int, int]:
-        """Number of statements that hold, and of all statements of the claim; each entry of a list is one."""
+        """Number of statements that hold, and total number; each entry of a list is a statement."""
         value = self.value or {}
         lists = {name: band for name, band in self.claim.band.items() if _is_texts(band)}
         if not lists:

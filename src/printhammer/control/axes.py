@@ -1,4 +1,4 @@
-"""Compensation tables with one more axis that the firmware knows: rail, coil temperature, gap or forms."""
+"""Compensation tables over a quantity that firmware knows: rail voltage, temperature, gap or forms."""
 
 from __future__ import annotations
 
@@ -54,13 +54,13 @@ class Axis:
 
 
 def _on_rail(hammer: Hammer, value: float) -> Hammer:
-    """Return a copy of the hammer with another rail voltage of its driver, V."""
+    """Return a copy of the hammer whose driver has the rail voltage `value`, V."""
     _check_driver(hammer, "rail")
     return hammer.replace("waveform.voltage", value)
 
 
 def _warm(hammer: Hammer, value: float) -> Hammer:
-    """Return a copy of the hammer with another coil temperature, degC."""
+    """Return a copy of the hammer with the coil temperature `value`, degC."""
     _check_driver(hammer, "temperature")
     return hammer.replace("coil.temperature", value)
 
@@ -97,7 +97,7 @@ class AxisTables:
     tables: tuple[CompensationTable, ...]
 
     def at(self, value: float | str) -> CompensationTable:
-        """Interpolate the tables at an axis value; if branches differ, the nearer value's entry is used."""
+        """Interpolate the tables at an axis value; if solution branches differ, the nearer entry is used."""
         asked = read_number(value, AXES[self.axis].unit, self.axis)
         least, most = self.values[0], self.values[-1]
         if not least <= asked <= most:
@@ -125,7 +125,7 @@ class AxisTables:
         return TableStrategy(table, other)
 
     def to_header(self, tick: float | str = NANOSECOND, budget: int | None = None) -> str:
-        """Render the tables as a C header with arrays `[value][rate][history]`, as for one table.
+        """Render the tables as a C header with arrays indexed `[value][rate][history]`.
 
         Values of a gap are in nanometres, values of other axes in millionths of the SI unit. A C function
         interpolates between them.
@@ -147,11 +147,11 @@ class AxisTables:
         return header_text(head, first.rates, times, unit, along)
 
     def quantised(self, tick: float | str) -> AxisTables:
-        """Return a copy with all times rounded to a timer tick, s, or text with a unit."""
+        """Return a copy with all times rounded to multiples of a timer tick (s, or text with a unit)."""
         return replace(self, tables=tuple(table.quantised(tick) for table in self.tables))
 
     def size(self, tick: float | str = NANOSECOND) -> int:
-        """Return the size of the C header's arrays in bytes, for a tick, s, or text with a unit."""
+        """Return the size of the C header's arrays, bytes, for a timer tick (s, or text with a unit)."""
         times = {name: np.stack([getattr(table, name) for table in self.tables]) for name in COLUMNS}
         bits, first = bits_of(times, checked_tick(tick)), self.tables[0]
         return size_of(first.rates.size, times[COLUMNS[0]].shape[-1], bits, len(self.values))
@@ -216,7 +216,7 @@ def tune_along(
     progress: Callable[[int, int], None] | None = None,
     **options: Any,
 ) -> AxisTables:
-    """Tune a table for each of several axis values; every dot equals the single pulse of the nominal hammer.
+    """Tune a table for each axis value; the target is always the single-pulse dot of the nominal hammer.
 
     Parameters
     ----------

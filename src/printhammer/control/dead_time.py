@@ -198,7 +198,7 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
 
     @property
     def reached(self) -> float:
-        """Largest impact speed that every rail and temperature with an impact can reach, m/s; 0 if none."""
+        """Largest impact speed, m/s, within reach at every grid point where the hammer strikes; 0 if none."""
         known = self.strongest[np.isfinite(self.strongest)]
         return float(known.min()) if known.size else 0.0
 
@@ -223,7 +223,7 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
 
 @dataclass(frozen=True)
 class _Fired:
-    """Outcome of one firing from rest: time, s, and speed, m/s, of impact, current, A, heat, J; or NaN."""
+    """Outcome of a firing from rest: time, s, speed, m/s, current, A, heat, J; NaN without impact."""
 
     time: float = np.nan
     speed: float = np.nan

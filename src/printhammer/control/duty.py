@@ -48,7 +48,7 @@ COLDEST: Final = REFERENCE - 1.0 / COPPER
 """Temperature at which the linear law of resistance reaches zero, degC."""
 
 FEEDS: Final = ("voltage", "current", "energy")
-"""Quantity that a driver keeps constant as the coil warms."""
+"""Quantities of which a driver keeps one constant as the coil warms."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class DotHeat:
 
 
 def dot_heat(heat: float | str, feed: str = "voltage") -> DotHeat:
-    """Build the coil heat per dot from its value at 20 degC, J, and the quantity that the driver keeps."""
+    """Build the coil heat per dot from its value at 20 degC, J, and the quantity that stays constant."""
     if feed not in FEEDS:
         raise InputError.of("feed", feed, f"one of {', '.join(FEEDS)}")
     return DotHeat((REFERENCE,), (read_positive(heat, "J", "heat"),), feed)
@@ -287,7 +287,7 @@ def thermal_duty(
 
 
 def steady(coil: ThermalCoil, heat: DotHeat, ambient: float, rate: float) -> float:
-    """Solve for the steady winding temperature, degC, at an ambient and a dot rate, Hz; inf if none."""
+    """Solve for the steady winding temperature, degC, at a dot rate, Hz; inf if there is none."""
 
     def excess(temperature: float) -> float:
         return rate * heat.at(temperature) * coil.whole - (temperature - ambient)

@@ -119,7 +119,7 @@ def starts_of(counts: IntArray) -> IntArray:
 
 
 class PulseTrains(Sequence[PulseTrain]):
-    """Batch of pulse trains, each with one waveform; few different waveforms occur.
+    """Batch of pulse trains, each with one waveform; efficient if few waveforms are distinct.
 
     All firing times are in one array, in the form that an ensemble uses; indexing builds a `PulseTrain` on
     demand.

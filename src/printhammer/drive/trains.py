@@ -52,7 +52,7 @@ class _Pulsed(Drive):
             )
 
     def with_waveform(self, waveform: Waveform) -> Self:
-        """Return a drive that fires another waveform at the same times."""
+        """Return a drive that fires `waveform` at the same times."""
         if not isinstance(waveform, Waveform):
             raise InputError.of("waveform", waveform, "a waveform")
         self._refuse_endless(waveform)

@@ -303,7 +303,7 @@ def _described(force: StaticForce, root: Root, current: float) -> Equilibrium:
 
 
 def _is_stable(root: Root, force: StaticForce) -> bool:
-    """Whether the force points to the root from both sides; a rigid backstop supports it from below."""
+    """Whether the force points to the root from both sides, or a rigid backstop supports the lower side."""
     held = root.before > 0 or (force.rigid and root.x == force.limits[0])
     return held and root.after < 0
 

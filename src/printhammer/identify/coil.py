@@ -244,7 +244,7 @@ class CurrentLaw:
         return np.concatenate(shown)
 
     def missing(self, p: FloatArray) -> dict[str, FloatArray]:
-        """Return d(current) / d(error) for every undeclared probe error, keyed by the advice for it."""
+        """Return d(current)/d(error) of each undeclared probe error, keyed by the advice on the error."""
         short = _SHORT * self.step
         steps = {"offset": 1.0, "gain": 1.0, "delay": short, "time constant": short}
         unstated = [name for name in steps if name not in [error.name for error in self.errors]]
@@ -335,7 +335,7 @@ class Averaged:
 
 
 def _within(p: FloatArray, space: Parameters) -> FloatArray:
-    """Return the initial guess of a second fit: the first result; the prior mean where there is a prior."""
+    """Return the initial guess of a second fit: the first result, but the mean of each prior."""
     return np.where(np.isfinite(space.deviation), space.start, np.clip(p, space.low, space.high))
 
 

@@ -227,7 +227,7 @@ def _undetermined(solution: Solution, data: FloatArray) -> int | None:
 
 
 def _held_at(law: Law, data: FloatArray, solution: Solution, free: BoolArray, held: int) -> FloatArray:
-    """Fix a parameter at its rest value if the data allow that, else at its fit; return all parameters."""
+    """Hold a parameter at its rest value, or at its fit if the data exclude the rest value; refit."""
     p, space = solution.p.copy(), solution.parameters
     if _at_bound(solution)[held]:
         return p

@@ -88,7 +88,7 @@ class Effort:
         return {"threads": self.threads, "progress": self.progress}
 
     def at(self, tolerance: float) -> Effort:
-        """Return a copy with another tolerance and without progress reports."""
+        """Return a copy with the tolerance `tolerance` and without progress reports."""
         return Effort(tolerance, self.threads)
 
     def within(self, begun: int, total: int) -> Effort:

@@ -155,12 +155,12 @@ class Motion(Result, fields=False):
 
     @property
     def voltage(self) -> FloatArray:
-        """Voltage across the coil on the output grid, V, shape (n,); zero unless a voltage drives it."""
+        """Voltage across the coil on the output grid, V, shape (n,); zero unless the drive is a voltage."""
         return self._electric(11)
 
     @property
     def linkage(self) -> FloatArray:
-        """Flux linkage of the coil on the output grid, Wb, shape (n,); zero unless a voltage drives it."""
+        """Flux linkage of the coil on the output grid, Wb, (n,); zero unless the drive is a voltage."""
         return self._electric(12)
 
     @property
@@ -178,7 +178,7 @@ class Motion(Result, fields=False):
         """Return all curves of a plot at the given times of the run, s, in one pass.
 
         Displacement, m, velocity, m/s, current in the coil, A, or force of the drive, N, voltage across the
-        coil, V (zero unless one drives it), and the forces by name, N.
+        coil, V (zero unless the drive is a voltage), and the forces by name, N.
         """
         table = self._resampled(t)
         if self._problem.laws.circuit:

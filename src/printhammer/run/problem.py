@@ -34,7 +34,7 @@ TOLERANCE: Final = 2e-11
 
 LEAST_TOLERANCE: Final = 1e-15  # Smallest tolerance, near the rounding of the arithmetic
 LARGEST_TOLERANCE: Final = 1e-5
-"""Largest tolerance; with larger ones the curves between the ends of steps would be inaccurate."""
+"""Largest accepted tolerance; above it, the curves between the ends of steps would be inaccurate."""
 
 MAX_STEPS: Final = 50_000_000  # Default largest number of steps of a run
 FAR: Final = 1e4
@@ -197,7 +197,7 @@ def scales_of(
 
 
 def control_of(scales: tuple[float, float], tolerance: float) -> tuple[float, float, float, float]:
-    """Return the step-size control of the kernel: scales, and allowances of the error estimates."""
+    """Return the step-size control of the kernel: scales, and tolerances of the two error estimates."""
     # The eighth order is controlled through the estimates of orders six and seven.
     return (*scales, (10.0 * tolerance) ** (7.0 / 9.0), 10.0 * tolerance)
 

@@ -126,7 +126,7 @@ def end_of(hammer: Hammer, drive: Drive) -> float:
 
 
 def longest_of(drive: Drive) -> Waveform:
-    """Return the waveform of a drive with the longest duration; of several, the first."""
+    """Return the waveform of a drive with the longest duration; the first one if several are equal."""
     return max(waveforms_of(drive), key=lambda waveform: waveform.support)
 
 

@@ -32,7 +32,7 @@ drive."""
 WORKER_LOST: Final = STATUSES.index("worker lost")
 NO_HAMMER: Final = STATUSES.index("no such hammer")
 NOT_YET: Final = -1
-"""Status code of a member whose block is not done."""
+"""Status code of a member whose block is not computed yet."""
 
 FIRING: Final = "firing"
 TIME: Final = "time"

@@ -136,7 +136,7 @@ def _from_ensemble(
 
 
 def _moments(members: Members, outputs: Outputs) -> tuple[list[FloatArray] | None, list[Any], list[int]]:
-    """Return the strobe times of each member, the range of firings among them, and the index of the end."""
+    """Return strobe times of each member, range of the firings among them, and index of the end."""
     strobes, final = outputs.wants(*STROBES), outputs.wants(*FINAL)
     if not strobes and not final:
         return None, [], []

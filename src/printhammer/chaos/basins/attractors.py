@@ -1,4 +1,4 @@
-"""Attractors: identification from the strobe states of pulse trains; assignment of further trains to them."""
+"""Attractors: identification from the strobe states of pulse trains, and assignment of trains."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SETTLING: Final = 1000
 points agree."""
 
 LONGEST: Final = 16_000
-"""Largest number of discarded firings; a train that still drifts then is not followed further; arbitrary."""
+"""Largest number of discarded firings; a train that still drifts stays undecided; arbitrary."""
 
 REACH: Final = 0.99
 """Quantile of the nearest-neighbour distances of a strange attractor's points that defines its reach."""
@@ -59,7 +59,7 @@ class Attractor(Declared):
 
 
 class Cloud(NamedTuple):
-    """Points of a strange attractor, and the distance within which further points lie on it."""
+    """Points of a strange attractor, and the distance within which a state belongs to the attractor."""
 
     tree: cKDTree  # Search tree of the points, (n, 2)
     reach: float
@@ -96,7 +96,7 @@ class Attractors:
         self._noise: dict[int, float] = {}
 
     def at(self, tolerance: float) -> Attractors:
-        """Return a copy of the known attractors for trains at another tolerance."""
+        """Return a copy with the same known attractors, for trains simulated at another tolerance."""
         other = Attractors(self.regime, self.scales, tolerance)
         other.found, other._clouds, other._noise = list(self.found), dict(self._clouds), dict(self._noise)
         other._attempts = ATTEMPTS
@@ -169,7 +169,7 @@ class Attractors:
         return places
 
     def _strange(self, columns: Columns, rows: IntArray, places: IntArray) -> None:
-        """Match aperiodic trains to the strange attractors; identify new ones from the unmatched trains."""
+        """Match aperiodic trains to strange attractors; identify new attractors from unmatched trains."""
         points = self._scaled(columns.x, columns.v)
         left = rows
         for place in self._clouds:

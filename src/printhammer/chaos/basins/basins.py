@@ -339,7 +339,7 @@ def basins(
     effort: Effort = EFFORT,
     **firing: Unpack[Fired],
 ) -> Basins:
-    """Compute the basins of attraction: which initial states lead to which attractor.
+    """Compute the basins of attraction: the attractor that each initial state of a grid leads to.
 
     An initial state inside the pack meets fresh paper, compressed to that depth: it starts on the loading
     branch if the armature moves inward, else on the unloading branch. A state inside the backstop starts with
@@ -408,7 +408,7 @@ def basins(
 def _decided(
     regime: Regime, cells: FloatArray, counts: tuple[int, int], effort: Effort, attractors: Attractors
 ) -> tuple[IntArray, IntArray, TextArray]:
-    """Return attractor indices (-1 undecided, -2 ended early, -3 no state), firings and statuses of cells."""
+    """Compute the attractor of each cell: index, number of firings, and status."""
     firings, most = counts
     places = np.full(len(cells), UNDECIDED - 1, np.int64)
     used = np.zeros(len(cells), np.int64)

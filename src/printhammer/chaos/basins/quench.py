@@ -164,7 +164,7 @@ class TwoPulses(Waveform):
 
     @property
     def peak(self) -> float:
-        """Largest absolute value; common to all widths of a map, so that all runs have equal scales."""
+        """Largest absolute value over all widths of the map, so that all runs are scaled alike."""
         return self.largest
 
 
@@ -296,7 +296,7 @@ def two_pulse_drives(first: Waveform, seconds: Sequence[Waveform], last: float) 
 def _piece(
     hammer: Hammer, drives: Sequence[TwoPulseDrive], gaps: FloatArray, tail: float, effort: Effort
 ) -> tuple[npt.NDArray[Any], ...]:
-    """Compute second dot, status, peak, force and flight time for several gaps and all widths."""
+    """Simulate all widths at some gaps: second dot, status, peak, m, force, N, flight time, s."""
     begin, number = 0.0, 1
     every: list[Drive]
     if drives[0].pulses[0].replaces:
@@ -344,7 +344,7 @@ def _piece(
 
 
 def _highest(grid: FloatArray, x: FloatArray, after: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Find the largest local maximum of each sampled motion after a given time; return it and its time, (M,).
+    """Find the largest local maximum of each sampled motion after a given time, and its time, (M,).
 
     The samples, shape (M, T), are evenly spaced; samples after the end of a run are NaN, and so is a maximum
     that does not exist.

@@ -29,7 +29,7 @@ FIRINGS: Final = 1000
 """Default number of firings per train of a bifurcation diagram."""
 
 _JUDGED: Final = 200
-"""Number of firings in the diagram, after the default transient."""
+"""Default number of recorded firings per train: the firings after the transient."""
 
 REFINE: Final = 2
 """Default number of times to halve the parameter step between neighbours that differ."""

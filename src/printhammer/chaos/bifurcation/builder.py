@@ -260,7 +260,7 @@ class DiagramBuilder:
         return False
 
     def trial(self, rows: Sequence[int], states: FloatArray) -> tuple[Any, Any, Any]:
-        """Run trains from given initial states; return states, periods and distances without storing them."""
+        """Run trains from given states without storing them; return states, periods, distances."""
         regimes = [self.table.regimes[row] for row in rows]
         done = self.done
         effort = replace(self.effort, progress=lambda part, _all: self.report_progress(done + part))

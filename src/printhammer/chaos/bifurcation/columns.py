@@ -86,7 +86,7 @@ def blank_columns(count: int, points: int) -> Columns:
 
 
 def put(columns: Columns, rows: Sequence[int] | IntArray, others: Columns) -> None:
-    """Copy the columns of some trains into given rows of other columns."""
+    """Copy the columns `others` into the given rows of `columns`."""
     where = np.asarray(rows, dtype=np.int64)
     for name, values in vars(others).items():
         getattr(columns, name)[where] = values
@@ -173,7 +173,7 @@ def _run(
 def run_in_stretches(
     regimes: Sequence[Regime], states: FloatArray, firings: int, transient: int, effort: Effort
 ) -> Columns:
-    """Compute the columns of `run_columns` one period at a time, for memoryless trains (`is_memoryless`).
+    """Compute the columns of memoryless trains (`is_memoryless`) as `run_columns` does, one period at a time.
 
     The computation is slower, but its rounding error does not grow with time; see
     `printhammer.chaos.strobe.train.STRETCH`.
@@ -291,7 +291,7 @@ def confirm(
     scales: FloatArray,
     effort: Effort,
 ) -> None:
-    """Confirm ambiguous periods from `cycles_of` by Newton's method; correct periods and distances in place.
+    """Confirm ambiguous periods from `cycles_of` by Newton's method; update periods and distances.
 
     Periods are ambiguous if the states alone do not show them, see `printhammer.chaos.orbits.settled`; an
     unconfirmed period becomes 0.

@@ -221,7 +221,7 @@ class Bifurcation(Result, rows="direction column"):
         )
 
     def _value_text(self) -> tuple[Callable[[float], str], str]:
-        """Return a formatter for parameter values, precise enough to separate neighbours, and the unit."""
+        """Return a formatter of parameter values that separates neighbours, and their unit."""
         si = self.regime.quantity(self.parameter).si
         unit = {"s": "ms", "m": "um"}.get(si, si)
         steps = np.diff(self.values)
@@ -387,7 +387,8 @@ def hysteresis(diagram: Bifurcation) -> BoolArray:
     """Mask of the parameter values at which the two directions lead to different attractors, shape (C,).
 
     Periodic trains differ if their periods differ, or if their orbits are further apart than `SAME` of the
-    builder; an aperiodic train differs from periodic trains only. All False for a single direction.
+    builder; an aperiodic train differs from every periodic train, and from no aperiodic train. All False for
+    a single direction.
     """
     different = np.zeros(len(diagram.values), np.bool_)
     if len(diagram.directions) < 2:

@@ -122,7 +122,7 @@ def _grazing(point: BranchPoint) -> tuple[str, str]:
 
 
 def _is_parted(touches: list[Touch], length: float) -> bool:
-    """Whether two contacts result from a split contact: the gap is shorter than the shortest contact."""
+    """Whether a contact is split by a short separation: shorter than the shortest of the contacts."""
     durations = [touch.t_out - touch.t_in for touch in touches]
     if len(touches) < 2 or min(durations) == 0.0:
         return False

@@ -56,13 +56,13 @@ _ROUNDING: Final = 1e-8
 _SHARE_OF_CHANGE: Final = 1e-10
 _SMALL_MARGIN: Final = 0.05
 _CLOSE_MARGIN: Final = 1e-7
-"""Width of the final bracket of a contact change, in steps; margins to start interpolation, and to stop."""
+"""Final bracket width of a contact change, in steps; margins at which interpolation starts and ends."""
 _NEAR: Final = 1e-4
 """Distance, as a fraction of a step, within which a fold and a crossing are the same point."""
 _AMPLITUDE: Final = 1e-2  # First scaled distance from a doubling at which its orbit is sought
 _LEAST_AMPLITUDE: Final = 1e-6
 _CLOSER: Final = 4.0
-"""Smallest scaled distance from a doubling at which the new orbit is sought; ratio of successive attempts."""
+"""Smallest scaled distance from a doubling at which an orbit is sought; ratio of successive distances."""
 _ASIDE: Final = 0.5
 _NEW_MULTIPLIER: Final = 0.3
 """Tolerances of a new orbit: sideways offset relative to its distance; deviation of a multiplier from 1."""

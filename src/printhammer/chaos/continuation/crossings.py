@@ -35,13 +35,13 @@ _BRACKET: Final = 1e-5
 _DIFFERENCE: Final = 1e-3
 """Scaled step of the second differences; between 1e-4 and 1e-2 the kinds found in the tests are the same."""
 _FLAT: Final = 1e-6
-"""Mixed second derivative, relative to the largest, below which the second direction is undetermined."""
+"""Mixed second derivative, relative to the largest one, below which the other tangent is undetermined."""
 _UPRIGHT: Final = 0.01
 """Component of a tangent along the parameter below which a curve turns back; arbitrary."""
 _AMPLITUDE: Final = 1e-2
 _LEAST_AMPLITUDE: Final = 1e-5
 _CLOSER: Final = 4.0
-"""Smallest scaled distance from a crossing at which the other curve is sought, and ratio of distances."""
+"""Smallest scaled distance from a crossing at which a curve is sought; ratio of successive distances."""
 _ASIDE: Final = 0.5
 """Largest distance from the predicted point, relative to the step, for a point to lie on the curve."""
 
@@ -120,8 +120,8 @@ def follow_crossing(
 ) -> Curve:
     """Follow, in both directions, the curve that crosses a known curve at one of its nodes.
 
-    The first point of the other curve is sought at a scaled distance along the tangent of that curve; if none
-    is found, the distance is reduced. The other arguments are those of `follow`.
+    The first point of the other curve is sought at a scaled distance along the tangent of the other curve; if
+    no fixed point is found, the distance is reduced. The other arguments are those of `follow`.
 
     Raises
     ------

@@ -2,8 +2,8 @@
 
 Stable and unstable orbits are searched for at several rates; each orbit that lies on no known branch is
 followed in both directions. Period doublings and crossings lead to further branches. An island, an orbit that
-exists only between two folds and is joined to no other branch, is a closed loop. Islands that contain none of
-these rates are missed.
+exists only between two folds and is joined to no other branch, is a closed loop. Islands between two
+successive search rates are missed.
 """
 
 from __future__ import annotations
@@ -227,7 +227,7 @@ def follow_doublings(
 
 
 class _Collected:
-    """Branches collected during a search, and methods that add further branches."""
+    """Branches collected during a search, with methods that follow and add branches."""
 
     def __init__(self, bounds: tuple[float, float], steps: Steps, effort: Effort) -> None:
         self.bounds, self.steps, self.effort = bounds, steps, effort
@@ -302,7 +302,7 @@ class _Collected:
 
 
 def _state_at(orbit: Orbit, phase: float) -> FloatArray:
-    """Return the state of an orbit, (m, m/s), at a section of another phase."""
+    """Return the state of an orbit, (m, m/s), at a section with the phase `phase`."""
     if phase == orbit.phase:
         return orbit.section
     motion = orbit.motion()

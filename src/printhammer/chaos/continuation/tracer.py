@@ -35,7 +35,7 @@ PRECISION: Final = 1e-10
 """Scaled correction of Newton's method below which an orbit has converged; see `arclength`."""
 
 _PARTS: Final = 5.0
-"""Ratio of the parameter range to the scale of the parameter; the state is scaled by half-widths."""
+"""Ratio of the parameter range to the parameter scale; state scales are half-widths of the window."""
 _LOST: Final = ("lost", "jump", "no value")
 GRAZING: Final = "grazing"
 _AT_GRAZING: Final = "it grazes the rigid backstop, where the strobe map has no derivative"
@@ -181,7 +181,7 @@ class Tracer:
         return None
 
     def at_phase(self, phase: float) -> Tracer:
-        """Return the tracer with its section at another phase."""
+        """Return a copy of the tracer whose section has the phase `phase`."""
         same = phase == self.regime.phase
         return self if same else replace(self, regime=replace(self.regime, phase=phase))
 
@@ -393,7 +393,7 @@ class Tracer:
         )
 
     def symmetry_of(self, family: RegimeFamily, node: Node) -> str:
-        """Return whether an orbit is its own mirror image: "symmetric", "asymmetric", or ""."""
+        """Classify an orbit: "symmetric" if it is its own mirror image, "asymmetric", or ""."""
         regime = family.regime.with_(self.parameter, node.parameter)
         image = mirror_image(regime, node.state, self.effort.tolerance)
         if image is None or not np.isfinite(image).all():
@@ -403,7 +403,7 @@ class Tracer:
         return "symmetric" if apart < _SHORTER else "asymmetric"
 
     def in_words(self, stop: Stop) -> Stop:
-        """Return a stop whose sentence names the parameter and its unit."""
+        """Return a copy of a stop whose sentence states the parameter value with its unit."""
         at = self.at_value(stop.parameter)
         why = stop.sentence.rpartition(": ")[2]
         sentences = {

@@ -8,7 +8,7 @@
 | 1:2 resonance | doubling, Neimark-Sacker | both multipliers are -1 |
 | degenerate doubling | doubling | c: it goes from super- to subcritical |
 | fold meets grazing, doubling meets grazing | all three | a contact appears while a multiplier is 1 or -1 |
-| resonant grazing | grazing, fold, doubling | the element 12 of A^n |
+| resonant grazing | grazing, fold, doubling | the element (1, 2) of A^n |
 | degenerate grazing | grazing | the acceleration at the touch |
 
 A is the derivative of the strobe map without the touch. At a resonant grazing of a rigid backstop, the
@@ -234,5 +234,5 @@ def _missed(
 
 
 def resonance_test(passages: int) -> Callable[[FloatArray], float]:
-    """Return the test function of a resonant grazing: element 12 of the derivative's n-th power."""
+    """Return the test function of a resonant grazing: element (1, 2) of the derivative to the power n."""
     return lambda jacobian: float(np.linalg.matrix_power(jacobian, passages)[0, 1])

@@ -1,4 +1,4 @@
-"""Start of a bifurcation curve: an event of a branch, in memory or in a file, or a saved curve's point."""
+"""Start of a bifurcation curve: an event of a branch in memory or in a file, or a point of a saved curve."""
 
 from __future__ import annotations
 

@@ -242,7 +242,7 @@ class GrazingSystem:
 
 
 class ImpactSystem:
-    """Extended map for an orbit that strikes a rigid backstop and has a critical multiplier.
+    """Extended system for an orbit with rigid impacts and a critical multiplier.
 
     Unknowns: phase of the impact, velocity after the impact, first parameter.
     """

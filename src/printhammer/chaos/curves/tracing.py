@@ -294,7 +294,7 @@ class CurveTracer:
 
     @property
     def short(self) -> str:
-        """Kind of the bifurcation without the word "period": "doubling" for a period doubling."""
+        """Short name of the kind of bifurcation, such as "doubling" for "period doubling"."""
         return self.kind.removeprefix("period ")
 
     def distance(self, one: Place, other: Place) -> float:

@@ -69,7 +69,7 @@ def dimension_text(value: float, error: float) -> str:
 
 
 def verdict_text(verdict: str) -> str:
-    """Format a classification for a summary, with a style that marks undecided ones."""
+    """Format a classification for a summary, with a style that marks "undecided"."""
     return judged(verdict != "undecided", verdict.replace("period-", "period "))
 
 
@@ -327,7 +327,7 @@ def kaplan_yorke(factors: FloatArray) -> tuple[float, float]:
 
 
 def cycle_of(period: int | None, firings: int) -> int:
-    """Return the period if the train has enough whole cycles, else 1, so that a cycle adds no scatter."""
+    """Return the period if a train covers enough whole cycles to average over, else 1."""
     return period if period is not None and firings >= _CYCLES * period else 1
 
 

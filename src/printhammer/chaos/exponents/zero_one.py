@@ -50,7 +50,7 @@ FEWEST: Final = 100
 """Smallest length of a series; its mean square displacement is computed up to a tenth of the length."""
 
 SETTLING: Final = 0.5
-"""Ratio of standard deviations, last to first quarter of a series, below which it is a transient."""
+"""Ratio of standard deviations, last to first quarter of a series, below which the series is a transient."""
 
 LONGEST_CYCLE: Final = 64
 """Largest cycle length of a series that is tested; at most a quarter of its length."""
@@ -59,7 +59,7 @@ CYCLES: Final = 5
 """Number of cycles over which growth must occur to count as chaos; within one cycle, any path may grow."""
 
 FOLLOWS: Final = 0.7
-"""Mean distance of images of neighbours, relative to arbitrary pairs, that proves a deterministic series."""
+"""Distance of images of neighbours, relative to arbitrary pairs, below which a series is deterministic."""
 
 _CUT: Final = 10  # Ratio of the series length to the largest lag of the displacement (Gottwald and Melbourne)
 _PASSES: Final = 4  # Smallest number of cycles in a series for a cycle to be considered
@@ -262,7 +262,7 @@ def _displacements(paths: npt.NDArray[np.complex128], resolution: float) -> Floa
 
 
 def without_cycle(numbers: FloatArray, resolution: float) -> tuple[int, FloatArray]:
-    """Estimate the cycle length of a series; return it and the series without its means over the cycle.
+    """Estimate the cycle length of a series; return the length, and the series minus its cycle means.
 
     The cycle length q, 1 for the mean alone, minimises the criterion of G. Schwarz (Ann. Statist. 6 (1978)
     461), n ln(residual variance) + q ln(n), and the means of every q-th number are subtracted. Changes up to

@@ -60,7 +60,7 @@ def index_sums(orbits: Sequence[tuple[int, npt.NDArray[np.complex128]]], longest
 
 
 def indices_add_up(regime: Regime) -> bool:
-    """Whether the fixed-point indices add up to 1: true without a pack, with damping or a backstop."""
+    """Whether theory makes the fixed-point indices sum to 1: no pack, and damping or a backstop."""
     hammer = regime.hammer
     return hammer.pack is None and (hammer.damping is not None or hammer.backstop is not None)
 
@@ -135,7 +135,7 @@ class Orbits(Result):
 
     @property
     def coverage(self) -> float:
-        """Estimated fraction of further converging guesses that lead to a known orbit; NaN without guesses.
+        """Estimated fraction of untried converging guesses that lead to a known orbit; NaN without guesses.
 
         The estimate is not a bound: orbits near no guess are not counted.
 

@@ -44,7 +44,7 @@ BEND: Final = 0.2
 _NEAR: Final = 1e-5
 """Distance from the saddle, in half-widths, within which a manifold is treated as straight."""
 _FINEST: Final = 1e-3
-"""Distance of points, as a fraction of the spacing, below which a bend gets no further point."""
+"""Distance of points, as a fraction of the spacing, below which no point is inserted at a bend."""
 _TIGHT: Final = 1e-12
 """Smallest step along a fundamental segment; a gap of the images at this step is a jump of the map."""
 _SETTLED: Final = 0.1
@@ -341,7 +341,7 @@ class _Inward:
 
     saddle: FloatArray
     reach: FloatArray
-    """Vector from the saddle to the parameter 1."""
+    """Vector from the saddle to the point with parameter 1."""
     shrink: float
     points: list[FloatArray] = field(default_factory=list)
     places: list[float] = field(default_factory=list)

@@ -215,7 +215,7 @@ class Search:
         return self._refined(regime, different)
 
     def _further(self, fast: FastMaps, different: list[_Known], records: Records, seen: set[bytes]) -> None:
-        """Try further close returns: from longer motions, and from motions just after a touch.
+        """Try additional close returns: from longer motions, and from motions just after a touch.
 
         These guesses are tried last, so that no orbit of the earlier stages is lost.
         """

@@ -298,7 +298,7 @@ def _around(
 
 
 def state_later(regime: Regime, state: FloatArray, phase: float, tolerance: float) -> FloatArray:
-    """Compute the state, (m, m/s), at the next section of another phase; NaN if the run ends early."""
+    """Compute the state, (m, m/s), at the next section with another phase; NaN if the run ends early."""
     train, _ = regime.train(2)
     begin = float(regime.moments(train, 1)[0])
     problem = Problem(regime.hammer, train, (float(state[0]), float(state[1])), begin, tolerance)

@@ -172,7 +172,7 @@ class FeedbackStrategy(Declared):
         used: BoolArray,
         x: FloatArray,
     ) -> None:
-        """Advance runs to the end of a stage if needed; fill in displacements at samples up to `until`."""
+        """Advance runs to a stage's end if needed; record displacements at samples up to `until`."""
         hammers, ends = leg
         inside = np.array([loop.state[2] in _BRANCHES for loop in loops])
         moves = np.array([loop.time < end for loop, end in zip(loops, ends, strict=True)])

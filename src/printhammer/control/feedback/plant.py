@@ -99,7 +99,7 @@ class Driver(Declared):
 
 
 class BoundedSequence(PulseSequence):
-    """Pulses of a driver whose stated largest value is its current limit, A, rather than a computed peak."""
+    """Sequence of driver pulses whose largest value is declared, as the current limit, not computed."""
 
     bounded = True
 

@@ -40,7 +40,7 @@ from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.threads import Progress
 
 OFFSETS: Final = (-0.07, 0.0, 0.07)
-"""Offsets of the front in the maps, away from the armature, as fractions of the stroke; evenly spaced."""
+"""Distances of the pack beyond nominal, one for each map, as fractions of the stroke; evenly spaced."""
 
 STEPS: Final = 100
 """Number of progress steps for each distance of the pack."""
@@ -145,7 +145,7 @@ class Committed(NamedTuple):
 
 
 class Policy:
-    """Cost-to-go of all actions at one rate, for a period in s; limits normalise the deviations."""
+    """Cost-to-go of all actions at one slot period, s; `limits` normalise the deviations of the dots."""
 
     def __init__(self, fronts: Fronts, period: float, limits: Limits) -> None:
         self.fronts = fronts

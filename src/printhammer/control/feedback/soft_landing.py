@@ -119,7 +119,7 @@ class Launch:
 
 
 def launch(plant: Plant, forces: ForceMap) -> Launch:
-    """Find the launch whose touch, without a push, prints `_ALMOST` of the single-pulse force.
+    """Find the launch whose touch, without a push, has the fraction `_ALMOST` of the single-pulse force.
 
     A short push into the pack adds the rest of the force; the length of the push is chosen when the impact
     speed is known.

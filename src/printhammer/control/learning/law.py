@@ -113,7 +113,7 @@ class Adjustable:
         return np.asarray((self._bounded(self._raw(after)) - self.base)[rows, columns] / STEP)
 
     def started_from(self, base: FloatArray) -> Adjustable:
-        """Return a copy with other base settings, (4, entries), clipped to all bounds."""
+        """Return a copy whose base settings are `base`, (4, entries), clipped to all bounds."""
         # Unlike entries of the first table, entries of this table may not stay beyond a bound.
         strict, own = base.copy(), base.copy()
         strict[ADVANCE] = -np.inf
@@ -218,7 +218,7 @@ class _Unit(NamedTuple):
 
 @dataclass(frozen=True)
 class LearningLaw:
-    """Learning law of a production: prior, ladder, and update of corrections; without data of a unit."""
+    """Learning law of a production: prior, ladder, update of corrections; stores no readings of a unit."""
 
     entries: Adjustable
     production: Production
@@ -375,7 +375,7 @@ class LearningLaw:
         return Verdict(gains, loops[chosen], float(np.fmax.reduce(growth)), float(good.mean()), every)
 
     def _leads(self, share: FloatArray, others: FloatArray) -> bool:
-        """Whether a drive prints more dots (M,) on average than others (drives, M), on no hammer fewer."""
+        """Whether a drive leads all others on average, and trails on at most the fraction `doubt` of all."""
         harmless = np.quantile(share - others.max(axis=0), self.doubt) >= 0.0
         return bool(harmless and share.mean() - others.mean(axis=1).max() >= _GAIN)
 

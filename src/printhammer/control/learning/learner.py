@@ -175,7 +175,7 @@ class Learner:
 
 
 def mean(readings: Sequence[FloatArray], noise: FloatArray) -> Mean:
-    """Average readings over runs, leaving out NaN and, from `_FEWEST` runs on, outliers."""
+    """Average readings over runs without NaN and, for `_FEWEST` runs or more, without outliers."""
     values = np.stack(readings)
     known = np.isfinite(values)
     if len(values) >= _FEWEST:

@@ -227,7 +227,7 @@ class Press:
     hammers: Sequence[Hammer]
 
     def ladder(self, rungs: Sequence[Rung]) -> tuple[FloatArray, FloatArray]:
-        """Simulate a ladder; return flight times, s, and forces over the nominal force, (M, dots)."""
+        """Simulate a ladder; return flight times, s, and forces relative to the nominal force, (M, dots)."""
         return printed(self.order_ladder(rungs), self.task)
 
     def line(
@@ -236,9 +236,10 @@ class Press:
         slots: Sequence[int] = LINE,
         pulses: Sequence[Waveform] | None = None,
     ) -> tuple[DotTable, Judgement]:
-        """Simulate a line, each hammer with its settings (4, entries); return dots and their deviations.
+        """Simulate a line on every hammer; return the dots and their deviations.
 
-        `pulses` are the waveforms, one per hammer; by default that of the task.
+        `settings` holds one array (4, entries) per hammer. `pulses` are the waveforms, one per hammer; the
+        default is the pulse of the task for all hammers.
         """
         return printed(self.order_line(settings, slots, pulses), self.task)
 

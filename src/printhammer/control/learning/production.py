@@ -26,7 +26,7 @@ SCALE: Final = 0.01
 """Prior standard deviation of the relative gain error of a sensor."""
 
 OFFSET: Final = 25e-6
-"""Prior standard deviation of the offset of a sensor's times, s, where the sensor states none.
+"""Prior standard deviation of the offset of a sensor's times, s, used if the sensor has no `offset`.
 
 Sound takes 20 us for 7 mm of air before a microphone."""
 

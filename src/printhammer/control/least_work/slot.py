@@ -54,7 +54,7 @@ class SlotState:
 
     @property
     def row(self) -> list[float]:
-        """The state as `Ensemble` accepts it; outside the pack, displacement and velocity are enough."""
+        """State in the form that `Ensemble` accepts; outside the pack, displacement and velocity only."""
         branch = _IN_PACK.get(MODE_NAMES[self.branch] if self.branch >= 0 else "", 0)
         return [self.x, self.v, float(branch), self.memory] if branch else [self.x, self.v]
 

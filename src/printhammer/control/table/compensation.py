@@ -216,7 +216,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return self.delayed(own - nominal(driven, tolerance=DISPLAY_TOLERANCE).flight_time, driver, hammer)
 
     def delayed(self, later: float, driver: str, hammer: Hammer) -> CompensationTable:
-        """Return a copy for a hammer and its driver, with all pulses `later` seconds later."""
+        """Return a copy for a hammer and its driver, with all pulses delayed by `later`, s."""
         delay = np.where(self.brake_width > 0.0, self.brake_delay + later, self.brake_delay)
         return replace(
             self,
@@ -371,12 +371,12 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return header_text(self._head, self.rates, self.quantised(unit)._times, unit)
 
     def size(self, tick: float | str = NANOSECOND) -> int:
-        """Return the size of the C header's arrays in bytes, for a tick, s, or text with a unit."""
+        """Return the size of the C header's arrays, bytes, for a timer tick (s, or text with a unit)."""
         bits = bits_of(self._times, checked_tick(tick))
         return size_of(self.rates.size, entries_of(self.gaps, self.reach), bits)
 
     def quantised(self, tick: float | str) -> CompensationTable:
-        """Return a copy with times in whole timer ticks, s or text; its deviations are unknown (NaN)."""
+        """Return a copy with times in whole timer ticks (s, or text); deviations become NaN."""
         times: dict[str, Any] = whole_ticks(
             self._times, self.rates, self.gaps, self.reach, checked_tick(tick)
         )

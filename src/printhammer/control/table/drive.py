@@ -79,7 +79,7 @@ def numbers_before(history: Sequence[int], reach: int) -> list[int]:
 
 
 def shared_numbers(gaps: int, reach: int) -> IntArray:
-    """Map every history number to the number whose history it stands for, shape (entries,)."""
+    """Map every history number, aliases included, to the number of the plain history, (entries,)."""
     every = itertools.product(range(reach + 1), repeat=gaps)
     return np.array([number_of(row, reach) for row in every], np.int64)
 
@@ -233,7 +233,7 @@ def clearance(hammer: Hammer, pulse: Waveform, width: float, largest: float) -> 
 
 
 def brake_of(pulse: Waveform, width: float) -> Waveform:
-    """Return a brake pulse of a width, s; one shorter than a driver's peak time applies the full supply."""
+    """Return a brake pulse of a width, s, with full supply up to the peak time of the driver."""
     if isinstance(pulse, PeakAndHold) and width <= pulse.peak_time:
         shared = {name: value for name, value in dict(pulse).items() if name in Rail.model_fields}
         return Rail(**{**shared, "width": width})
@@ -351,6 +351,6 @@ def of_force(hammer: Hammer, pulse: Waveform, force: float, low: float, high: fl
 
 
 def with_pulse(hammer: Hammer, pulse: Waveform) -> Hammer:
-    """Return a copy of the hammer with another waveform."""
+    """Return a copy of the hammer whose waveform is `pulse`."""
     constants = {key: value for key, value in dict(pulse).items() if key != "quantity"}
     return hammer.replace("waveform", {"shape": pulse.shape, **constants}, source="of the driver")

@@ -245,7 +245,7 @@ def _applies(hammer: Hammer, by: Perturbation) -> bool:
 
 
 def _growth(driven: Sequence[Hammer], rate: float, strategy: Strategy, effort: Effort) -> FloatArray:
-    """Compute the multipliers of rows at a rate, Hz, (hammers,): the larger one of two dot spacings."""
+    """Compute the largest multiplier of rows with a dot in every or every second slot, (hammers,)."""
     rates = [rate] * len(driven)
     each = np.array([multipliers(driven, rates, strategy, effort, step) for step in (1, 2)])
     largest = np.nan_to_num(np.abs(each), nan=-1.0).argmax(axis=0)
@@ -269,7 +269,7 @@ def _largest(values: FloatArray) -> float:
 
 
 def between(table: CompensationTable) -> list[float]:
-    """Return rates for validating a table: its own or, for a long table, five halfway between them."""
+    """Return rates for validating a table: the table's own rates or, for a long table, five midpoints."""
     rates = table.rates
     if rates.size < _LONG:
         return [float(rate) for rate in rates]

@@ -117,7 +117,7 @@ def spaced(periods: FloatArray, spacing: float) -> list[float]:
 
 
 def _valued(task: Task, tried: Sequence[Ways]) -> list[Ways]:
-    """Solve several groups of candidates together; return each group's candidates with a finite cost."""
+    """Refine the candidates of several groups as one batch; return the groups without infinite costs."""
     every = solved(task, joined(tried))
     every = every._replace(cost=costs(task, every))
     ends = np.cumsum([group.size for group in tried])
@@ -126,7 +126,7 @@ def _valued(task: Task, tried: Sequence[Ways]) -> list[Ways]:
 
 
 def _look_closely(task: Task, periods: FloatArray, groups: list[Ways]) -> None:
-    """Search for candidates with brake pulses between the grid values, where the best cost is poor.
+    """Search for brake pulses between the grid values at the periods whose best candidate is poor.
 
     Extends the groups of candidates of the periods in place.
     """
@@ -168,7 +168,8 @@ def _look_closely(task: Task, periods: FloatArray, groups: list[Ways]) -> None:
 def searched(task: Task, period: float) -> Ways:
     """Run the multi-start search for one period, s; return the best candidates, best first.
 
-    Candidates with a brake pulse are searched, if allowed, only where those without are not good enough.
+    Candidates with a brake pulse are searched, if allowed, only if the best candidate without a brake pulse
+    is poor.
     """
     plain = _best(task, _grid(task, period, [(0.0, 0.0)], _FINE), _FINE)
     if not task.brake or (plain.size and plain.cost[0] <= _ENOUGH):

@@ -69,7 +69,7 @@ def refined(draft: Draft) -> Draft:
 
 
 def _halfway(draft: Draft, lower: IntArray) -> Draft:
-    """Interpolate a draft halfway between some rates and the next higher ones, and evaluate the result."""
+    """Interpolate a draft halfway between the rates `lower` and the next higher ones; evaluate the result."""
     table = draft.table()
     rates = 0.5 * (draft.rates[lower] + draft.rates[lower + 1])
     settings = np.array([table.at(float(rate)) for rate in rates])
@@ -80,7 +80,7 @@ def _halfway(draft: Draft, lower: IntArray) -> Draft:
 
 
 def _tuned_between(draft: Draft, lower: IntArray) -> Draft:
-    """Tune table rows at rates halfway between some rates and the next higher ones."""
+    """Tune table rows halfway between the rates `lower` and the next higher ones."""
     task = draft.task
     rates = 0.5 * (draft.rates[lower] + draft.rates[lower + 1])
     halfway = Draft(task, rates, draft.values[:, lower])
@@ -120,7 +120,7 @@ SPREAD: Final = (
 # Deviation, as a fraction of the limits, up to which a rate is kept in an automatic grid
 _USABLE: Final = 0.9
 _GAP: Final = 6
-"""Largest gap of unusable rates that is tuned again, in rates; arbitrary: each rate takes some seconds."""
+"""Largest number of successive unusable rates that are tuned again; arbitrary: each takes some seconds."""
 _TRIES: Final = 4  # Maximum number of times to search a rate again, without the candidates that failed
 _POOR: Final = 0.5  # Deviation, as a fraction of the limits, above which a requested rate is tuned again
 # Offsets of additional periods at which candidates are then searched, s
@@ -276,7 +276,7 @@ def _counter(effort: Effort, total: int) -> Callable[[], None]:
 
 
 def _all_rates(single: Single, scale: float) -> FloatArray:
-    """Return the rates from where dots do not interact up to where the armature is still in the pack."""
+    """Return the default rates of a table, Hz: from independent dots up to overlapping pack contacts."""
     first, step = FIRST / scale, STEP / scale
     lowest = step * np.floor(1.0 / (single.settled * step))
     rates = np.arange(lowest, 1.0 / single.left, step)
@@ -340,8 +340,8 @@ def _tuned(
 ) -> Draft:
     """Tune rows for the given rates; an entry without a solution has an infinite deviation.
 
-    An `open_ended` draft ends below the first rate without a solution. `around` are offsets, s, of additional
-    periods at which candidates are searched.
+    An `open_ended` draft ends below the first rate without a solution. `around` are offsets, s, from each
+    period to additional periods at which candidates are searched.
     """
     draft = blank(task, rates)
     draft.timing[1] = task.width

@@ -110,7 +110,7 @@ def changes(
 BAD: Final = 0.75  # Cost above which more candidates are searched for
 _SECOND: Final = 2  # Index of the first firing after two dots that are made right
 UNSTABLE: Final = 1e3
-"""Cost from which on a candidate is unstable: never chosen, but a neighbour may be stable; arbitrary."""
+"""Lowest cost of an unstable candidate, which is never chosen, but may have a stable neighbour; arbitrary."""
 
 ROW: Final = 8  # Number of dots in the row that rates a candidate
 NOMINAL: Final = 8.0  # Weight of the design hammer relative to the perturbed hammers
@@ -158,7 +158,7 @@ class Ways(NamedTuple):
         return Ways(*(values[which] for values in self))
 
     def at(self, period: float) -> Ways:
-        """Return the candidates for another period, s, with the same firing time relative to the slot."""
+        """Return the candidates for a new period, s; firing times relative to the slot are unchanged."""
         moved = self.fired + (period - self.period)
         return self._replace(period=np.full(self.size, period), fired=moved)
 
@@ -175,7 +175,7 @@ def ways_of(cells: Sequence[tuple[float, float, float, float, float]]) -> Ways:
 
 
 def fits(task: Task, ways: Ways) -> BoolArray:
-    """Mask of the candidates that fire after the preceding pulses, and early enough to be braked."""
+    """Mask of the candidates whose firing time lies between the earliest and the latest possible one."""
     first, last = task.earliest(ways.delay, ways.brake), ways.period + task.latest(ways.width)
     return np.asarray((ways.fired >= first - _ROUNDING) & (ways.fired <= last + _ROUNDING))
 
@@ -219,8 +219,8 @@ def costs(task: Task, ways: Ways) -> FloatArray:
     The cost is the largest deviation of any dot of a row of `ROW` dots, over the hammers of `task.spread`
     and, with the weight `NOMINAL`, the design. With a stated variability it is instead the RMS of the largest
     deviations over its sigma points and the design. Candidates that miss even the second dot cost `_WRONG`
-    more. It is at least `UNSTABLE`, and the more the larger the multiplier of a long row, if that exceeds
-    `STABLE`. It is infinite if a dot is lost or the pulses overlap.
+    more. If the multiplier of a long row exceeds `STABLE`, the cost is at least `UNSTABLE` and increases with
+    the multiplier. The cost is infinite if a dot is lost or the pulses overlap.
     """
     cost = np.full(ways.size, np.inf)
     some = np.flatnonzero(fits(task, ways))
@@ -245,10 +245,10 @@ def costs(task: Task, ways: Ways) -> FloatArray:
 def growths(task: Task, ways: Ways) -> FloatArray:
     """Compute the factor by which an error in a long row of each candidate grows from dot to dot, (ways,).
 
-    NaN if the factor is unknown. If the first two dots are right, the state after them is the fixed point of
-    the row. If the cost says that they are not, and the row looks stable, the fixed point is located by
-    iteration; so are the fixed points of all rows if the task requires it, since beside a grazing none
-    exists, however good the first dots are.
+    An unknown factor is NaN. If the first two dots meet their target, the state after them is the fixed point
+    of the row. If the cost shows that they miss it, and the row looks stable, the fixed point is located by
+    iteration. If `task.located`, the fixed points of all rows are located: near a grazing no fixed point may
+    exist, however good the first dots are.
     """
     rows = rows_of(task, ways, _SECOND + MORE)
     hammers = [task.hammers[0]] * ways.size

@@ -57,7 +57,7 @@ class Chain(Waveform):
         return offset + last.support
 
     def supply(self) -> Supply:
-        """Return the supply of the first part."""
+        """Return the supply of the first waveform of the chain."""
         return self.parts[0][1].supply()
 
     def segments(self) -> FloatArray:

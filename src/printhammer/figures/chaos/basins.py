@@ -82,7 +82,7 @@ def draw(
 
 
 SHADES: Final = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#0072b2", "#d55e00", "#999933")
-"""Colours of the basins, by M. Okabe and K. Ito (2008); further basins get lighter shades of them."""
+"""Colours of the basins, by M. Okabe and K. Ito (2008); lighter shades follow for further basins."""
 
 OTHERS: Final = {0: ("undecided", "#ffffff"), -1: ("run ended early", "#1a1a1a"), -2: ("no state", "#d9d9d9")}
 """Names and colours of the cells that lead to no known attractor, by cell label."""

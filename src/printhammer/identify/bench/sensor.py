@@ -173,7 +173,7 @@ _OTHERS: Final = ("exact", "sampling_rate", "bandwidth", "outliers")
 
 
 def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, str]) -> Sensor:
-    """Return a copy of a sensor with other settings; `units` are the SI units of the quantities.
+    """Return a copy of a sensor with changed settings; `units` are the SI units of the quantities.
 
     Settings are "noise", "resolution", "offset": a mapping of quantity to amount, such as {"force": "0.5 %"};
     "sampling_rate" and "bandwidth": "100 kHz" or a number in Hz, "none" for no limit; "outliers": a
@@ -215,7 +215,7 @@ def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, st
 
 
 def applicable(sensor: Sensor, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings that apply to a sensor; omit sampling settings if it makes no records."""
+    """Return the settings that apply to a sensor, without sampling settings if it makes no records."""
     kept = dict(settings)
     for role in PARTS:
         if role in kept:

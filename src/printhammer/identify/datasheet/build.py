@@ -61,7 +61,7 @@ GUESSES: Final = {
     "fringe": Guess(0.5, 0.7, "flanks that fringe half as high as the pole's radius, within a factor 2"),
     "leakage": Guess(0.3, 1.0, "a third of the printed inductance passes the armature, within a factor e"),
 }
-"""Log-normal priors, SI, of size-independent terms; `core` is an equivalent air gap, `leakage` a fraction."""
+"""Log-normal priors of the magnet's constants, SI; "core" is an air gap, "fringe" and "leakage" fractions."""
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ from printhammer.support.arrays import FloatArray
 _REJECTED: Final = 0.01
 """Significance level below which the F-test rejects the model."""
 _LARGER: Final = 1.1
-"""Factor by which residuals may exceed the noise estimate of a record; the estimate is no more accurate."""
+"""Largest accepted ratio of residuals to the noise estimate of a record, whose accuracy is limited."""
 _DEGREES: Final = 0.22
 """Degrees of freedom per sample of the noise estimate (median of third differences)."""
 _TOLD: Final = 0.05

@@ -264,14 +264,14 @@ class Pulse(Declared, eq=False):
     note: str = part("remark; may be empty", default="")
 
     def changed(self, values: Sequence[float]) -> Waveform:
-        """Return the waveform with its constants set to other values."""
+        """Return the waveform with its fitted constants set to `values`."""
         if self.names == ("scale",):
             return self.waveform.scaled(float(values[0]))
         new = dict(zip(self.names, (float(value) for value in values), strict=True))
         return type(self.waveform)(**{**self.waveform.model_dump(), **new})
 
     def at(self, values: Sequence[float]) -> Pulse:
-        """Return the pulse with its constants set to other values, without uncertainty."""
+        """Return the pulse with its fitted constants set to `values`, without uncertainty."""
         waveform = self.changed(values) if self.names else self.waveform
         return Pulse(waveform, (), np.zeros(0), np.zeros((0, 0)))
 

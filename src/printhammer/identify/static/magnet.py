@@ -148,7 +148,7 @@ def _least_absolute(columns: FloatArray, data: FloatArray) -> FloatArray:
 
 
 _SPARE: Final = 4
-"""Smallest number of rows in excess of parameters, for the errors and the test of the law; arbitrary."""
+"""Smallest number of rows in excess of parameters for which errors and tests are computed; arbitrary."""
 
 _LEVELS: Final = 12
 """Largest number of distinct currents plotted as separate series."""

@@ -44,7 +44,7 @@ _FACTOR: Final = 4.0
 """Ratio of force to i^2/2 dL/dg that saturation cannot explain; a force in lbf instead of N gives 4.4."""
 
 _SPARE: Final = 4
-"""Smallest number of rows in excess of parameters, for the errors; arbitrary."""
+"""Smallest number of rows in excess of parameters for which standard errors are computed; arbitrary."""
 
 _STARTS: Final = 8
 """Number of starts of the multi-start search; the first is an estimate, the others are random around it."""

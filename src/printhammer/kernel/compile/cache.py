@@ -123,7 +123,7 @@ def _write(path: Path, payload: bytes) -> None:
 
 @contextmanager
 def _alone(path: Path) -> Iterator[None]:
-    """Lock a file while its content is made, waiting for other processes; no lock if unsupported."""
+    """Lock a file while its content is computed; wait for other processes; no lock if unsupported."""
     lock = path.with_name(f".{path.name}.lock")
     handle = -1
     try:
@@ -198,7 +198,7 @@ class File:
             say_once(f"{self._written}: machine code cannot be kept ({error.strerror or error}); {_OTHER}")
 
     def get(self, make: Callable[[], bytes]) -> bytes:
-        """Return the cached content; if it is missing, make it and write it to the cache."""
+        """Return the cached content; if it is missing, create it and write it to the cache."""
         content = self.read()
         if content is None:
             with self._alone():
@@ -209,7 +209,7 @@ class File:
         return content
 
     def _alone(self) -> AbstractContextManager[None]:
-        """Return a lock on the file; another process may have made the content once the lock is obtained."""
+        """Return a context manager that locks the file; the content may have appeared by then."""
         return nullcontext() if self._written is None else _alone(self._written / self.name)
 
 

@@ -111,7 +111,7 @@ def _not(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
 
 
 def law(name: str, symbol: str, floats: int) -> Callable[..., float]:
-    """Return a stub for a law whose arguments are the constants and `floats` numbers, for its callers."""
+    """Return the stub of a law, for compiling its callers: constants, then `floats` numbers."""
     arguments = ", ".join(f"a{i}" for i in range(floats))
     scope: dict[str, Any] = {"__name__": __name__}
     exec(f"def {name}(c, {arguments}):\n    return 0.0\n", scope)

@@ -73,8 +73,8 @@ class Kernel:
     def web_module(self, names: Sequence[str] = ENTRIES) -> WebModule:
         """Return the WebAssembly module of the entry points `names`.
 
-        The calling convention is described in :mod:`printhammer.kernel.compile.web.build`. The content is
-        shipped for the laws of shipped hammers; building other modules needs the extra `page`.
+        The calling convention is described in :mod:`printhammer.kernel.compile.web.build`. The wheel contains
+        the modules for the laws of shipped hammers; building other modules needs the extra `page`.
         """
         return web_module_of([self._entries[name] for name in names])
 

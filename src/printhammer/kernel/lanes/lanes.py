@@ -58,7 +58,7 @@ if TYPE_CHECKING:
 
 
 FINE = 1e-6
-"""Tolerance of the order 7 estimate below which samples use the additional force evaluation."""
+"""Tolerance of the order 7 error estimate, below which samples use an additional force evaluation."""
 
 
 @compiled

@@ -119,7 +119,7 @@ FREE_STEP = 3
 PACK_STEP = 4
 CONTACT_STEP = 5
 UNIT = 6
-"""Column of the scale of s in the current backstop contact; 0 if the contact is open since the start."""
+"""Column of the scale of s in the current backstop contact; 0 if the run began in this contact."""
 DOT = 7
 """Column of the row of dot data of the open pack contact; -1 if no pack contact is open."""
 END = 8

@@ -130,7 +130,7 @@ def leave(
     drive: Drive,
     control: Control,
 ) -> tuple[float, float, float, float, float]:
-    """Locate the release, w = 0, in a step `h` up to the fraction `upper`; return state and fraction."""
+    """Locate the release from the backstop, w = 0, in a step `h` up to the fraction `upper`."""
     t, w, v, kv = start
     low, high = 0.0, upper
     negligible = 1e-12 * math.sqrt(control[0])
@@ -182,7 +182,7 @@ def reach_time(
 
 @called
 def end_push(start: ContactState, h: float, upper: float, hammer: Hammer, drive: Drive) -> ContactState:
-    """Locate by bisection where the backstop ceases to push in a step `h`, up to the fraction `upper`."""
+    """Locate by bisection the end of the push by the backstop in a step `h`, up to the fraction `upper`."""
     t, w, v, kv = start
     low, high = 0.0, upper
     for _ in range(60):

@@ -61,7 +61,7 @@ def plain_step(
 def whole_step(
     t: float, x: float, v: float, a: float, h: float, law: ForceLaw
 ) -> tuple[float, float, float, float, float, Electric, float]:
-    """Compute `plain_step` with the electric state and its normalised error estimate as further results."""
+    """Compute the same step as `plain_step`; return also the electric state and its normalised error."""
     if HAS_CIRCUIT:
         return whole_time_step(t, x, v, a, h, law)
     x1, v1, a1, error_x, error_v = plain_step(t, x, v, a, h, law)

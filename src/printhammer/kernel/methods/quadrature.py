@@ -1,8 +1,8 @@
 """Integrals of power along a recorded run: the terms of the energy ledger, each by its own quadrature.
 
 Each integration step is integrated by eight-point Gauss-Legendre quadrature; the state at each point is
-computed by a shortened step of the integrator. In the backstop, the integration variable is s, in which the
-power is smooth at touch and at separation.
+computed by a shortened step of the integrator. In the backstop, the integration variable is the regularised
+time s (dt = 2 w ds), in which the power is smooth at touch and at separation.
 """
 
 from __future__ import annotations

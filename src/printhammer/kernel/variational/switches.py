@@ -155,7 +155,7 @@ def pass_level(
 
 @compiled
 def pass_node(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
-    """Propagate the columns through any event at the node `after`; return whether it is differentiable."""
+    """Propagate the columns through any event at the node `after`; return whether differentiable."""
     if is_rebound(node, after):
         pass_rebound(node, after, columns, setting)
         return True

@@ -178,7 +178,7 @@ class TableMagnet(GridMagnet):
 
 
 def _packed_spline(table: Grid) -> tuple[float, ...]:
-    """Return the force spline and its integrals along x: of the force, and of the derivative along I."""
+    """Return table, force spline, and its integrals along x: energy at zero current, flux linkage."""
     import numpy as np
 
     x, current = np.array(table.x), np.array(table.current)

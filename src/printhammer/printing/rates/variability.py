@@ -150,7 +150,7 @@ CONSTANTS: Final = {
 
 _TRIES: Final = 10  # Maximum number of batches drawn, each of the requested size
 WIDEST: Final = 3.0
-"""Standard deviations at which a draw is clipped; arbitrary."""
+"""Largest deviation of a drawn constant, in standard deviations; larger draws are clipped; arbitrary."""
 
 
 class Variability(Declared):

@@ -249,7 +249,7 @@ class Results:
     schemes = _file("schemes", Schemes, "Effect of the integrators of 1983 on verdicts.")
 
     def check(self) -> None:
-        """Read all result files, to check them."""
+        """Read and validate all result files."""
         for name in FILES:
             getattr(self, name)
 

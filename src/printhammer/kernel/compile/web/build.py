@@ -38,10 +38,10 @@ _FEATURES: Final = "+bulk-memory,+mutable-globals,+nontrapping-fptoint,+sign-ext
 """Features of WebAssembly 2.0, which browsers have had since 2023."""
 _POINTERS: Final = "-p:32:32-"
 _PADDED: Final = "-p:32:64-"
-"""Pointers of four bytes that take eight in a structure.
+"""Pointers in the data layout, with a size of four bytes and an alignment of eight.
 
-Templates are simplified when they are lowered: they hold sizes and offsets of structures as numbers, those of
-a machine with pointers of eight bytes.
+Lowered templates hold the sizes and offsets of structures as numbers, computed for pointers of eight bytes;
+with this alignment the numbers stay correct.
 """
 _STACK: Final = 1 << 20
 """Size of the stack, bytes; several times what an entry point uses."""
