@@ -121,6 +121,12 @@ def test_a_package_brings_a_law(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
             "spring_energy",
         ),
         ("    travel = x - c[2]\n", "    travel = x - c[2]\n    print(travel)\n", "spring_force"),
+        # A print in a function that the law calls.
+        (
+            "def spring_force(c, x):\n",
+            "def shown(x):\n    print(x)\n\n\ndef spring_force(c, x):\n    shown(x)\n",
+            "spring_force",
+        ),
     ],
 )
 def test_a_law_that_is_none_is_a_sentence(tmp_path: Path, old: str, new: str, key: str | None) -> None:
@@ -138,6 +144,24 @@ def test_a_law_in_a_cell_of_a_notebook_is_a_sentence(monkeypatch: pytest.MonkeyP
     exec(CUBIC.replace('"hardening"', '"of a cell"'), vars(cell))
     with refused("CubicSpring", "cell"):
         vars(cell)["CubicSpring"](stiffness=1.0, cubic=1.0)
+
+
+def test_a_law_of_a_file_replaces_one_of_a_cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cell = ModuleType("cell")
+    monkeypatch.setitem(sys.modules, "cell", cell)
+    exec(CUBIC.replace('"hardening"', '"own_cell"'), vars(cell))
+    load_parts(written(tmp_path, "own_cell"))
+    assert PARTS["spring", "own_cell"].__module__ == "own_cell"
+
+
+def test_a_law_that_the_compiler_does_not_understand_is_a_sentence(tmp_path: Path) -> None:
+    text = CUBIC.replace("    travel = x - c[2]\n", "    travel = float(str(x - c[2]).upper())\n", 1)
+    load_parts(written(tmp_path, "own_words", text))
+    spring: dict[str, Any] = {"law": "own_words", "stiffness": "1 N/m", "cubic": "1 N/m^3"}
+    hammer = ph.Hammer.build("1 kg", spring=spring)
+    with refused("spring_force") as caught:
+        ph.simulate(hammer, ph.SineForce("0.1 N", "1 Hz"), duration=1.0)
+    assert "own_words.py" in str(caught.value)
 
 
 def test_a_wrong_law_is_a_sentence_in_python_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

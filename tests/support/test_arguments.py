@@ -23,6 +23,11 @@ TRAIN = ph.PulseTrain(HAMMER.waveform, rate="1 kHz", pulses=2)
         (lambda: ph.strobe(HAMMER.waveform, rate="1 kHz"), "hammer", HAMMER.waveform),
         (lambda: ph.safe_rate("impact-wire"), "hammer", "impact-wire"),
         (lambda: ph.judge_table(HAMMER, "table.json"), "table", "table.json"),
+        (lambda: ph.rest_state("hendriks-1983"), "hammer", "hendriks-1983"),
+        (lambda: ph.equilibria(TRAIN), "hammer", TRAIN),
+        (lambda: ph.release_current(HAMMER.waveform), "hammer", HAMMER.waveform),
+        (lambda: ph.holding_margin("hendriks-1983", 1e-4), "hammer", "hendriks-1983"),
+        (lambda: ph.bifurcation_curve(TRAIN, "mass", (1.0, 2.0)), "source", TRAIN),
         (lambda: ph.measure("magnet", "hendriks-1983"), "hammer", "hendriks-1983"),
     ],
 )

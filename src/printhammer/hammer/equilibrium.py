@@ -135,13 +135,13 @@ def equilibria(
     InputError
         The current is not finite or outside the range of the magnet's law, or the limits are empty.
     """
+    force = StaticForce(hammer)
     smallest, largest = _currents(hammer)
     if not smallest <= current <= largest:
         bounds = f"is expected to be from {smallest:g} to {largest:g} A"
         raise InputError(
             f"current = {current!r} {bounds}, where the law of the magnet holds", key="current", value=current
         )
-    force = StaticForce(hammer)
     resting = [_described(force, root, current) for root in _same_rest(force, current, within)]
     if force.rigid and hammer.backstop is not None:
         position = hammer.backstop.position
@@ -164,10 +164,10 @@ def release_current(hammer: HammerLike) -> float:
         The hammer has no backstop or magnet, or no current within the range of the magnet's law lifts the
         armature.
     """
+    force = StaticForce(hammer)
     if hammer.backstop is None or hammer.magnet is None:
         missing = "magnet" if hammer.magnet is None else "backstop"
         raise InputError(f"{_named(hammer)} has no release current: it has no {missing}", key="release")
-    force = StaticForce(hammer)
     position = hammer.backstop.position
 
     def net(current: float) -> float:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any, Final, Protocol
 
+from printhammer.errors import InputError
 from printhammer.parts import BackstopPart, MagnetPart, PackPart, Part, SpringPart, absent
 
 FAR: Final = 1.0
@@ -60,6 +61,8 @@ class StaticForce:
     """
 
     def __init__(self, hammer: HammerLike) -> None:
+        if not hasattr(hammer, "backstop"):
+            raise InputError.of("hammer", hammer, "a hammer, such as load('hendriks-1983')")
         self.hammer = hammer
         self._magnet, self._magnet_constants = law_of(hammer, hammer.magnet, "magnet_force")
         self._spring, self._spring_constants = law_of(hammer, hammer.spring, "spring_force")

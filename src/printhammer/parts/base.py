@@ -134,6 +134,8 @@ _P = TypeVar("_P", bound=type[Part])
 def register(part: _P) -> _P:
     """Class decorator that registers a part class under its role and law.
 
+    A class of a notebook cell, from which no hammer can be built, gives way to one of a file.
+
     Raises
     ------
     ValueError
@@ -144,7 +146,11 @@ def register(part: _P) -> _P:
         raise ValueError(f"part {part.__name__} has the role {part.role!r}: expected one of {known}")
     key = (part.role, part.law)
     taken = PARTS.get(key)
-    if taken is not None and (taken.__module__, taken.__qualname__) != (part.__module__, part.__qualname__):
+    same = taken is not None and (taken.__module__, taken.__qualname__) == (
+        part.__module__,
+        part.__qualname__,
+    )
+    if taken is not None and not same and hasattr(sys.modules.get(taken.__module__), "__file__"):
         raise ValueError(f"the {part.role} law {part.law!r} is already taken by {taken.__module__}")
     PARTS[key] = part
     return part

@@ -6,6 +6,7 @@ import inspect
 import sys
 from collections.abc import Callable
 from functools import cache
+from types import FunctionType
 from typing import Any, Final
 
 from printhammer.errors import InputError
@@ -54,8 +55,7 @@ def check_functions(part: Any, *, complete: bool = False) -> None:
             raise InputError(
                 f"{where}: {has}", file=where, key=name, expected=f"the function {name}({', '.join(wanted)})"
             )
-        code = getattr(law, "__code__", None)
-        if code is not None and "print" in code.co_names:
+        if any("print" in function.__code__.co_names for function in _called(law)):
             # Machine code runs without the interpreter's lock, for which a print would wait.
             raise InputError.of(name, "print", "a law that prints nothing", file=where)
     forces = _FORCES[part.role]
@@ -66,6 +66,18 @@ def check_functions(part: Any, *, complete: bool = False) -> None:
             key="force",
             expected=f"the function {' or '.join(forces)}",
         )
+
+
+def _called(law: Callable[..., Any]) -> list[FunctionType]:
+    """Return the Python functions of a law: the law and all that it calls, directly or not."""
+    waiting: list[object] = [law]
+    functions: dict[FunctionType, None] = {}
+    while waiting:
+        function = waiting.pop()
+        if isinstance(function, FunctionType) and function not in functions:
+            functions[function] = None
+            waiting += [function.__globals__.get(name) for name in function.__code__.co_names]
+    return list(functions)
 
 
 def _takes(law: Callable[..., Any], count: int) -> bool:

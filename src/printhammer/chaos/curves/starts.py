@@ -71,6 +71,8 @@ def start_of(
         if regime is not None:
             raise InputError("a branch is given", key="regime", expected="no regime in addition")
         return _of_branch(source, event)
+    if not isinstance(source, Reopened | str | Path):
+        raise InputError.of("source", source, "a branch of orbits, or a file with a branch or a curve")
     opened = source if isinstance(source, Reopened) else reopen(source)
     if regime is None:
         raise InputError(

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any, Final
 import llvmlite.binding as llvm
 import numba
 from numba import types
+from numba.core.errors import NumbaError, UnsupportedBytecodeError
 
+from printhammer.errors import InputError
 from printhammer.kernel.compile.link import law_symbol
 from printhammer.kernel.compile.templates import compile_law, compile_module
 from printhammer.kernel.lanes import layout as lane_layout
@@ -29,12 +31,21 @@ _OPTIONS: Final[dict[str, Any]] = {
 }
 """Compiler options, the same as in :mod:`printhammer.kernel.compile.compiling`."""
 
+_NO_REASON: Final = ("Failed in", "Resolution failure")
+"""First words of the lines of a typing error that name a pass of the compiler, not the reason."""
+
 _FOR_C: Final = "cfunc."
 """Prefix of the symbol of numba's C wrapper of a function; the symbol of the function itself follows."""
 
 
 def laws(role: str, functions: Mapping[str, Callable[..., Any]], for_lanes: bool) -> bytes:
-    """Lower the law functions of a part to one module; return LLVM bitcode."""
+    """Lower the law functions of a part to one module; return LLVM bitcode.
+
+    Raises
+    ------
+    InputError
+        The compiler does not understand a function; the message names the function and the reason.
+    """
 
     def compiled(function: Any) -> Any:
         return numba.njit(**_OPTIONS)(function)
@@ -50,7 +61,17 @@ def laws(role: str, functions: Mapping[str, Callable[..., Any]], for_lanes: bool
     for name in LAW_FUNCTIONS[role]:
         arguments = (constants, *(types.float64,) * floats_of(name))
         law = compile_law(functions[name], compiled, **names).py_func
-        lowered = numba.njit(types.float64(*arguments), **_OPTIONS)(law)
+        try:
+            lowered = numba.njit(types.float64(*arguments), **_OPTIONS)(law)
+        except (NumbaError, UnsupportedBytecodeError) as error:
+            lines = (line.strip(" -") for line in str(error).splitlines())
+            reasons = [line for line in lines if line and not line.startswith(_NO_REASON)]
+            raise InputError.of(
+                name,
+                reasons[0],
+                "a law of floats that calls only `math` and functions of its own module",
+                file=functions[name].__code__.co_filename,
+            ) from error
         whole.link_in(_alone(lowered.inspect_llvm(arguments), law_symbol(name, for_lanes)))
     return bytes(whole.as_bitcode())
 
