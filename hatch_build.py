@@ -29,10 +29,9 @@ class LoweredModules(BuildHookInterface[Any]):
         from printhammer.hammer.hammer import load, shipped
         from printhammer.kernel.compile.bindings import bindings_of
         from printhammer.kernel.compile.modules import Module, every_template, laws_of
-        from printhammer.kernel.compile.specialise import specialise
         from printhammer.kernel.model.laws import LAW_FUNCTIONS, Laws
         from printhammer.parts import PARTS
-        from printhammer.run import problem
+        from printhammer.run import entries, problem
 
         folder = tempfile.TemporaryDirectory()
         atexit.register(folder.cleanup)
@@ -43,7 +42,7 @@ class LoweredModules(BuildHookInterface[Any]):
             place = module.shipped.relative_to(Path(self.root, "src"))
             build_data["force_include"][str(path)] = place.as_posix()
 
-        for template in every_template():
+        for template in (*every_template(), *entries.templates()):
             ship(template)
         for role in LAW_FUNCTIONS:
             parts = {part.__module__ for (known, _), part in PARTS.items() if known == role}
@@ -56,4 +55,4 @@ class LoweredModules(BuildHookInterface[Any]):
         for hammer in map(load, shipped()):
             # A textbook oscillator has no pulse of its own, and is driven by a force.
             drive = PulseTrain(hammer.waveform) if hammer.waveform else SineForce(1.0, 1.0)
-            ship(specialise(problem.laws_of(hammer, drive)).web_module())
+            ship(entries.page_module(problem.laws_of(hammer, drive)))

@@ -7,7 +7,7 @@ import hashlib
 import importlib
 import inspect
 import sys
-from types import FunctionType
+from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from printhammer.kernel.compile.cache import File
@@ -112,3 +112,31 @@ def helpers_of(function: FunctionType) -> dict[str, FunctionType]:
 def _modules_of(function: FunctionType) -> set[str]:
     """Return the names of the modules that define a law and all functions that it calls."""
     return {function.__module__}.union(*(_modules_of(helper) for helper in helpers_of(function).values()))
+
+
+def plain_digest(function: Callable[..., Any]) -> str:
+    """Return a digest of a plain function: of its module, of those of its helpers, and of their constants."""
+    modules: set[str] = set()
+    constants: set[str] = set()
+
+    def walk(each: Any) -> None:
+        modules.add(each.__module__)
+        for name in each.__code__.co_names:
+            value = each.__globals__.get(name)
+            if isinstance(value, FunctionType):
+                walk(value)
+            elif isinstance(value, type):
+                modules.add(value.__module__)
+            elif isinstance(value, ModuleType):
+                attributes = ((one, getattr(value, one, None)) for one in each.__code__.co_names)
+                constants.update(f"{name}.{one} {number}" for one, number in attributes if _is_number(number))
+            elif _is_number(value):
+                constants.add(f"{name} {value!r}")
+
+    walk(function)
+    sources = (inspect.getsource(sys.modules[name]) for name in sorted(modules))
+    return f"{code_digest(sources)} {sorted(constants)}"
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, bool | int | float | tuple)

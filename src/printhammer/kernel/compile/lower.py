@@ -21,6 +21,7 @@ from printhammer.kernel.compile.signatures import RESULTS, signature_of
 from printhammer.kernel.compile.templates import (
     TEMPLATES,
     VARIATIONAL,
+    bind,
     compile_law,
     compile_module,
     execute,
@@ -34,6 +35,8 @@ from printhammer.kernel.variational.layout import electric_row
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
+
+    from printhammer.kernel.compile.signatures import Plain
 
 _LAYOUT = ("INVERSE_MASS", "POSITION", "FRONT", "DAMPING", "SPRING", "PACK", "BACKSTOP_PART", "MAGNET")
 
@@ -52,11 +55,25 @@ def template(entry: str, variant: Mapping[str, bool]) -> bytes:
         namespace = _flow(variant["HAS_CIRCUIT"], variant["FORCED"])
     else:
         namespace = _plain(variant["HAS_CIRCUIT"])
-    arguments = tuple(_types(each) for each in signature_of(entry, variant))
-    library, symbol, kind = _lowered(namespace[entry], arguments)
-    expected = {0: types.none, 1: types.int64}.get(RESULTS[entry], _tuple([types.int64] * RESULTS[entry]))
-    if kind != expected:
-        raise TypeError(f"{entry} returns {kind}, expected {expected}")
+    return _entry(namespace[entry], entry, signature_of(entry, variant), RESULTS[entry])
+
+
+def plain(name: str, entry: Plain, circuit: bool | None) -> bytes:
+    """Lower a plain function as an entry point; return LLVM bitcode.
+
+    `circuit` states whether the hammer has a coil circuit; None for a function that uses no names of the
+    kernel.
+    """
+    namespace = {} if circuit is None else _plain(circuit)
+    return _entry(bind(entry.function, namespace, compiled), name, entry.arguments, entry.results)
+
+
+def _entry(function: Any, name: str, signature: Any, results: int) -> bytes:
+    """Lower a compiled function as an entry point, with its callees; return LLVM bitcode."""
+    library, symbol, kind = _lowered(function, tuple(map(_types, signature)))
+    expected = {0: types.none, 1: types.int64}.get(results, _tuple([types.int64] * results))
+    if types.unliteral(kind) != expected:  # type: ignore[no-untyped-call]
+        raise TypeError(f"{name} returns {kind}, expected {expected}")
     return bytes(library.with_callees(symbol, ENTRY).as_bitcode())
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.kernel.compile import calls, link
-from printhammer.kernel.compile.bindings import code_digest
+from printhammer.kernel.compile.bindings import code_digest, plain_digest
 from printhammer.kernel.compile.cache import Code, File, say_once
 from printhammer.kernel.compile.signatures import RESULTS, signature_of
 from printhammer.kernel.compile.web import build as web
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from printhammer.kernel.compile.bindings import Bindings
+    from printhammer.kernel.compile.signatures import Plain
 
 KINDS: Final = {
     "run": "runs",
@@ -42,14 +43,8 @@ KERNEL: Final = Path(__file__).parents[1]
 SHIPPED: Final = KERNEL / "modules"
 """Folder of the lowered modules that the wheel contains."""
 
-_PLAIN: Final = (
-    "model",
-    "methods",
-    "single",
-    "compile/compiling.py",
-    "compile/linking.py",
-    "compile/lower.py",
-)
+_LOWERING: Final = ("compile/compiling.py", "compile/linking.py", "compile/lower.py")
+_PLAIN: Final = ("model", "methods", "single", *_LOWERING)
 _SOURCES: Final = {
     "lanes": (*_PLAIN, "lanes"),
     "members": (*_PLAIN, "lanes"),
@@ -71,7 +66,7 @@ def _digest_of(places: tuple[str, ...]) -> str:
 
 
 @cache
-def _lowering() -> str:
+def _versions() -> str:
     """Return the versions of numba and llvmlite, on which lowered modules depend, for use in file names."""
     versions = []
     for name in ("numba", "llvmlite"):
@@ -99,11 +94,11 @@ class Module:
 
     def identity(self) -> str:
         """Return a name that identifies the content of the module, without reading or lowering it."""
-        return self.name if self.shipped.exists() else f"{self.name}_{_lowering()}"
+        return self.name if self.shipped.exists() else f"{self.name}_{_versions()}"
 
     def is_there(self) -> bool:
         """Whether the lowered module is in the wheel or in the disk cache."""
-        return self.shipped.exists() or File(f"{self.name}_{_lowering()}{self.suffix}").exists()
+        return self.shipped.exists() or File(f"{self.name}_{_versions()}{self.suffix}").exists()
 
     def content(self) -> bytes:
         """Return the content of the module: from the wheel, from the disk cache, or lowered now."""
@@ -113,7 +108,7 @@ class Module:
                 if self.is_readable(content):
                     return content
             say_once(f"{self.shipped}: the module cannot be read; it is made anew")
-        return File(f"{self.name}_{_lowering()}{self.suffix}").get(self._make)
+        return File(f"{self.name}_{_versions()}{self.suffix}").get(self._make)
 
 
 class WebModule(Module):
@@ -137,6 +132,20 @@ def template_of(entry: str, variant: Mapping[str, bool]) -> Module:
 
     sources = _digest_of(_SOURCES.get(entry, _PLAIN))
     return Module(entry, f"{entry} {sorted(variant.items())} {sources}", make)
+
+
+def plain_template(name: str, plain: Plain, circuit: bool) -> Module:
+    """Return the template of a plain function, in a variant if it uses names of the kernel."""
+
+    def make() -> bytes:
+        from printhammer.kernel.compile import lower
+
+        return lower.plain(name, plain, circuit if plain.laws else None)
+
+    sources = _digest_of(_SOURCES["members"] if plain.laws else _LOWERING)
+    kind = circuit if plain.laws else None
+    own = plain_digest(plain.function)
+    return Module(name, f"{name} {plain.arguments} {plain.results} {kind} {sources} {own}", make)
 
 
 def every_template() -> Iterator[Module]:
@@ -163,9 +172,7 @@ def laws_of(role: str, bindings: Bindings, for_lanes: bool) -> Module:
 
         return own.laws(role, bindings.names, for_lanes)
 
-    lowering = (
-        ("compile/compiling.py", "compile/linking.py", "compile/lower.py") if ours else ("compile/own.py",)
-    )
+    lowering = _LOWERING if ours else ("compile/own.py",)
     sources = _digest_of((*lowering, "model/laws.py"))
     if for_lanes:
         sources += _digest_of(("lanes/layout.py", "lanes/math.py"))
@@ -187,6 +194,8 @@ class Entry:
         Additional choices, by name.
     label : str
         Description of the laws, for messages.
+    plain : Plain, optional
+        Function outside the kernel, instead of a key of `KINDS`.
     """
 
     def __init__(
@@ -196,12 +205,19 @@ class Entry:
         bindings: Bindings,
         choices: Mapping[str, int],
         label: str,
+        plain: Plain | None = None,
     ) -> None:
         self.name = name
-        self._variant = dict(variant)
         self._choices = {**bindings.choices, **choices}
-        flavours = (False, True) if name == "lanes" else (False,)
-        self._template = template_of(name, variant)
+        flavours: tuple[bool, ...] = (False, True) if name == "lanes" else (False,)
+        if plain is None:
+            self._template = template_of(name, variant)
+            self._signature, self._results = signature_of(name, variant), RESULTS[name]
+        else:
+            self._template = plain_template(name, plain, variant["HAS_CIRCUIT"])
+            self._signature, self._results = plain.arguments, plain.results
+            if not plain.laws:
+                flavours, self._choices = (), {}
         self._laws = [laws_of(role, bindings, lanes) for lanes in flavours for role in bindings.digests]
         self._function: Callable[..., Any] | None = None
         parts = [module.identity() for module in (self._template, *self._laws)]
@@ -210,7 +226,7 @@ class Entry:
         modules = [self._template, *self._laws]
         self.code = Code(
             f"{name}_{digest.hexdigest()[:24]}.code",
-            KINDS[name],
+            KINDS.get(name, name),
             label,
             lambda: all(module.is_there() for module in modules),
         )
@@ -224,12 +240,8 @@ class Entry:
         with one_at_a_time:
             if self._function is None:
                 address = link.load(self.code.get(self._make))
-                self._function = calls.caller(address, self._signature, RESULTS[self.name])
+                self._function = calls.caller(address, self._signature, self._results)
         return self._function
-
-    @property
-    def _signature(self) -> Any:
-        return signature_of(self.name, self._variant)
 
     def _make(self) -> bytes:
         calling = calls.calling_code(link.ENTRY, self._signature, link.CALL)
@@ -251,7 +263,7 @@ class Entry:
 
     def description(self) -> dict[str, Any]:
         """Return argument types and number of results of the entry point, for its WebAssembly module."""
-        return {"arguments": web.description_of(self._signature), "results": RESULTS[self.name]}
+        return {"arguments": web.description_of(self._signature), "results": self._results}
 
 
 def web_module_of(entries: Sequence[Entry]) -> WebModule:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from printhammer.kernel.lanes.batch import Batch, Kept
 from printhammer.kernel.variational.layout import Carried
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from printhammer.kernel.compile.calls import Signature
 
@@ -69,3 +69,20 @@ def signature_of(entry: str, variant: Mapping[str, bool]) -> Any:
     if entry == "flow":
         return (*_FLOW, _FORCING if variant["FORCED"] else (), "f1", "i1", "b", "b", "f2", _CARRIED)
     return _SIGNATURES[entry]
+
+
+class Plain(NamedTuple):
+    """Entry point outside the kernel: an ordinary function of numbers and arrays, and its types.
+
+    The function allocates nothing and raises nothing; it returns None, an integer, or a tuple of integers.
+    Its module may leave names of laws, of choices and of functions of the kernel's templates undefined; these
+    are bound when the function is compiled, see :func:`printhammer.kernel.compile.templates.bind`.
+    """
+
+    function: Callable[..., Any]
+    arguments: Any
+    """Type codes of the arguments, see :data:`printhammer.kernel.compile.calls.Signature`."""
+    results: int = 0
+    """Number of integers that the function returns."""
+    laws: bool = False
+    """Whether the function uses names of the kernel."""

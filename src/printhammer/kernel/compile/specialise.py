@@ -5,16 +5,18 @@ from __future__ import annotations
 import functools
 import os
 import sys
-from typing import TYPE_CHECKING, Any
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final, cast
 
 from printhammer.kernel.compile.bindings import bindings_of
 from printhammer.kernel.compile.modules import Entry, WebModule, one_at_a_time, web_module_of
-from printhammer.kernel.compile.templates import TEMPLATES, VARIATIONAL, compile_law, execute_all
+from printhammer.kernel.compile.templates import TEMPLATES, VARIATIONAL, bind, compile_law, execute_all
 from printhammer.kernel.variational.layout import changing, electric_row
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from printhammer.kernel.compile.signatures import Plain
     from printhammer.kernel.model.laws import Laws
 
 begin_ahead: Callable[[Laws], Callable[[], None]] | None = None
@@ -28,6 +30,8 @@ ENTRIES = ("run", "resample", "quadratures", "peaks", "members")
 
 AHEAD = ("peaks", "quadratures", "resample")
 """Entry points that are usually needed after `run`, and may be compiled ahead in parallel."""
+
+_NONE: Final[Mapping[str, Plain]] = MappingProxyType({})
 
 
 class Kernel:
@@ -70,13 +74,20 @@ class Kernel:
         """Whether an entry point is compiled in this process or has machine code on disk."""
         return name not in self._entries or self._entries[name].is_ready()
 
-    def web_module(self, names: Sequence[str] = ENTRIES) -> WebModule:
-        """Return the WebAssembly module of the entry points `names`.
+    def web_module(self, names: Sequence[str] = ENTRIES, further: Mapping[str, Plain] = _NONE) -> WebModule:
+        """Return the WebAssembly module of the entry points `names` and of `further` plain functions.
 
         The calling convention is described in :mod:`printhammer.kernel.compile.web.build`. The wheel contains
         the modules for the laws of shipped hammers; building other modules needs the extra `page`.
         """
-        return web_module_of([self._entries[name] for name in names])
+        plain = [_plain_entry(name, function, self.laws) for name, function in further.items()]
+        return web_module_of([*(self._entries[name] for name in names), *plain])
+
+    def plain(self, name: str, function: Plain) -> Callable[..., Any]:
+        """Return a plain function, with the laws of the kernel, as machine code that Python calls."""
+        if is_interpreted():
+            return cast("Callable[..., Any]", bind(function.function, self.namespace, _as_is))
+        return _plain_entry(name, function, self.laws).function()
 
     @functools.cached_property
     def namespace(self) -> dict[str, Any]:
@@ -123,6 +134,18 @@ def _specialised(laws: Laws) -> Kernel:
     if is_interpreted():
         kernel.interpret(kernel.namespace)
     return kernel
+
+
+@functools.cache
+def _plain_entry(name: str, function: Plain, laws: Laws) -> Entry:
+    bindings = bindings_of(laws)
+    variant = {"HAS_CIRCUIT": bindings.choices["HAS_CIRCUIT"]}
+    label = _specialised(laws).label if function.laws else "numbers of the page"
+    return Entry(name, variant, bindings, {}, label, function)
+
+
+def _as_is(function: Callable[..., Any]) -> Callable[..., Any]:
+    return function
 
 
 def variational(plain: Kernel, *, forced: bool) -> Kernel:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from printhammer.kernel.compile.bindings import helpers_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
 TEMPLATES = (
     "model.pulses",
@@ -81,6 +81,23 @@ def compile_law(function: Callable[..., Any], compiled: Callable[..., Any], **na
         scope.update({name: compile_law(helper, compiled, **names) for name, helper in helpers.items()})
         function = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
     return compiled(function)
+
+
+def bind(function: Any, namespace: Mapping[str, Any], compiled: Callable[..., Any], known: Any = None) -> Any:
+    """Compile a plain function and its helpers; `namespace` has the names that their modules leave undefined.
+
+    The dictionary `known` collects the compiled functions, so that each is compiled once.
+    """
+    known = {} if known is None else known
+    if function not in known:
+        scope = dict(function.__globals__)
+        missing = {name for name in function.__code__.co_names if name in namespace and name not in scope}
+        scope.update({name: namespace[name] for name in missing})
+        for name, helper in helpers_of(function).items():
+            scope[name] = bind(helper, namespace, compiled, known)
+        copy = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
+        known[function] = compiled(copy)
+    return known[function]
 
 
 def compile_module(module: ModuleType, compiled: Callable[..., Any]) -> ModuleType:

@@ -1,0 +1,53 @@
+"""Plain functions as entry points: machine code computes what the functions compute, and laws are bound."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import printhammer as ph
+from printhammer.kernel.compile.signatures import Plain
+from printhammer.kernel.compile.specialise import specialise
+from printhammer.parts.spring.linear import PreloadSpring
+from printhammer.run.entries import compiled
+from printhammer.run.problem import Problem
+
+if TYPE_CHECKING:
+    from printhammer.kernel.model.laws import spring_force
+
+SPRING = 16
+
+
+def pull(hammer: Any, x: float) -> float:
+    return spring_force(hammer[SPRING:], x)
+
+
+def fill_pulls(hammer: Any, places: Any, pulls: Any) -> int:
+    """An entry point whose helper calls a law."""
+    for k in range(len(places)):
+        pulls[k] = pull(hammer, places[k])
+    return len(places)
+
+
+def test_a_law_is_bound_to_an_entry_point() -> None:
+    hammer = ph.Hammer.build("2 g", spring=PreloadSpring(preload=3.0, stiffness=500.0))
+    problem = Problem(hammer, ph.SineForce(1.0, 50.0), (0.0, 0.0), 0.0, 1e-9)
+    plain = Plain(fill_pulls, ("f1", "f1", "f1"), 1, laws=True)
+    places, pulls = np.array([0.0, 1e-3, -2e-3]), np.zeros(3)
+    assert specialise(problem.laws).plain("pulls", plain)(problem.constants, places, pulls) == 3
+    np.testing.assert_allclose(pulls, 3.0 - 500.0 * places, rtol=1e-15)
+
+
+@pytest.mark.parametrize("pattern", [False, True])
+def test_firing_times_are_those_of_a_train(pattern: bool) -> None:
+    marks, rate = np.array([1, 1, 0, 1, 0, 0, 1]), 1449.2
+    waveform = ph.load("hendriks-1983-1").waveform
+    assert waveform is not None
+    times = np.full(7, np.nan)
+    if pattern:
+        expected = ph.PulseTrain(waveform, at=[0.0, 1 / rate, 3 / rate, 6 / rate]).times
+    else:
+        marks = np.ones(7, np.int64)
+        expected = ph.PulseTrain(waveform, rate=rate, pulses=7).times
+    assert compiled("firings")(rate, marks, pattern, times) == len(expected)
+    np.testing.assert_array_equal(times[: len(expected)], expected)
