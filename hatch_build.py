@@ -31,7 +31,8 @@ class LoweredModules(BuildHookInterface[Any]):
         from printhammer.kernel.compile.modules import Module, every_template, laws_of
         from printhammer.kernel.model.laws import LAW_FUNCTIONS, Laws
         from printhammer.parts import PARTS
-        from printhammer.run import entries, problem
+        from printhammer.run import problem
+        from printhammer.run.plain import entries
 
         folder = tempfile.TemporaryDirectory()
         atexit.register(folder.cleanup)

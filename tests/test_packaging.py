@@ -14,7 +14,7 @@ import pytest
 import printhammer as ph
 from printhammer.kernel.compile.modules import KINDS
 from printhammer.kernel.model.laws import LAW_FUNCTIONS
-from printhammer.run.entries import entries
+from printhammer.run.plain.entries import entries
 
 ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src"
@@ -183,7 +183,7 @@ sys.modules["ziglang"] = None
 import printhammer as ph
 from printhammer.hammer.hammer import shipped
 from printhammer.kernel.compile.specialise import specialise
-from printhammer.run.entries import page_module
+from printhammer.run.plain.entries import page_module
 from printhammer.run.problem import laws_of
 for hammer in map(ph.load, shipped()):
     drive = ph.PulseTrain(hammer.waveform) if hammer.waveform else ph.SineForce(1.0, 1.0)

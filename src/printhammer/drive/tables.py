@@ -1,7 +1,7 @@
 """Pulses as plain functions of numbers and arrays: values of a segment table, and firing times.
 
 A plain function allocates nothing and raises nothing, so that it can be compiled as an entry point, see
-`printhammer.run.entries`. Segment tables are described in `printhammer.drive.segments`.
+`printhammer.run.plain.entries`. Segment tables are described in `printhammer.drive.segments`.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ import printhammer as ph
 from printhammer.kernel.compile.signatures import Plain
 from printhammer.kernel.compile.specialise import specialise
 from printhammer.parts.spring.linear import PreloadSpring
-from printhammer.run.entries import compiled
+from printhammer.run.plain.entries import compiled
 from printhammer.run.problem import Problem
 
 if TYPE_CHECKING:
