@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from functools import cached_property
-from typing import Any, Final, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
 
 import numpy as np
 
@@ -26,6 +26,9 @@ from printhammer.results import Declared, part, scalar
 from printhammer.run.start import AT_REST, Beyond
 from printhammer.run.supply import take_supply, typical_current
 from printhammer.support.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from printhammer.kernel.compile.modules import WebModule
 
 T = TypeVar("T")
 
@@ -253,6 +256,13 @@ class Problem:
         from printhammer.kernel.compile.specialise import specialise
 
         return specialise(self.laws)
+
+    @property
+    def page_module(self) -> WebModule:
+        """WebAssembly module with which a page computes the runs of this hammer."""
+        from printhammer.run.plain.entries import page_module
+
+        return page_module(self.laws)
 
     def leave_out(self, surface: Literal["pack", "backstop"]) -> None:
         """Move a surface out of reach of the armature, leaving all other forces unchanged."""
