@@ -421,7 +421,7 @@ def _range(intervals: FloatArray) -> tuple[float, float]:
 
 
 def _fano(times: FloatArray, length: float) -> tuple[int, float]:
-    """Return the number of windows of a length, s, and the Fano factor of the impacts in them."""
+    """Return the number of windows of a given length, s, and the Fano factor of the impacts per window."""
     # Windows start half an interval before the first impact, so that impacts of a clock avoid the edges.
     begin = times[0] - 0.5 * (times[-1] - times[0]) / (len(times) - 1)
     windows = int((times[-1] - begin) // length)

@@ -114,7 +114,7 @@ class AxisTables:
         return replace(first, **times, deviation=np.full_like(first.deviation, np.nan))
 
     def strategy(self, hammer: Hammer, value: float | str) -> TableStrategy:
-        """Return the table for an axis value as a drive strategy, with the hammer's pulses at that value."""
+        """Return the drive strategy of the table at an axis value, with the hammer's pulses there."""
         table = self.at(value)
         table.check_hammer(hammer)
         place = read_number(value, AXES[self.axis].unit, self.axis)

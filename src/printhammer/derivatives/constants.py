@@ -43,7 +43,7 @@ def flow(
 ) -> Flow:
     """Integrate the columns of constants along a recorded run; most arguments are as for `carry_columns`.
 
-    Derivatives are with respect to ``value / scale`` of each constant.
+    Derivatives are with respect to the scaled constants, ``value / scale``.
     """
     forcing = forcing_of(problem, as_arrays(wanted))
     return carry_columns(problem, [record], marks, initial, forcing, nodes=nodes)

@@ -31,7 +31,7 @@ CONFIDENCE: Final = 0.95
 """Confidence level of the intervals."""
 
 LAWS: Final = {"magnet": "inverse-root", "spring": "linear", "pack": "power", "backstop": "hertz"}
-"""Fitted law by role; the kind "solenoid" fits another magnet law."""
+"""Law assumed by each fit, by role; the fit "solenoid" assumes the magnet law `reluctance` instead."""
 
 _BODIES: Final = (
     "radius1",

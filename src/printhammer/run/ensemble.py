@@ -455,7 +455,7 @@ def _integrate(jobs: Sequence[Job], engine: Engine, threads: int, progress: Prog
 
 
 def _check_kind(name: str, members: Sequence[Any], kind: type, expected: str) -> None:
-    """Raise InputError for the first member of another class."""
+    """Raise InputError for the first element that is not an instance of `kind`."""
     for member in members:
         if not isinstance(member, kind):
             raise InputError.of(name, member, expected)

@@ -212,7 +212,7 @@ def _scales(
 
 
 class Job:
-    """Integration of a group: requested results, and their arrays.
+    """Integration of a group of members: the requested results, and the arrays that receive the results.
 
     The results are the dots and extra contacts, if requested; the states at the `moments`, times in s for
     each member of the ensemble; and the displacements at the times of the `grid`, s, in `x`, the array of the

@@ -323,7 +323,7 @@ class Problem:
         contacts: FloatArray,
         state: FloatArray,
     ) -> tuple[int, int, int, int]:
-        """Run to time `end`, s, or to a pause, from the start or from `state`."""
+        """Integrate to time `end`, s, or to a pause, from the start or from `state`."""
         status, used, touched, steps = self.kernel.run(
             (drive, self.constants, self.control, self.bounds, max_steps),
             float(end),

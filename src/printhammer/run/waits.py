@@ -28,7 +28,7 @@ from printhammer.support.arrays import FloatArray
 def waits_of(
     hammers: Sequence[Hammer], waveforms: Sequence[Waveform], threads: int | None = None
 ) -> FloatArray:
-    """Compute the time from last firing to end of each run, s, as `wait_of` does, by ensembles.
+    """Compute the time from last firing to end of each run, s, like `wait_of`, but with ensembles.
 
     One hammer and one waveform for each run, shape (runs,); equal objects are simulated once.
     """

@@ -357,7 +357,7 @@ def _is_born(way: FloatArray, row: FloatArray, amplitude: float, node: Node) -> 
 
 
 def birth_of(half: Corrector, here: Node, ahead: Node) -> Stop | None:
-    """Locate the period doubling at which a branch of even period ends, if its curve passes one.
+    """Locate the period doubling in which a branch of even period ends; None if its curve passes none.
 
     At the doubling, states half a period apart coincide, and the curve retraces the same orbits half a period
     later. `half` corrects points onto the curve of orbits of half the period; `here` and `ahead` are

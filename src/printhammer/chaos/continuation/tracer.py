@@ -212,7 +212,7 @@ class Tracer:
         return way(firings, event, most, threads)
 
     def crossed(self, firings: int, event: BranchEvent, most: int, threads: int | None) -> Branch:
-        """Follow the branch that crosses the branch of orbits of `firings` firings at an event."""
+        """Follow the branch that crosses the branch of `firings`-firing orbits at an event."""
         family, steps = self.family(firings), Steps(most=most, precision=PRECISION)
         curve = follow_crossing(
             family,

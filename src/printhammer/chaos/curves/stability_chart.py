@@ -49,7 +49,7 @@ GRID: Final = (48, 32)
 """Default numbers of values of the two parameters at which trains from rest are classified."""
 
 _ACROSS: Final = (0.02, 0.98)
-"""Positions in the range of the first parameter, as fractions, at which branches in the second one start."""
+"""Fractions of the range of the first parameter at which branches in the second parameter start."""
 
 
 class StabilityChart(Result):

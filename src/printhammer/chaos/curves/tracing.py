@@ -152,7 +152,7 @@ class CurveTracer:
         return Traced(self.kind, surface, nodes, (first, last), points, coefficients, pieces)
 
     def resonance(self, system: System, here: Node, beyond: Node) -> Node:
-        """Locate the resonance of a torus curve between two nodes, where both multipliers become real."""
+        """Locate the resonance on a torus curve between two nodes, at which both multipliers become real."""
         sign = float(np.sign(np.trace(place_of(beyond).jacobian)))
         corrector = Corrector(system, system.scales, self.steps.precision)
         _, node = zero_between(

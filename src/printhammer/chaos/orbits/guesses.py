@@ -205,7 +205,7 @@ def close_returns(
 def joined(
     shorter: Sequence[Guess], period: int, most: int, scales: FloatArray, known: Collection[tuple[int, int]]
 ) -> list[Guess]:
-    """Concatenate pairs of shorter orbits to initial guesses of `period` firings.
+    """Concatenate pairs of shorter orbits to form initial guesses of `period` firings.
 
     At most `most` pairs are used, those with the smallest jumps between the orbits first; pairs of indices in
     `known` are skipped.

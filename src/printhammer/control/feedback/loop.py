@@ -138,6 +138,6 @@ class Loop:
         return PulseSequence([pulse.waveform(edge) for pulse in self.pulses], [p.fired for p in self.pulses])
 
     def recent(self, driver: Driver) -> BoundedSequence:
-        """Return the drive of the pulses whose currents may not have decayed."""
+        """Return the drive of the latest pulses: those whose currents may still flow."""
         pulses = self.pulses[-REMEMBERED:]
         return driver.drive([pulse.waveform(driver.edge) for pulse in pulses], [p.fired for p in pulses])

@@ -49,7 +49,7 @@ _EXPLAINED: Final = 2.0  # Largest mean square residual, in variances, of a leve
 
 @dataclass(frozen=True)
 class Evidence:
-    """Readings of a unit, normalised by the limits, shape (readings,); NaN where no dot was seen."""
+    """Readings of a unit, normalised by the limits, shape (readings,); NaN for a dot that was not detected."""
 
     value: FloatArray
     noise: FloatArray  # Standard deviation

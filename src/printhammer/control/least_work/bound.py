@@ -52,7 +52,7 @@ class Bound(Declared):
 
 
 def bound(hammer: Hammer, single: Nominal, force: float, largest: float) -> Bound:
-    """Compute the lower bounds for dots with `force` times the force of the single pulse.
+    """Compute the lower bounds for dots whose peak force is `force` times the single-pulse force.
 
     The hammer needs magnet, pack and backstop; `largest` is the current limit of either sign, A.
     """

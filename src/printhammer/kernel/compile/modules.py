@@ -78,7 +78,7 @@ def _versions() -> str:
 
 
 class Module:
-    """Lowered module, as LLVM bitcode, of a template or of the laws of a part; `make` lowers it."""
+    """Lowered module, as LLVM bitcode, of a template or of a part's laws; `make` lowers the module."""
 
     suffix = ".bc"
     is_readable = staticmethod(link.is_readable)
