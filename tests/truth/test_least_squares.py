@@ -109,7 +109,7 @@ class Line:
         first = self.columns[:, :1]
         return np.column_stack([first * p[1], first * p[0], self.columns[:, 1:]])
 
-    def spread(self, p: FloatArray) -> FloatArray:
+    def variance_columns(self, p: FloatArray) -> FloatArray:
         return np.ones((len(self.columns), 1))
 
 

@@ -272,7 +272,7 @@ def given(**options: Any) -> dict[str, Any]:
     return {name: value for name, value in options.items() if value is not None}
 
 
-def need_one(options: Mapping[str, object], example: Callable[[], str]) -> None:
+def check_one_spacing(options: Mapping[str, object], example: Callable[[], str]) -> None:
     """Check that exactly one of `period` and `rate` is set."""
     if (options.get("period") is None) == (options.get("rate") is None):
         raise InputError(f"--period and --rate: expected one of them, such as {example()}", key="--period")

@@ -406,7 +406,9 @@ def firing_of(
                 expected="one, or --drive FILE",
             )
         if timed:
-            opt.need_one(train, lambda: f"--period {period_text(hammer, period)!r}, or --drive FILE{more}")
+            opt.check_one_spacing(
+                train, lambda: f"--period {period_text(hammer, period)!r}, or --drive FILE{more}"
+            )
         firing: Firing = opt.given(**train)  # type: ignore[assignment]
         return firing
     from printhammer.drive.file import load_drive

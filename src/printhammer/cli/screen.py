@@ -167,10 +167,10 @@ def train_line(shape: str, quantity: str, overlap: str, period: float | None = N
 
 def heading(hammer: Hammer) -> str:
     """Return the headline of a hammer: its name and the status of its constants, in Rich markup."""
-    return f"[bold]{escape(hammer.name)}[/bold]  {honesty(hammer)}"
+    return f"[bold]{escape(hammer.name)}[/bold]  {status_counts(hammer)}"
 
 
-def honesty(hammer: Hammer) -> str:
+def status_counts(hammer: Hammer) -> str:
     """Return a one-line count of the constants by status, in Rich markup."""
     counts: dict[str, int] = {}
     for constant in hammer.constants.values():

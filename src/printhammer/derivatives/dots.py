@@ -168,7 +168,7 @@ def _acceleration(problem: Problem, row: FloatArray, *without: int) -> float:
 
 
 class Changes(Declared):
-    """Derivatives of the quantities of dots and run with respect to the scaled constants, ``value / scale``."""
+    """Derivatives of the quantities of dots and run by the scaled constants, ``value / scale``."""
 
     dots: FloatArray = part(
         "derivatives of `DOT_QUANTITIES`, shape (dots, quantities, n)",

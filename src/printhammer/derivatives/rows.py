@@ -127,7 +127,7 @@ class _Maps:
                 raise InputError.of("drive", len(drive.times), f"a row of {least} dots or more")
         self.times = np.array([drive.times[firing - 1 : firing + 2] for drive in drives])
         period = self.times[:, 2] - self.times[:, 1]
-        way = np.array([_way(hammer) for hammer in hammers])
+        way = np.array([_travel(hammer) for hammer in hammers])
         self.scales = np.stack([way, way / period], axis=1)
         self.lowest = np.array([StaticForce(hammer).limits[0] for hammer in hammers])
         strobes = self._run(None, np.zeros(len(hammers)), self.times[:, :2], hammers, drives)
@@ -187,7 +187,7 @@ class _Maps:
         return result.strobes
 
 
-def _way(hammer: Hammer) -> float:
+def _travel(hammer: Hammer) -> float:
     """Return the distance from the rest position to the front of the pack, m."""
     if hammer.front is None:
         raise InputError(

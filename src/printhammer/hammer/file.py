@@ -148,7 +148,7 @@ def file_options(model: type[BaseModel]) -> dict[str, Any]:
 def _build(
     document: Mapping[str, Any], folder: Path, before: Mapping[str, Any], known: Contents | None
 ) -> Contents:
-    _only(document, ("format", *TEXTS, *quantities(Body), *SELECTORS, UNCERTAINTY), "")
+    _check_keys(document, ("format", *TEXTS, *quantities(Body), *SELECTORS, UNCERTAINTY), "")
     if "format" not in document:
         raise InputError("format is missing", key="format", expected=f"format = {FORMAT}")
     version = document["format"]
@@ -220,7 +220,7 @@ def _kind(table: Mapping[str, Any], section: str, selector: str) -> str:
     return kind
 
 
-def _only(table: Mapping[str, Any], known: Iterable[str], prefix: str) -> None:
+def _check_keys(table: Mapping[str, Any], known: Iterable[str], prefix: str) -> None:
     """Raise InputError for an unknown key of a table; the message suggests the closest known key."""
     known = list(known)
     for key in table:
@@ -246,7 +246,7 @@ def _read(
     Constants shared with the table `before` are already parsed.
     """
     known, choices = quantities(model), file_options(model)
-    _only(table, (*known, *choices), prefix)
+    _check_keys(table, (*known, *choices), prefix)
     fields: dict[str, Any] = {}
     written: dict[str, str] = {}
     for name, value in table.items():
@@ -280,7 +280,7 @@ def _constant(key: str, written: Any, note: Quantity) -> Constant:
             f'{describe(note.si)} as {{ value = ..., unit = "...", status = "...", source = "..." }}',
             written=shown(written),
         )
-    _only(written, CONSTANT_KEYS, f"{key}.")
+    _check_keys(written, CONSTANT_KEYS, f"{key}.")
     value = written.get("value")
     for name in CONSTANT_KEYS:
         if name not in written:

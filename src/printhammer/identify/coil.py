@@ -36,7 +36,7 @@ from printhammer.identify.probe import (
     resolution_of,
 )
 from printhammer.identify.result import Fit
-from printhammer.identify.static.assemble import Data, assemble, enough, judge, need, solved
+from printhammer.identify.static.assemble import Data, assemble, check_rows, judge, solved, term_p_value
 from printhammer.support.arrays import FloatArray, IntArray
 
 FREE: Final = ("coil.resistance", "coil.inductance")
@@ -138,7 +138,7 @@ def fit_coil(
     law = CurrentLaw(hammer, names, traces, errors)
     data = _data(traces)
     space = law.space(start)
-    enough(data, len(space.start) + _SPARE, "the constants of the coil and their errors")
+    check_rows(data, len(space.start) + _SPARE, "the constants of the coil and their errors")
     # Raises for a hammer without a coil circuit; in the iterations invalid constants merely give NaN.
     law.simulated(space.start)
     solution = solved(data, law, space, robust=robust)
@@ -159,7 +159,7 @@ def fit_coil(
     p_value, why = math.nan, ""
     if solution.residual_scale > _EXACT * float(np.abs(data.values).max()):
         p_value, why = judge(solution, terms, data.abscissa, data.series)
-    if SIGNS["gain"] in terms and math.isnan(need(solution, terms[SIGNS["gain"]])):
+    if SIGNS["gain"] in terms and math.isnan(term_p_value(solution, terms[SIGNS["gain"]])):
         notes.append("a gain error of the probe cannot be detected: the constants scale with the gain")
     held = sorted({trace.locked for trace in traces if trace.locked is not None})
     known = {"armature locked at": ", ".join(f"{place!r} m" for place in held)} if held else {}
@@ -284,7 +284,7 @@ class CurrentLaw:
 
         return _kept(self._slopes, p, made)
 
-    def spread(self, p: FloatArray) -> FloatArray:  # noqa: ARG002
+    def variance_columns(self, p: FloatArray) -> FloatArray:  # noqa: ARG002
         """Return the variance components: one noise variance per record."""
         count = len(self.traces)
         return np.repeat(np.eye(count), [len(trace.table) for trace in self.traces], axis=0)
@@ -329,9 +329,9 @@ class Averaged:
         slopes = self.law.jacobian(p)
         return np.column_stack([self.mean(column) for column in slopes.T])
 
-    def spread(self, p: FloatArray) -> FloatArray:
+    def variance_columns(self, p: FloatArray) -> FloatArray:
         """Return the variance components: the rounding variance of each record."""
-        return np.asarray(self.law.spread(p)[self.begins] * self.share[:, np.newaxis])
+        return np.asarray(self.law.variance_columns(p)[self.begins] * self.share[:, np.newaxis])
 
 
 def _within(p: FloatArray, space: Parameters) -> FloatArray:

@@ -1,6 +1,6 @@
 """Robust weighted least squares with outlier rejection, variance components and sandwich errors.
 
-    data = law(p) + noise,   variance of the noise in row i = sum over j of spread[i, j] theta[j]
+    data = law(p) + noise, variance of the noise in row i = sum over j of columns[i, j] theta[j]
 
 A robust fit (soft-l1 loss, scale from the median absolute residual) estimates the parameters and the variance
 components theta >= 0; outliers are excluded; the rest is fitted by iteratively reweighted least squares until
@@ -8,7 +8,7 @@ rows and weights converge. The covariance is the sandwich estimator HC2, which i
 are wrong, with degrees of freedom for each parameter (R. M. Bell and D. F. McCaffrey, Survey
 Methodology 28 (2002) 169; G. W. Imbens and M. Kolesar, Rev. Econ. Stat. 98 (2016) 701).
 
-An error in the abscissa enters as a column of `spread` equal to the squared slope of the law (effective
+An error in the abscissa enters as a variance column equal to the squared slope of the law (effective
 variance: J. Orear, Am. J. Phys. 50 (1982) 912).
 """
 
@@ -62,7 +62,7 @@ class Law(Protocol):
     def jacobian(self, p: FloatArray) -> FloatArray:
         """Return the derivatives of the data with respect to the parameters, shape (m, n)."""
 
-    def spread(self, p: FloatArray) -> FloatArray:
+    def variance_columns(self, p: FloatArray) -> FloatArray:
         """Return the coefficient of each variance component in each row, shape (m, q), not negative."""
 
 
@@ -277,11 +277,11 @@ def _solve(
         if exact:
             variance = np.ones(m)
         else:
-            variance = variance_of(law.spread(p), residuals, used, n, clipped=robust and step == 0)
+            variance = variance_of(law.variance_columns(p), residuals, used, n, clipped=robust and step == 0)
         if robust and not exact:
             jacobian = law.jacobian(p)
             inside = _inside(jacobian[:, free], residuals, variance, used)
-            inside = _keep_what_holds(_weighted(jacobian, variance, None, space, free), inside)
+            inside = _with_determining_rows(_weighted(jacobian, variance, None, space, free), inside)
             if inside.tobytes() in tried:
                 # Rows that alternate between in and out stay out.
                 inside &= used
@@ -299,7 +299,7 @@ def _solve(
     return _solution(law, data, space, p, free, variance, used, exact=exact)
 
 
-def _keep_what_holds(rows: FloatArray, inside: BoolArray) -> BoolArray:
+def _with_determining_rows(rows: FloatArray, inside: BoolArray) -> BoolArray:
     """Return a mask of used rows that leaves no parameter undetermined.
 
     Rows determine a parameter if its variance without them is more than `_HOLDING` times as large; such rows

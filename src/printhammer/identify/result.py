@@ -345,7 +345,7 @@ class Fit(Result):
                     expected=f"the law {self._laws[section]!r}",
                 )
         for key, text in self.given.items():
-            _agrees(hammer, key, text)
+            _check_agreement(hammer, key, text)
         gone = [other for key in constants for other in REPLACED.get(key, ())]
         taken = {key: None for key in gone if key in hammer.constants}
         return hammer.replace(
@@ -460,7 +460,7 @@ def student(degrees_of_freedom: float) -> float:
     return float(t.ppf(0.5 + 0.5 * CONFIDENCE, degrees_of_freedom))
 
 
-def _agrees(hammer: Hammer, key: str, text: str) -> None:
+def _check_agreement(hammer: Hammer, key: str, text: str) -> None:
     """Raise `InputError` if the hammer's constant differs from the value that the fit took as known."""
     from printhammer.units import parse
 

@@ -65,7 +65,7 @@ def waits_of(
     return np.asarray(waits[np.array(which, dtype=np.int64)])
 
 
-def fired_by(drives: Sequence[Drive]) -> list[Waveform]:
+def longest_waveforms(drives: Sequence[Drive]) -> list[Waveform]:
     """Return, for each drive, the waveform with the longest duration."""
     if isinstance(drives, PulseTrains):
         return [drives.pulses[number].waveform for number in drives.pulse_of.tolist()]

@@ -20,7 +20,7 @@ from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import RATE
 from printhammer.results import Declared, part, scalar
-from printhammer.run.waits import fired_by, waits_of
+from printhammer.run.waits import longest_waveforms, waits_of
 from printhammer.run.window import end_of
 from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.sweep.axes import COUNTS, Axis
@@ -120,7 +120,7 @@ class Maker:
         if self.base.duration is not None:
             ends = np.full(len(chosen), self.base.duration)
         else:
-            ends = firings_of(drives).last + waits_of(hammers, fired_by(drives), threads)
+            ends = firings_of(drives).last + waits_of(hammers, longest_waveforms(drives), threads)
         return chosen, Members(hammers, drives, ends, np.array(states).reshape(-1, 2))
 
     def _trains(self, rows: FloatArray) -> PulseTrains | None:

@@ -18,7 +18,7 @@ from printhammer.chaos.curves.bifurcation_curve import BifurcationCurve, curve_o
 from printhammer.chaos.curves.codimension import resonance_test
 from printhammer.chaos.curves.normal_forms import MOST_PERIODS, grazing_sides, root_coefficient
 from printhammer.chaos.curves.starts import start_of
-from printhammer.chaos.curves.systems import TESTS, MultiplierSystem, Place, check_two
+from printhammer.chaos.curves.systems import TESTS, CurvePoint, MultiplierSystem, check_two
 from printhammer.chaos.curves.tracing import PRECISION, CurveTracer, Traced
 from printhammer.errors import InputError
 from printhammer.results import reopen
@@ -68,8 +68,8 @@ def test_the_system_of_a_map_and_its_derivative(kind: str, x: float, y: float, a
 
 
 def test_multipliers_of_a_place_are_sorted_by_size() -> None:
-    def place(matrix: Any) -> Place:
-        return Place(1.0, 2.0, np.zeros(2), 0.0, np.array(matrix, np.float64), "")
+    def place(matrix: Any) -> CurvePoint:
+        return CurvePoint(1.0, 2.0, np.zeros(2), 0.0, np.array(matrix, np.float64), "")
 
     assert place([[0.5, 0.0], [0.0, -2.0]]).multipliers.tolist() == [-2.0, 0.5]
     pair = place([[0.0, -1.0], [1.0, 0.0]]).multipliers
@@ -114,9 +114,9 @@ def rigid_plane() -> Any:
     return dataclasses.replace(plane, regime=dataclasses.replace(plane.regime, hammer=hammer))
 
 
-def touch(matrix: Any, slope: Any, acceleration: float = 2.0) -> Place:
+def touch(matrix: Any, slope: Any, acceleration: float = 2.0) -> CurvePoint:
     flat = np.array(slope, np.float64)
-    return Place(SHIFT, 0.0, np.zeros(2), 0.0, np.array(matrix), "", flat, acceleration)
+    return CurvePoint(SHIFT, 0.0, np.zeros(2), 0.0, np.array(matrix), "", flat, acceleration)
 
 
 def test_the_root_of_a_touch() -> None:

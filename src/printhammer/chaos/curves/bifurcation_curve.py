@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from printhammer.chaos.continuation.arclength import Stop
     from printhammer.chaos.continuation.branch import Branch, BranchEvent
     from printhammer.chaos.curves.codimension import CodimensionTwo
-    from printhammer.chaos.curves.systems import Place
+    from printhammer.chaos.curves.systems import CurvePoint
 
 SAME: Final = 1e-3
 """Distance of a multiplier from the unit circle within which it counts as lying on the circle."""
@@ -97,7 +97,7 @@ class BifurcationCurve(Result, rows="point"):
         "values of the two parameters, shapes (m,) and (n,), at which trains from rest were classified",
         repr=False,
     )
-    crossings: Callable[[int, float], list[Place]] = part(
+    crossings: Callable[[int, float], list[CurvePoint]] = part(
         "function that solves for the points at which the first or second parameter has a given value",
         repr=False,
     )

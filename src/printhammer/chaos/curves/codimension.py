@@ -27,7 +27,7 @@ import numpy as np
 import numpy.typing as npt
 
 from printhammer.chaos.continuation.branch_points import doubling_test, fold_test, zero_between
-from printhammer.chaos.curves.systems import GrazingSystem, place_of
+from printhammer.chaos.curves.systems import GrazingSystem, curve_point_of
 from printhammer.errors import InputError
 from printhammer.results import Declared, part
 from printhammer.support.arrays import FloatArray
@@ -35,7 +35,7 @@ from printhammer.support.arrays import FloatArray
 if TYPE_CHECKING:
     from printhammer.chaos.continuation.family import Surface
     from printhammer.chaos.continuation.fixed_points import Corrector, Node
-    from printhammer.chaos.curves.systems import Place, Plane
+    from printhammer.chaos.curves.systems import CurvePoint, Plane
 
 RESONANCES: Final = 3
 """Largest number n of orbit periods per touch for which a grazing orbit is tested for a resonance."""
@@ -68,7 +68,7 @@ class CodimensionTwo(Declared):
         return f"{self.kind} of {self.passages} passages" if self.passages > 1 else self.kind
 
 
-def point_of(kind: str, place: Place, after: int, passages: int = 1) -> CodimensionTwo:
+def point_of(kind: str, place: CurvePoint, after: int, passages: int = 1) -> CodimensionTwo:
     """Build the point of codimension two at a node of a curve."""
     multipliers = place.multipliers
     return CodimensionTwo(
@@ -115,7 +115,7 @@ def _tests(kind: str, rigid: bool) -> dict[tuple[str, int], Callable[[Node], flo
     tests: dict[tuple[str, int], Callable[[Node], float]] = {
         ("fold meets grazing", 1): lambda node: fold_test(_matrix(node)),
         ("doubling meets grazing", 1): lambda node: doubling_test(_matrix(node)),
-        ("degenerate grazing", 1): lambda node: place_of(node).acceleration,
+        ("degenerate grazing", 1): lambda node: curve_point_of(node).acceleration,
     }
     if rigid:
         tests |= {("resonant grazing", n): _resonance(n) for n in range(1, RESONANCES + 1)}
@@ -128,7 +128,7 @@ def points_along(
     nodes: list[Node],
     follower: Corrector,
     coefficients: FloatArray,
-    coefficient: Callable[[Place], float],
+    coefficient: Callable[[CurvePoint], float],
 ) -> list[CodimensionTwo]:
     """Locate the points of codimension two on a curve, in order.
 
@@ -148,22 +148,22 @@ def points_along(
         for name, passages, test in named:
             if passages == first[name]:
                 share, node = zero_between(follower, here, ahead, test)
-                place = place_of(node if node is not None else (here, ahead)[int(share > 0.5)])
+                place = curve_point_of(node if node is not None else (here, ahead)[int(share > 0.5)])
                 points.append(point_of(name, place, after, passages))
         if kind == "fold" and float(here.tangent[-2:] @ ahead.tangent[-2:]) < 0.0:
             # The curve turns back in the plane, whatever the orientation of the cusp.
             turn = ahead.tangent[-2:] - here.tangent[-2:]
             _, node = zero_between(follower, here, ahead, _along(turn))
             if node is not None and _is_stationary(node, here, ahead):
-                points.append(point_of("cusp", place_of(node), after))
+                points.append(point_of("cusp", curve_point_of(node), after))
         pair = coefficients[after : after + 2]
         if kind == "period doubling" and pair[0] * pair[1] < 0.0:
-            _, node = zero_between(follower, here, ahead, lambda node: coefficient(place_of(node)))
+            _, node = zero_between(follower, here, ahead, lambda node: coefficient(curve_point_of(node)))
             # At a resonance or fold-flip the coefficient changes sign through infinity.
             if node is not None and (
-                not named or abs(coefficient(place_of(node))) < float(np.abs(pair).min())
+                not named or abs(coefficient(curve_point_of(node))) < float(np.abs(pair).min())
             ):
-                points.append(point_of("degenerate doubling", place_of(node), after))
+                points.append(point_of("degenerate doubling", curve_point_of(node), after))
     return points
 
 
@@ -183,7 +183,7 @@ def meeting(
     surface: Surface,
     guess: FloatArray,
     test: Callable[[FloatArray], float],
-) -> Place | None:
+) -> CurvePoint | None:
     """Find the grazing near a guess at which a test function of the derivative vanishes; None if not found.
 
     Parameters
@@ -224,7 +224,7 @@ def meeting(
 
 def _missed(
     system: GrazingSystem, z: FloatArray, test: Callable[[FloatArray], float]
-) -> tuple[Place, FloatArray] | None:
+) -> tuple[CurvePoint, FloatArray] | None:
     phase, first, second = (float(value) for value in z * system.scales)
     value = system.at(phase, first, second)
     if isinstance(value, str):

@@ -28,7 +28,7 @@ from printhammer.errors import InputError
 from printhammer.support.arrays import FloatArray
 
 if TYPE_CHECKING:
-    from printhammer.chaos.curves.systems import Place, Plane
+    from printhammer.chaos.curves.systems import CurvePoint, Plane
 
 MOST_PERIODS: Final = 4
 """Largest number of periods per touch for which the orbits at a grazing are tested."""
@@ -41,7 +41,7 @@ _DOUBLES: Final = 1e-4
 _FEW: Final = 1e-9  # Relative magnitude below which a denominator is singular
 
 
-def doubling_coefficient(plane: Plane, place: Place) -> float:
+def doubling_coefficient(plane: Plane, place: CurvePoint) -> float:
     """Compute the coefficient c of a period doubling; NaN if the finite differences are inconclusive."""
     regime = replace(plane.at(place.first, place.second), phase=place.phase)
     quiet = quiet_section(regime, place.state, plane.firings, plane.tolerance)
@@ -87,7 +87,7 @@ def doubling_coefficient(plane: Plane, place: Place) -> float:
     return math.nan
 
 
-def root_coefficient(plane: Plane, place: Place) -> float:
+def root_coefficient(plane: Plane, place: CurvePoint) -> float:
     """Compute (1 + e) sqrt(2 a), m^(1/2)/s: the velocity added by a touch, per square root of its depth."""
     try:
         restitution = plane.at(place.first, place.second).value("backstop.restitution")
@@ -96,7 +96,7 @@ def root_coefficient(plane: Plane, place: Place) -> float:
     return (1.0 + restitution) * math.sqrt(2.0 * place.acceleration) if place.acceleration > 0.0 else math.nan
 
 
-def grazing_sides(plane: Plane, place: Place) -> tuple[int, ...]:
+def grazing_sides(plane: Plane, place: CurvePoint) -> tuple[int, ...]:
     """Determine on which sides of a grazing, in the first parameter, orbits with and without the touch exist.
 
     Returns

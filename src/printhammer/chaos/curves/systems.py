@@ -101,7 +101,7 @@ def check_two(first: str, second: str) -> None:
         raise InputError.of("second", second, f"another constant than that of the branch, {first}")
 
 
-class Place(Declared):
+class CurvePoint(Declared):
     """Point of a bifurcation curve in the plane of two parameters, with the orbit at this point."""
 
     first: float = part("value of the first parameter, SI")
@@ -163,7 +163,7 @@ class MultiplierSystem:
             matrix,
             np.append(across[3], slopes[3]),
             contacts,
-            extra=Place(
+            extra=CurvePoint(
                 float(whole[2]),
                 other,
                 whole[:2].copy(),
@@ -176,9 +176,9 @@ class MultiplierSystem:
         )
 
 
-def place_of(node: Node) -> Place:
+def curve_point_of(node: Node) -> CurvePoint:
     """Return the point of the parameter plane that belongs to a fixed point of an extended map."""
-    place: Place = node.value.extra
+    place: CurvePoint = node.value.extra
     return place
 
 
@@ -201,7 +201,7 @@ class GrazingSystem:
         self.plane, self.kind, self.surface = plane, GRAZING, surface
         self.scales = np.array([_PHASES, *plane.scales[2:]])
 
-    def at(self, phase: float, first: float, second: float) -> tuple[Place, FloatArray] | str:
+    def at(self, phase: float, first: float, second: float) -> tuple[CurvePoint, FloatArray] | str:
         """Compute the orbit that leaves a grazing touch, and its miss at the next touch.
 
         The miss is the difference of both states, in scales of the state. A text with the reason is returned
@@ -211,7 +211,7 @@ class GrazingSystem:
         if flight.trouble:
             return flight.trouble
         at, contacts = np.array([flight.surface, 0.0]), cyclic(flight.contacts)
-        place = Place(
+        place = CurvePoint(
             first, second, at, phase % 1.0, flight.jacobian, contacts, acceleration=flight.accelerations[0]
         )
         return place, (flight.end - at) / self.plane.scales[:2]
@@ -272,7 +272,7 @@ class ImpactSystem:
         known = np.diag([-self._sign, -self._sign * determinant]) if self._sign else jacobian
         contacts = cyclic((*here.contacts, "backstop"))
         state = np.array([here.surface, whole[1]])
-        place = Place(float(whole[2]), other, state, float(whole[0]) % 1.0, jacobian, contacts)
+        place = CurvePoint(float(whole[2]), other, state, float(whole[0]) % 1.0, jacobian, contacts)
         return MapValue(
             whole + misses[0],
             np.eye(3) + np.column_stack(slopes[:3]),

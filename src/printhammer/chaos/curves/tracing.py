@@ -24,12 +24,12 @@ from printhammer.chaos.curves.normal_forms import doubling_coefficient
 from printhammer.chaos.curves.systems import (
     GRAZING,
     TESTS,
+    CurvePoint,
     GrazingSystem,
     ImpactSystem,
     MultiplierSystem,
-    Place,
     Plane,
-    place_of,
+    curve_point_of,
 )
 from printhammer.chaos.strobe.map import quiet_section
 from printhammer.errors import InputError
@@ -69,13 +69,13 @@ class Traced:
     pieces: list[tuple[System, list[Node]]] = field(repr=False)
 
     @property
-    def places(self) -> list[Place]:
+    def places(self) -> list[CurvePoint]:
         """Points of the curve in the parameter plane, in order."""
-        return [place_of(node) for node in self.nodes]
+        return [curve_point_of(node) for node in self.nodes]
 
-    def crossings(self, which: int, value: float) -> list[Place]:
+    def crossings(self, which: int, value: float) -> list[CurvePoint]:
         """Find the points where the first (`which` = 0) or the second parameter (1) has a given value."""
-        places: list[Place] = []
+        places: list[CurvePoint] = []
         for system, nodes in self.pieces:
             corrector = Corrector(system, system.scales, PRECISION)
             column = system.scales.size - 2 + which
@@ -88,12 +88,12 @@ class Traced:
                 z = begin + share * (end - begin)
                 z[column] = level
                 node = corrector.correct(z, row)
-                if node is not None and not any(_is_same(place_of(node), place) for place in places):
-                    places.append(place_of(node))
+                if node is not None and not any(_is_same(curve_point_of(node), place) for place in places):
+                    places.append(curve_point_of(node))
         return places
 
 
-def _is_same(one: Place, other: Place) -> bool:
+def _is_same(one: CurvePoint, other: CurvePoint) -> bool:
     return bool(np.allclose([one.first, one.second], [other.first, other.second], rtol=1e-9, atol=0.0))
 
 
@@ -130,7 +130,7 @@ class CurveTracer:
             nodes = [node for _, part in pieces for node in part]
         coefficients = np.full(len(nodes), np.nan)
         if self.kind == "period doubling":
-            coefficients[:] = mapped(lambda node: self.coefficient(place_of(node)), nodes, threads)
+            coefficients[:] = mapped(lambda node: self.coefficient(curve_point_of(node)), nodes, threads)
         points, begin = [], 0
         for own, part in pieces:
             corrector = Corrector(own, own.scales, self.steps.precision)
@@ -153,14 +153,14 @@ class CurveTracer:
 
     def resonance(self, system: System, here: Node, beyond: Node) -> Node:
         """Locate the resonance on a torus curve between two nodes, at which both multipliers become real."""
-        sign = float(np.sign(np.trace(place_of(beyond).jacobian)))
+        sign = float(np.sign(np.trace(curve_point_of(beyond).jacobian)))
         corrector = Corrector(system, system.scales, self.steps.precision)
         _, node = zero_between(
-            corrector, here, beyond, lambda each: sign * float(np.trace(place_of(each).jacobian)) - 2.0
+            corrector, here, beyond, lambda each: sign * float(np.trace(curve_point_of(each).jacobian)) - 2.0
         )
         return here if node is None else node
 
-    def coefficient(self, place: Place) -> float:
+    def coefficient(self, place: CurvePoint) -> float:
         """Compute the normal-form coefficient of a period doubling at a point of the curve."""
         return doubling_coefficient(self.plane, place)
 
@@ -210,7 +210,7 @@ class CurveTracer:
                 return Stop("grazing", here.parameter, here.state, why, here)
             if isinstance(system, ImpactSystem) and ahead.state[1] < _GENTLE * system.scales[1]:
                 return Stop("grazing", here.parameter, here.state, "the impact vanishes in a grazing", here)
-            if self.kind == "Neimark-Sacker" and abs(np.trace(place_of(ahead).jacobian)) > 2.0:
+            if self.kind == "Neimark-Sacker" and abs(np.trace(curve_point_of(ahead).jacobian)) > 2.0:
                 why = "both multipliers become real: a resonance"
                 return Stop("resonance", ahead.parameter, ahead.state, why, ahead)
             value = float(ahead.state[place])
@@ -240,7 +240,7 @@ class CurveTracer:
             if stop.reason not in ("lost", "jump", "no value"):
                 break
             node = nodes[0] if first else nodes[-1]
-            place = place_of(node)
+            place = curve_point_of(node)
             regime = replace(self.plane.at(place.first, place.second), phase=place.phase)
             quiet = quiet_section(regime, place.state, self.plane.firings, self.plane.tolerance)
             if quiet is None or abs(quiet[0].phase - place.phase) < 1e-3:
@@ -284,9 +284,9 @@ class CurveTracer:
             here, ahead = nodes[after], nodes[after + 1]
             if here.value.label == ahead.value.label:
                 continue
-            span = self.distance(place_of(here), place_of(ahead))
+            span = self.distance(curve_point_of(here), curve_point_of(ahead))
             for node in (here, ahead):
-                place = self.grazing_near(place_of(node), 2.0 * span + 1e-6)
+                place = self.grazing_near(curve_point_of(node), 2.0 * span + 1e-6)
                 if place is not None:
                     points.append(point_of(f"{self.short} meets grazing", place, begin + after))
                     break
@@ -297,12 +297,12 @@ class CurveTracer:
         """Short name of the kind of bifurcation, such as "doubling" for "period doubling"."""
         return self.kind.removeprefix("period ")
 
-    def distance(self, one: Place, other: Place) -> float:
+    def distance(self, one: CurvePoint, other: CurvePoint) -> float:
         """Compute the distance of two points in the parameter plane, in scales of the parameters."""
         away = np.array([one.first - other.first, one.second - other.second]) / self.plane.scales[2:]
         return float(np.linalg.norm(away))
 
-    def grazing_near(self, place: Place, within: float) -> Place | None:
+    def grazing_near(self, place: CurvePoint, within: float) -> CurvePoint | None:
         """Find the grazing near an orbit of the curve at which the same test function vanishes."""
         regime = replace(self.plane.at(place.first, place.second), phase=place.phase)
         for touch in near_touches(regime, place.state, self.plane.firings, self.plane.tolerance)[:3]:
@@ -321,13 +321,13 @@ class CurveTracer:
         for end, (node, after) in enumerate(((nodes[0], -1), (nodes[-1], len(nodes) - 1))):
             if stops[end].reason not in ("grazing", "lost", "jump", "no value"):
                 continue
-            point = self.end_at(place_of(node), after)
+            point = self.end_at(curve_point_of(node), after)
             if point is not None:
                 stops[end] = replace(stops[end], reason="grazing")
                 points = [point, *points] if end == 0 else [*points, point]
         return points
 
-    def end_at(self, place: Place, after: int) -> CodimensionTwo | None:
+    def end_at(self, place: CurvePoint, after: int) -> CodimensionTwo | None:
         """Find the point of codimension two that ends a curve, near its last point; None if not found."""
         speed = float(place.state[1]) / float(self.plane.scales[1])
         if self.rigid and 0.0 < speed < _SLOW:

@@ -213,7 +213,7 @@ def zero_one(
         path = _paths(rest, chosen[shown : shown + 1])
         displacement = _displacements(path, least)[0]
         k = float(np.median(correlations))
-        verdict, reason = _judged(k, cycle, rest, least)
+        verdict, reason = _classify(k, cycle, rest, least)
     return ZeroOne(
         k=k,
         verdict=verdict,
@@ -231,7 +231,7 @@ def zero_one(
     )
 
 
-def _judged(k: float, cycle: int, rest: FloatArray, resolution: float) -> tuple[str, str]:
+def _classify(k: float, cycle: int, rest: FloatArray, resolution: float) -> tuple[str, str]:
     """Classify a series by K and its transient; return the classification and the reason if undecided."""
     if k <= REGULAR:
         return "regular", ""

@@ -335,7 +335,7 @@ def scheme_strobes(
         states = States(*problem.strobed(moments))
         chosen = np.arange(1, points + 1)
         shown = _part(states, slice(0, points))
-        strobed.append(strobe_of(train, chosen, shown, TOLERANCE, _judged(states, train, firings)))
+        strobed.append(strobe_of(train, chosen, shown, TOLERANCE, _classify(states, train, firings)))
         if progress is not None:
             progress(done, len(regimes))
     return strobed
@@ -346,7 +346,7 @@ def _part(states: States, some: slice) -> States:
     return replace(states, **{name: getattr(states, name)[some] for name in names})
 
 
-def _judged(states: States, train: Train, firings: tuple[int, int]) -> Verdict:
+def _classify(states: States, train: Train, firings: tuple[int, int]) -> Verdict:
     first, last = firings
     judged = _part(states, slice(first - 1, last))
     stopped = states.status if np.isnan(states.x[last - 1]) else ""

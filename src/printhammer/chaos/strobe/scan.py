@@ -89,7 +89,7 @@ def scan(
         effort.report(len(verdicts), len(times))
     left = [i for i in range(len(times)) if i not in verdicts]
     trains = [Train.of(regimes[i], LAST) for i in left]
-    verdicts |= dict(zip(left, _followed(trains, exponents, quiet), strict=True))
+    verdicts |= dict(zip(left, _classify_late(trains, exponents, quiet), strict=True))
     effort.report(len(verdicts), len(times))
     return [verdicts[i] for i in range(len(times))]
 
@@ -141,7 +141,7 @@ def largest_multiplier(train: Train, states: States, period: int, tolerance: flo
     return float(np.abs(np.linalg.eigvals(tangent.matrix)).max())
 
 
-def _followed(trains: Sequence[Train], exponents: bool, effort: Effort) -> list[Verdict]:
+def _classify_late(trains: Sequence[Train], exponents: bool, effort: Effort) -> list[Verdict]:
     """Classify trains that the early stages left undecided, from the states at firings 1001 to 2000."""
     judged, tolerance = (FIRST, LAST), effort.tolerance
     states, _ = run_trains(trains, np.arange(FIRST, LAST + 1), None, effort)

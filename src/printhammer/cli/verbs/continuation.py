@@ -137,7 +137,7 @@ def continue_(
                 )
         else:
             start = {"firings": firings, "state": state, "phase": phase}
-            result = _followed(job, hammer, parameter, bounds, doublings, **firing, **start, **passed)
+            result = _follow_orbit(job, hammer, parameter, bounds, doublings, **firing, **start, **passed)
     except InterruptedBranches as interrupt:
         interrupted, result = True, interrupt.branches
     job.show(*render(result.summary()))
@@ -165,7 +165,7 @@ def both(low: str | None, high: str | None, first: str, last: str, parameter: st
     return low, high
 
 
-def _followed(
+def _follow_orbit(
     job: Job, hammer: Hammer, parameter: str, bounds: tuple[str, str], levels: int, **options: Any
 ) -> Branches:
     from printhammer.chaos.continuation.continuation import continuation

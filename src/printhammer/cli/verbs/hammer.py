@@ -16,7 +16,7 @@ from rich.table import Table
 from printhammer.cli import options as opt
 from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, verb
-from printhammer.cli.screen import STATUS_STYLES, Column, honesty, render, table
+from printhammer.cli.screen import STATUS_STYLES, Column, render, status_counts, table
 from printhammer.cli.terminal import warn
 from printhammer.errors import InputError, nearest
 
@@ -56,7 +56,7 @@ def show(
         [
             f"[bold]{escape(loaded.name)}[/bold]{title}",
             f"[dim]{escape(loaded.path)}, fingerprint {loaded.fingerprint[:16]}[/dim]",
-            f"constants: {honesty(loaded)}\n",
+            f"constants: {status_counts(loaded)}\n",
             *note,
             constants_table(loaded, sources),
             *numbered(sources),
@@ -76,7 +76,9 @@ def check(hammer: str = opt.NAMED) -> Answer:
     for warning in warnings:
         warn(f"{loaded.path}: {warning}")
     count = f"{len(warnings)} warning{'s' if len(warnings) > 1 else ''}"
-    return Answer([f"{escape(hammer)}: {count if warnings else '[green]ok[/green]'}; {honesty(loaded)}"])
+    return Answer(
+        [f"{escape(hammer)}: {count if warnings else '[green]ok[/green]'}; {status_counts(loaded)}"]
+    )
 
 
 @verb(
@@ -222,7 +224,7 @@ def from_datasheet(
     sources = list(dict.fromkeys(constant.source for constant in made.constants.values()))
     return Answer(
         [
-            f"[bold]{made.name}[/bold]  {honesty(made)}\n",
+            f"[bold]{made.name}[/bold]  {status_counts(made)}\n",
             constants_table(made, sources),
             *numbered(sources),
             "",

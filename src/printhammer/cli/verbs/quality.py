@@ -148,7 +148,9 @@ def quality(
     of_drive = opt.given(table=table, serial=serial, feedback=feedback or None)
     of_grid = opt.given(first=first, last=last, step=step)
     of_draw = opt.given(spread=spread, judged_by=judged_by, seed=seed)
-    _only(task, {*of_report, *of_drive, *of_grid, *of_draw, *opt.given(current=current, threads=threads)})
+    _check_options(
+        task, {*of_report, *of_drive, *of_grid, *of_draw, *opt.given(current=current, threads=threads)}
+    )
     if task == "report" and rate is None:
         raise InputError(
             f"--rate: expected slots per second, such as --rate {rate_text(hammer, 900.0)!r}, or --safe-rate",
@@ -212,7 +214,7 @@ _TAKES: Final = {
 }
 
 
-def _only(task: str, options: set[str]) -> None:
+def _check_options(task: str, options: set[str]) -> None:
     """Raise InputError if an option is set that belongs to another task."""
 
     def named(name: str) -> str:

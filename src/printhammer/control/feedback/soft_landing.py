@@ -64,7 +64,7 @@ def soft_landing(plant: Plant, forces: ForceMap) -> Landing:
     best = np.full((len(release), 2), np.nan)
     left = np.full(len(release), np.nan)
     for finer in (*_FINER, None):
-        remains = _left(plant, forces, release, rows, np.maximum(tried * scale, AHEAD))
+        remains = _residual_speeds(plant, forces, release, rows, np.maximum(tried * scale, AHEAD))
         way = np.argmin(remains, axis=1)
         best[rows] = tried[np.arange(len(rows)), way]
         left[rows] = remains[np.arange(len(rows)), way]
@@ -75,7 +75,7 @@ def soft_landing(plant: Plant, forces: ForceMap) -> Landing:
     return Landing(release, force, best[:, 0] * scale, best[:, 1] * scale, left, (braked + _SETTLED) * scale)
 
 
-def _left(
+def _residual_speeds(
     plant: Plant, forces: ForceMap, release: FloatArray, rows: IntArray, tried: FloatArray
 ) -> FloatArray:
     """Simulate brake pulses, (rows, pulses, 2): start and width, s; return the residual speeds, m/s."""

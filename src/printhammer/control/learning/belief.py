@@ -49,7 +49,7 @@ _EXPLAINED: Final = 2.0  # Largest mean square residual, in variances, of a leve
 
 @dataclass(frozen=True)
 class Evidence:
-    """Readings of a unit, normalised by the limits, shape (readings,); NaN for a dot that was not detected."""
+    """Readings of a unit, normalised by the limits, shape (readings,); NaN for a dot not detected."""
 
     value: FloatArray
     noise: FloatArray  # Standard deviation
@@ -133,7 +133,7 @@ def believe(
     return Belief.of(ends)
 
 
-class _Place(NamedTuple):
+class _Iterate(NamedTuple):
     """Current iterate of a Levenberg-Marquardt search."""
 
     constants: FloatArray  # Constants, in prior standard deviations, (constants,)
@@ -144,7 +144,7 @@ class _Place(NamedTuple):
 
 def _descend(evidence: Evidence, start: FloatArray, levels: Sequence[float]) -> Search[Mode]:
     ((shown,),) = yield [start[None]]
-    place, level, misfit = (yield from _look(start, shown)), levels[0], np.inf
+    place, level, misfit = (yield from _linearise(start, shown)), levels[0], np.inf
     for finer in levels:
         noise = evidence.at(finer)
         after = yield from _climb(evidence.value, noise, place)
@@ -176,10 +176,10 @@ def _misfit(shown: FloatArray, evidence: Evidence) -> float:
     return float(np.sqrt(np.mean(each**2))) if each.size else 0.0
 
 
-def _look(constants: FloatArray, shown: FloatArray) -> Search[_Place]:
+def _linearise(constants: FloatArray, shown: FloatArray) -> Search[_Iterate]:
     """Evaluate the Jacobian of the readings at an iterate by forward differences."""
     (moved,) = yield [constants + _STEP * np.eye(constants.size)]
-    return _Place(constants, shown, np.asarray((moved - shown).T / _STEP), fresh=True)
+    return _Iterate(constants, shown, np.asarray((moved - shown).T / _STEP), fresh=True)
 
 
 def _objective(places: FloatArray, shown: FloatArray, value: FloatArray, noise: FloatArray) -> FloatArray:
@@ -191,7 +191,7 @@ def _objective(places: FloatArray, shown: FloatArray, value: FloatArray, noise: 
     return np.asarray(0.5 * (places**2).sum(axis=1) + 0.5 * each.sum(axis=1))
 
 
-def _normal(place: _Place, value: FloatArray, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _normal(place: _Iterate, value: FloatArray, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Compute the Gauss-Newton matrix of the objective and its negative gradient, (constants,)."""
     rest = value - place.shown
     known = np.isfinite(rest) & np.isfinite(place.slopes).all(axis=1)
@@ -207,7 +207,7 @@ def _size(rest: FloatArray) -> float:
     return 1.4826 * float(np.median(known)) if known.size else 0.0
 
 
-def _climb(value: FloatArray, noise: FloatArray, place: _Place) -> Search[_Place]:
+def _climb(value: FloatArray, noise: FloatArray, place: _Iterate) -> Search[_Iterate]:
     """Minimise the objective from an iterate by the Levenberg-Marquardt method with Broyden updates."""
     damping = 0.1
     for _ in range(_ITERATIONS):
@@ -224,13 +224,13 @@ def _climb(value: FloatArray, noise: FloatArray, place: _Place) -> Search[_Place
         if not best - objective[k] > _GAIN:
             if place.fresh:
                 break
-            place = yield from _look(place.constants, place.shown)
+            place = yield from _linearise(place.constants, place.shown)
             continue
         # Broyden's rank-one update: the new Jacobian reproduces the readings after the step.
         move = places[k] - place.constants
         surprise = np.nan_to_num(readings[k] - place.shown - place.slopes @ move)
         slopes = place.slopes + surprise[:, None] * (move / (move @ move))
-        place = _Place(places[k], readings[k], slopes, fresh=False)
+        place = _Iterate(places[k], readings[k], slopes, fresh=False)
         damping = max(0.3 * tried[k], 1e-4)
         if float(np.abs(move).max()) < _STILL:
             break

@@ -264,10 +264,10 @@ class LearningLaw:
         while largest(part) > 1.0 and part > _LEAST_LAW:
             part *= 0.5
         contraction, unit = largest(part), unit._replace(more=part * unit.more)
-        left, found = yield from self._followed(unit, keep * corrections)
+        left, found = yield from self._smallest_objective(unit, keep * corrections)
         if left > BAD and corrections.any():
             # Starting over from the first table may converge where the learned corrections do not.
-            other = yield from self._followed(unit, 0.0 * corrections)
+            other = yield from self._smallest_objective(unit, 0.0 * corrections)
             left, found = min((left, found), other, key=lambda end: end[0])
         verdict = yield from self._compared(alike, found)
         return Update(found, contraction, verdict, left)
@@ -303,7 +303,7 @@ class LearningLaw:
             return replace(self, entries=self.entries.started_from(base))
         return None
 
-    def _followed(self, unit: _Unit, corrections: FloatArray) -> Printing[tuple[float, FloatArray]]:
+    def _smallest_objective(self, unit: _Unit, corrections: FloatArray) -> Printing[tuple[float, FloatArray]]:
         """Iterate the law on simulated hammers; return the smallest objective, with its corrections."""
         best = np.inf, corrections
         for _ in range(_NEWTON):

@@ -100,7 +100,9 @@ class Production:
         if there:
             single = self.task.single.nominal
             parts = [press.order_ladder(rungs)] if rungs else []
-            parts += [_told(press.order_line([settings] * len(there)), single.force) for settings in lines]
+            parts += [
+                _readings_of(press.order_line([settings] * len(there)), single.force) for settings in lines
+            ]
             told = yield from together(parts)
             shown[there] = np.concatenate([np.stack(part, axis=1) for part in told], axis=2)
         limits = self.task.limits
@@ -111,7 +113,7 @@ class Production:
         return np.asarray(shown[:, : self.measured].reshape(len(rows), -1))
 
 
-def _told(
+def _readings_of(
     line: Printing[tuple[DotTable, Judgement]], force: float
 ) -> Printing[tuple[FloatArray, FloatArray]]:
     """Extract from dots of a line the flight times, s, and the forces, normalised by `force`."""

@@ -83,7 +83,7 @@ def deviations(late: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatAr
     return np.where(np.isfinite(late), late / ARRIVAL, LOST), (force - 1.0) / _FORCE
 
 
-def met(missed: float, spare: float) -> bool:
+def is_acceptable(missed: float, spare: float) -> bool:
     """Whether a dot is acceptable, from its normalised deviations of arrival and force."""
     return abs(missed) < _MISSED and spare > -_SLACK
 

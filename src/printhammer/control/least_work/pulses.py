@@ -12,7 +12,15 @@ from typing import Final
 
 import numpy as np
 
-from printhammer.control.least_work.descent import ARRIVAL, LOST, best_of, descend, deviations, met, sobol
+from printhammer.control.least_work.descent import (
+    ARRIVAL,
+    LOST,
+    best_of,
+    descend,
+    deviations,
+    is_acceptable,
+    sobol,
+)
 from printhammer.control.least_work.slot import SlotState, Task, end_of
 from printhammer.control.pulses import of_width, widest
 from printhammer.drive.sequence import PulseSequence
@@ -91,7 +99,7 @@ class PulsePlan:
         def attempt(row: int) -> tuple[float, FloatArray] | None:
             place = _descend(measured, tried[row], conditions=True)
             cost, missed, above = measured(place[np.newaxis])[:, 0].tolist()
-            return (cost, place) if met(missed, above) else None
+            return (cost, place) if is_acceptable(missed, above) else None
 
         cost, missed, above = measured(tried)
         best = best_of(cost + np.abs(missed) + np.abs(above), attempt, _TRIES, _MOST_TRIES)

@@ -18,7 +18,7 @@ from typing import Final
 
 import numpy as np
 
-from printhammer.control.least_work.descent import best_of, descend, deviations, met, sobol
+from printhammer.control.least_work.descent import best_of, descend, deviations, is_acceptable, sobol
 from printhammer.control.least_work.slot import RELOADING, Outcomes, SlotState, Task, node_times
 from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.waveforms.shapes import Sampled
@@ -185,7 +185,7 @@ def printing_current(
         outcomes = task.run(begin, currents[np.newaxis], duration, task.tolerance)
         missed, above = asked(outcomes)
         once = outcomes.ok[0] and outcomes.extra_contacts[0] == 0
-        return bool(once and outcomes.reloading[0] < _LAGS * RELOADING and met(missed[0], above[0]))
+        return bool(once and outcomes.reloading[0] < _LAGS * RELOADING and is_acceptable(missed[0], above[0]))
 
     def attempt(start: FloatArray, rounds: int = _ROUNDS) -> tuple[float, FloatArray] | None:
         currents = start

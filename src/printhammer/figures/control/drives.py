@@ -76,7 +76,7 @@ def plot(feedback: Feedback) -> Figure:
     return figure
 
 
-def _look(feedback: Feedback, number: int) -> tuple[str, str]:
+def _style_of(feedback: Feedback, number: int) -> tuple[str, str]:
     """Return colour and marker of a strategy by its number; the last strategy is feedback."""
     if number == len(feedback.strategies) - 1:
         return style.BLUE, "o"
@@ -93,7 +93,7 @@ def _histogram(ax: Axes, feedback: Feedback, values: FloatArray, limit: float) -
             continue
         counts, _ = np.histogram(np.clip(known, -reach, reach), edges)
         text = f"{name}: {100.0 * feedback.passed[number].mean():.0f} % of the patterns"
-        colour, _marker = _look(feedback, number)
+        colour, _marker = _style_of(feedback, number)
         last = number == len(feedback.strategies) - 1
         how: dict[str, Any] = {
             "fill": last,
@@ -111,7 +111,7 @@ def _by_gap(ax: Axes, feedback: Feedback, values: FloatArray, limit: float) -> N
     gaps = from_si(1.0, "s", "ms") * feedback.gaps
     reach = _REACH * limit
     for number, name in enumerate(feedback.strategies):
-        colour, marker = _look(feedback, number)
+        colour, marker = _style_of(feedback, number)
         how: dict[str, Any] = {"marker": marker, "ms": 2.6, "lw": style.THIN, "label": name, "gid": name}
         ax.plot(gaps, np.clip(values[number], -reach, reach), color=colour, **how)
     dashed(ax.axhline, -limit, limit)

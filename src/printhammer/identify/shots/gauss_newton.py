@@ -101,7 +101,7 @@ def weak(values: FloatArray, covariance: FloatArray) -> list[int]:
     return [int(i) for i in np.flatnonzero(errors > _WEAK * np.abs(values))]
 
 
-def would_be_found(
+def changes_if_fitted(
     design: FloatArray, columns: FloatArray, names: Sequence[str], residuals: FloatArray
 ) -> list[tuple[str, float, float]]:
     """Estimate by how much each held constant would change if it alone were fitted in addition.

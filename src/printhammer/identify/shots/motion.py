@@ -26,11 +26,11 @@ from printhammer.identify.shots.approach import Prior
 from printhammer.identify.shots.gauss_newton import (
     GaussNewton,
     Solution,
+    changes_if_fitted,
     condition_number,
     refuse_degenerate,
     tied_constants,
     weak,
-    would_be_found,
 )
 from printhammer.identify.shots.shooting import Parameters, Shooting
 from printhammer.identify.shots.shot import FEWEST, Pulse, Shot, fit_pulse, read_shot
@@ -144,7 +144,7 @@ def further(fit: GaussNewton, solution: Solution, hammer: Hammer, rejected: str)
     below = len(solution.design) - sum(len(row) for row in rows)
     columns = np.concatenate([*rows, np.zeros((below, len(others)))])
     left = np.concatenate([*residuals, np.zeros(below)])
-    candidates = would_be_found(solution.design, columns, others, left)
+    candidates = changes_if_fitted(solution.design, columns, others, left)
     sharp = [f"{name} to {100.0 * error:.2g} %" for name, error, _change in candidates if error < _TOLD]
     if sharp:
         sentences.append(f"with one more constant free, the records would determine {', '.join(sharp)}")

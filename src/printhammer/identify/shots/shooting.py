@@ -169,7 +169,7 @@ class Shooting:
                 times = plan.grid[rows[stretch] : rows[stretch + 1] + 1]
                 begin = None if stretch == 0 else states[shot][stretch - 1]
                 for number, (hammer, rest, fired) in enumerate(variants):
-                    if self._acts(number, shot, times[0]):
+                    if self._has_effect(number, shot, times[0]):
                         where[shot, stretch, number] = len(runs)
                         state = np.array([rest, 0.0]) if begin is None else begin
                         runs.append(_Run(hammer, fired[shot], state, times))
@@ -196,7 +196,7 @@ class Shooting:
         count = self.parameters.count if derivatives else 0
         return [self._chain(shot, states[shot], table, where, count) for shot in range(len(self.shots))]
 
-    def _acts(self, variant: int, shot: int, start: float) -> bool:
+    def _has_effect(self, variant: int, shot: int, start: float) -> bool:
         """Whether perturbing a parameter changes a segment that begins at a given time, s."""
         number = variant - 1 - len(self.parameters.keys)
         return number < 0 or (self.parameters.owners[number] == shot and start <= self.lasting[shot])

@@ -59,7 +59,7 @@ def judge(
     """
     if solution.exact or solution.degrees_of_freedom < 3:
         return math.nan, ""
-    p_values = {why: need(solution, term) for why, term in terms.items()}
+    p_values = {why: term_p_value(solution, term) for why, term in terms.items()}
     order = np.lexsort((abscissa, series))
     ordered = (solution.residuals / np.sqrt(solution.variance))[order][solution.used[order]]
     p_values[_RUNS] = min(1.0, 2.0 * float(np.nanmin([1.0, runs_p_value(ordered), ratio_p_value(ordered)])))
@@ -72,7 +72,7 @@ def judge(
     return p_value, why if p_value < LEVEL else ""
 
 
-def need(solution: Solution, term: FloatArray) -> float:
+def term_p_value(solution: Solution, term: FloatArray) -> float:
     """Compute the p-value of one additional term in the linearised fit; NaN if the term is collinear."""
     from scipy.stats import t
 
@@ -350,7 +350,7 @@ def _crossing(values: FloatArray, increase: FloatArray, level: float, never: flo
     return float(values[k - 1] + share * (values[k] - values[k - 1]))
 
 
-def enough(data: Data, needed: int, what: str) -> None:
+def check_rows(data: Data, needed: int, what: str) -> None:
     """Raise `InputError` for data with too few rows for a fit, or with no nonzero value."""
     where = " and ".join(str(path) for path in data.files)
     if len(data.values) < needed:

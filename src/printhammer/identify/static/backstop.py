@@ -25,7 +25,7 @@ import numpy as np
 from printhammer.errors import InputError
 from printhammer.identify.least_squares import Solution
 from printhammer.identify.result import Fit, FittedConstant
-from printhammer.identify.static.assemble import Data, assemble, enough, judge, solved
+from printhammer.identify.static.assemble import Data, assemble, check_rows, judge, solved
 from printhammer.parts.backstop._hertz import damping_from_restitution, stiffness_from_bodies
 from printhammer.support.arrays import FloatArray
 from printhammer.support.tables.readings import read_table
@@ -75,7 +75,7 @@ class RestitutionLaw:
         """Compute the derivatives of the rebound speeds with respect to l/k."""
         return (self.speed**2 * rebound(self._z(p))[1])[:, None]
 
-    def spread(self, p: FloatArray) -> FloatArray:
+    def variance_columns(self, p: FloatArray) -> FloatArray:
         """Return the variance components: absolute and proportional errors of both speeds.
 
         An error of the impact speed acts through the slope d(v_out)/d(v_in) = e + z de/dz.
@@ -200,7 +200,7 @@ def fit_backstop(
             )
     zeros = np.zeros(len(speed), dtype=np.int64)
     data = Data((table.path,), "backstop", speed, back, _AXES, zeros, ("rebounds",), table.lines)
-    enough(data, _ROWS, "the damping of the backstop and its error")
+    check_rows(data, _ROWS, "the damping of the backstop and its error")
     if speed.max() < _SPAN * speed.min():
         raise InputError(
             f"{table.path}: impact speeds from {speed.min():.4g} to {speed.max():.4g} m/s",

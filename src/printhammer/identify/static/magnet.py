@@ -16,7 +16,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.identify.result import Fit
-from printhammer.identify.static.assemble import Data, assemble, enough, judge, solved
+from printhammer.identify.static.assemble import Data, assemble, check_rows, judge, solved
 from printhammer.identify.static.spring import start_of as spring_start
 from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.tables.readings import Readings, read_table
@@ -63,7 +63,7 @@ class TotalLaw:
             columns.append(-self._slope(p))
         return np.column_stack(columns)
 
-    def spread(self, p: FloatArray) -> FloatArray:
+    def variance_columns(self, p: FloatArray) -> FloatArray:
         """Return the variance components: force with and without magnet, displacement, current."""
         magnet = self.magnet.astype(np.float64)
         by_current = 2.0 * p[2] * (p[1] - p[2] * self.current) / np.sqrt(self._place(p)) * magnet
@@ -196,7 +196,7 @@ def fit_magnet(
     # NaN marks the rows without the magnet.
     current = np.concatenate([table.values["current"], np.full(0 if alone is None else len(alone), math.nan)])
     law = TotalLaw(x, current, position if alone is not None else None, zero)
-    enough(data, law.parameters + _SPARE, "the constants of the magnet and their errors")
+    check_rows(data, law.parameters + _SPARE, "the constants of the magnet and their errors")
     levels = _check(table, alone, zero or 0.0, position)
     start = start_of(table, levels, zero or 0.0)
     if alone is not None and position is not None:
@@ -207,7 +207,7 @@ def fit_magnet(
     if zero is None:
         start = np.append(start, 0.0)
     solution = solved(data, law, start, robust=robust)
-    _releases(table, law, solution.p, zero, position)
+    _check_release(table, law, solution.p, zero, position)
     p_value, why = judge(solution, law.richer(solution.p, by_current=levels != 2), x, data.series)
     wide, strong = "more rows over a wider span of displacement", "more currents over a wider span"
     remedies = {"magnet.Am": wide, "magnet.Bm": strong, "magnet.F0": wide, "spring.Bs": wide}
@@ -292,7 +292,7 @@ def _never(table: Readings, place: float, force: float) -> str:
     )
 
 
-def _releases(
+def _check_release(
     table: Readings, law: TotalLaw, p: FloatArray, zero: float | None, position: float | None
 ) -> None:
     """Raise `InputError` if no measured current makes the force positive at the rest position."""

@@ -20,7 +20,7 @@ from printhammer.errors import InputError
 from printhammer.identify.least_squares import NoSolutionError, Solution, solve
 from printhammer.identify.noise import robust_scale
 from printhammer.identify.result import Fit
-from printhammer.identify.static.assemble import Data, assemble, enough, judge, solved
+from printhammer.identify.static.assemble import Data, assemble, check_rows, judge, solved
 from printhammer.results import Declared, part
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 from printhammer.support.tables.readings import Readings, read_table
@@ -180,7 +180,7 @@ class PackLaw:
         depth = p[1 + self.column] if len(self.turns) else np.zeros_like(force)
         return [np.where(out, depth, self.log_r) * force, np.where(out, (self.log_r - depth) * force, 0.0)]
 
-    def spread(self, p: FloatArray) -> FloatArray:
+    def variance_columns(self, p: FloatArray) -> FloatArray:
         """Return the variance components: absolute force, proportional force, indentation."""
         force, (low, high) = self.value(p), self.exponents(p)
         steep = np.where(self.cycles.unloading, high, low) / (np.exp(self.log_r) * self.thickness)
@@ -233,7 +233,9 @@ def fit_pack(
         ("loading", *(f"unloading {turn + 1}" for turn in law.turns)),
         table.lines,
     )
-    enough(data, law.parameters + _SPARE, "the stiffness of the pack, the turning points and their errors")
+    check_rows(
+        data, law.parameters + _SPARE, "the stiffness of the pack, the turning points and their errors"
+    )
     if exponents and not len(cycles.unloaded):
         raise InputError(
             f"{table.path}: no rows of unloading",

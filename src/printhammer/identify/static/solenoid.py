@@ -17,7 +17,7 @@ import numpy as np
 from printhammer.errors import InputError
 from printhammer.identify.least_squares import Parameters
 from printhammer.identify.result import Fit
-from printhammer.identify.static.assemble import Data, assemble, enough, solved
+from printhammer.identify.static.assemble import Data, assemble, check_rows, solved
 from printhammer.parts.magnet.reluctance import MU0, ReluctanceMagnet, magnet_force, magnet_linkage
 from printhammer.support.arrays import FloatArray
 from printhammer.support.tables.readings import read_table
@@ -119,7 +119,7 @@ def fit_solenoid(
         ("ln(force / N)", "ln(linkage / Wb)"),
         np.concatenate([table.lines, table.lines]),
     )
-    enough(data, len(CONSTANTS) + _SPARE, "the constants of the magnetic circuit and their errors")
+    check_rows(data, len(CONSTANTS) + _SPARE, "the constants of the magnetic circuit and their errors")
     law = CircuitLaw(gap, currents, turns)
     start = _start(law, gap, force, linkage, data.values)
     least, most = start / _REACH, start * _REACH
@@ -194,7 +194,7 @@ class CircuitLaw:
         ]
         return np.column_stack(columns)
 
-    def spread(self, p: FloatArray) -> FloatArray:  # noqa: ARG002
+    def variance_columns(self, p: FloatArray) -> FloatArray:  # noqa: ARG002
         """Return the variance components: the relative errors of force and of linkage."""
         return np.repeat(np.eye(2), len(self.rows), axis=0)
 

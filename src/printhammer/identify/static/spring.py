@@ -13,7 +13,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.identify.result import Fit
-from printhammer.identify.static.assemble import Data, assemble, enough, judge, solved
+from printhammer.identify.static.assemble import Data, assemble, check_rows, judge, solved
 from printhammer.support.arrays import FloatArray
 from printhammer.support.tables.readings import read_table
 
@@ -34,7 +34,7 @@ class SpringLaw:
         """Compute the derivatives of the force with respect to Bs and As."""
         return np.column_stack([1.0 - self.travel / p[1], p[0] * self.travel / (p[1] * p[1])])
 
-    def spread(self, p: FloatArray) -> FloatArray:  # noqa: ARG002
+    def variance_columns(self, p: FloatArray) -> FloatArray:  # noqa: ARG002
         """Return one variance component: along a line, an error in x only adds to the error in the force."""
         return np.ones((len(self.travel), 1))
 
@@ -62,7 +62,7 @@ def fit_spring(path: str | Path, *, position: float, robust: bool = True, column
         ("spring",),
         table.lines,
     )
-    enough(data, _ROWS, "the two constants of the spring and their errors")
+    check_rows(data, _ROWS, "the two constants of the spring and their errors")
     if len(np.unique(x)) < 3:
         raise InputError(
             f"{table.path}: {len(np.unique(x))} different displacements",

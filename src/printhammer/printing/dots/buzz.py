@@ -296,7 +296,7 @@ class _Search:
             return BuzzSearch(None, "a single pulse makes no dot", None, 0.0, 0)
         # Within half a flight time of the last firing, the armature has hardly responded.
         self._scan(np.linspace(0.5 * self.flight, self.back, _PERIODS, endpoint=False), self._even)
-        if not self._done:
+        if not self._is_done:
             way = self.back - self.leaving
             # At least two delays, even if the armature returns at once.
             step = min(max(_DELAY_STEP, way / _DELAYS), 0.5 * way)
@@ -313,7 +313,7 @@ class _Search:
         return BuzzSearch(None, reason, self.best, self.reference, self.tried)
 
     @property
-    def _done(self) -> bool:
+    def _is_done(self) -> bool:
         """Whether the best train is good enough to end the search: enough dots, and clear of the backstop."""
         return self.best is not None and self.best.clear and self.best.count >= self.fewest
 
@@ -322,7 +322,7 @@ class _Search:
         trains = {train.interval: train for train in trial(grid.tolist())}
         step, known = float(grid[1] - grid[0]), set(grid.tolist())
         for _ in range(_ZOOMS):
-            if self._done:
+            if self._is_done:
                 return
             step /= _PER_ZOOM
             ranked = sorted(trains.values(), key=self._merit, reverse=True)
@@ -334,14 +334,14 @@ class _Search:
 
     def _even(self, periods: Sequence[float]) -> list[BuzzTrain]:
         trains = [tuple(k * period for k in range(self.pulses)) for period in periods]
-        return self._judged("uniform", periods, trains)
+        return self._simulate("uniform", periods, trains)
 
     def _delayed(self, delays: Sequence[float]) -> list[BuzzTrain]:
         count = len(delays)
         trains = delayed_trains([self.hammer] * count, delays, [self.patience] * count, self.pulses)
-        return self._judged("delayed", delays, trains)
+        return self._simulate("delayed", delays, trains)
 
-    def _judged(
+    def _simulate(
         self,
         kind: Literal["uniform", "delayed"],
         intervals: Sequence[float],

@@ -170,7 +170,7 @@ class SafeRate(Result):
                 else styled("best", f"{more}{self.rate:g} Hz"),
             ),
             ("peak", None if none else f"{self.peak_drive:.3f} {waveform.unit if waveform else ''}"),
-            ("row", _said_of_row(growth[0]) if np.isfinite(growth).any() else None),
+            ("row", _row_text(growth[0]) if np.isfinite(growth).any() else None),
             ("because", "the grid ends" if self.failure is None else self.failure.text),
             ("grid", f"{first:g} to {last:g} Hz, every {self.step:g} Hz"),
         ]
@@ -301,7 +301,7 @@ def safe_rate(
     )
 
 
-def _said_of_row(growth: float) -> str:
+def _row_text(growth: float) -> str:
     """Describe the multiplier of a row of dots in words."""
     more = ": dots alternate, within limits" if growth < -1.0 else ""
     return f"multiplier {growth:+.3f} from dot to dot{more}"
