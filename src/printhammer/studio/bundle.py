@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+import posixpath
 import re
 from functools import lru_cache
 from typing import Final
 
 from printhammer.studio.files import page_files
 
-_IMPORT: Final = re.compile(r'from "\./([\w./]+)"')
+_IMPORT: Final = re.compile(r'from "(\.{1,2}/[\w./]+)"')
+_IMPORTS: Final = re.compile(r'^import .* from ".*";$\n?', re.MULTILINE)
+_EXPORT: Final = re.compile(r"^export (?=(async )?function|const|let|class)", re.MULTILINE)
 
 _SOURCES: Final = """
 const sources = %s;
@@ -45,24 +48,40 @@ export default {
 @lru_cache
 def module() -> str:
     """Return one ES module that contains the modules of the page as texts, and loads them in order."""
-    return _sources("mount.js") + _WIDGET
+    return sources("mount.js") + _WIDGET
 
 
-def _sources(wanted: str) -> str:
+def sources(wanted: str) -> str:
     """Return a script that creates a module of the page and its dependencies."""
+    # Inside a page, no text may resemble the end of a script.
+    return _SOURCES % json.dumps(_ordered(wanted)).replace("<", "\\u003c")
+
+
+def merged(wanted: str) -> str:
+    """Return a module of the page and its dependencies as one script without imports, as workers need it."""
+    return "\n".join(_EXPORT.sub("", _IMPORTS.sub("", text)) for _, text in _ordered(wanted))
+
+
+def _ordered(wanted: str) -> list[tuple[str, str]]:
+    """Return a module and its dependencies, each before those that import it, by name from the root."""
     texts = {name: data.decode() for name, data in page_files().items() if name.endswith(".js")}
-    ordered: list[tuple[str, str]] = []
+    ordered: dict[str, str] = {}
 
     def add(name: str) -> None:
-        if name in (done for done, _ in ordered):
+        if name in ordered:
             return
-        for part in _IMPORT.findall(texts[name]):
+        folder = posixpath.dirname(name)
+
+        def place(found: re.Match[str]) -> str:
+            part = posixpath.normpath(posixpath.join(folder, found[1]))
             add(part)
-        ordered.append((name, texts[name]))
+            return f'from "./{part}"'
+
+        ordered[name] = _IMPORT.sub(place, texts[name])
 
     add(wanted)
-    # Inside a page, no text may resemble the end of a script.
-    return _SOURCES % json.dumps(ordered).replace("<", "\\u003c")
+    # A module is entered after those that it imports.
+    return list(ordered.items())
 
 
 @lru_cache
@@ -101,4 +120,4 @@ show(document.getElementById("studio"), JSON.parse(document.getElementById("kept
 @lru_cache
 def page() -> str:
     """Return a page that shows, without a server, the content inserted at `PLACE`."""
-    return _PAGE % (style(), PLACE, _sources("kept.js"))
+    return _PAGE % (style(), PLACE, sources("kept.js"))

@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.studio.states.shelf import Shelf, Told
 
 PORT: Final = 19830
 """Default port of the studio, always the same, so that links and open pages remain valid."""
@@ -54,13 +53,14 @@ def serve(
         raise missing_extra(f"the studio needs {error.name}", "studio") from None
     from printhammer.studio.bounds import LARGEST_MESSAGE
     from printhammer.studio.guard import HOSTS, Guard
+    from printhammer.studio.states.links import open_file
     from printhammer.studio.states.shelf import Shelf
     from printhammer.studio.token import user_token
     from printhammer.studio.workers.crew import Crew
 
     shelf = Shelf(hammer)
     if state is not None:
-        shelf.start = _read(Path(state), shelf)
+        open_file(Path(state), shelf)
     listening = _listen(HOSTS[0], port)
     guard = Guard(listening.getsockname()[1], token or user_token())
     crew = Crew()
@@ -82,13 +82,6 @@ def serve(
         uvicorn.Server(config).run(sockets=[listening])
     finally:
         crew.close()
-
-
-def _read(path: Path, shelf: Shelf) -> Told:
-    from printhammer.studio.states.links import read_file
-    from printhammer.support.files import read_text
-
-    return read_file(read_text(path, "the state"), str(path), shelf)
 
 
 def _listen(host: str, port: int | None) -> socket.socket:

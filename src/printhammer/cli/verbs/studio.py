@@ -11,7 +11,7 @@ from threading import Thread
 from typing import TYPE_CHECKING, Final
 
 from printhammer.cli import options as opt
-from printhammer.cli.runner import Answer, Job, verb
+from printhammer.cli.runner import Answer, Content, Job, verb
 from printhammer.cli.screen import Column, table
 from printhammer.cli.terminal import say
 
@@ -19,7 +19,15 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
 
 
-@verb("studio", "printhammer studio hendriks-1983 --port 8080")
+@verb(
+    "studio",
+    "printhammer studio hendriks-1983 --port 8080",
+    out=opt.file(
+        "Output file for a page that computes by itself, without a server or a network (.html); with this"
+        " option the studio is not started.",
+        ".html",
+    ),
+)
 def studio(
     job: Job,
     hammer: Hammer = opt.HAMMER,
@@ -32,6 +40,15 @@ def studio(
     ),
 ) -> Answer:
     """Start the studio, a local web page accessible only to its user; Ctrl-C stops it."""
+    if job.outputs:
+        from printhammer.studio.live import live_page
+        from printhammer.studio.states.links import open_file
+        from printhammer.studio.states.shelf import Shelf
+
+        shelf = Shelf(hammer)
+        if state is not None:
+            open_file(state, shelf)
+        return Answer(files={"out": Content.text(lambda: live_page(shelf))})
     from printhammer.studio import serve
 
     def ready(address: str) -> None:

@@ -10,12 +10,14 @@ from printhammer.studio.bounds import LARGEST_MESSAGE
 from printhammer.studio.states.state import READERS, ProtocolError, check_constant, dropped_hammer, read_state
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from printhammer.hammer.hammer import Hammer
     from printhammer.studio.states.shelf import Shelf, Told
     from printhammer.studio.states.state import State
 
 FORMAT: Final = 1
-_KIND: Final = "printhammer studio state"
+KIND: Final = "printhammer studio state"
 _MOST_NOTES: Final = 6
 
 
@@ -125,7 +127,7 @@ def read_file(text: str, where: str, shelf: Shelf) -> Told:
         content = json.loads(text)
     except (ValueError, RecursionError):
         content = None
-    if not isinstance(content, dict) or content.get("kind") != _KIND:
+    if not isinstance(content, dict) or content.get("kind") != KIND:
         raise InputError(
             f"{where}: expected a state file of the studio, as its export saves it", file=where, key="state"
         )
@@ -140,6 +142,19 @@ def read_file(text: str, where: str, shelf: Shelf) -> Told:
     return taken(content.get("state"), shelf)
 
 
+def open_file(path: Path, shelf: Shelf) -> None:
+    """Have a shelf start with the state in a file that the studio has exported.
+
+    Raises
+    ------
+    InputError
+        The file is not a state.
+    """
+    from printhammer.support.files import read_text
+
+    shelf.start = read_file(read_text(path, "the state"), str(path), shelf)
+
+
 def file_of(state: State) -> str:
     """Return the text of a state file; a hammer that is not shipped is included completely."""
     table = {key: getattr(state, key) for key in READERS}
@@ -147,4 +162,4 @@ def file_of(state: State) -> str:
     table["waveform"] = None if state.waveform is None else dict(state.waveform)
     if not state.text and state.shelf.is_guest(state.hammer) and not state.shelf.is_shipped(state.hammer):
         table.update(hammer="", text=state.base.to_toml())
-    return json.dumps({"kind": _KIND, "format": FORMAT, "state": table}, indent=1) + "\n"
+    return json.dumps({"kind": KIND, "format": FORMAT, "state": table}, indent=1) + "\n"

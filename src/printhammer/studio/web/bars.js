@@ -14,6 +14,7 @@ export function energyView(body, studio) {
     if (!frame) return;
     const c = colours();
     const { dots, energy } = frame;
+    if (!energy) { refusal(pen, width, height, frame.unknown); return; }
     const unit = unitOf("J");
     const of = (name) => digits(energy[name] * unit.factor, 3);
     const most = Math.max(...dots.map((dot) => dot.loading_work ?? 0), 1e-12);

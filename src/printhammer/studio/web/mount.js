@@ -278,34 +278,40 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     },
     receive: (buffer) => {
       const frame = decode(buffer);
-      if (asked.has(frame.serial) && frame.kind !== "progress") {
-        asked.get(frame.serial)(frame);
-        asked.delete(frame.serial);
-        return;
-      }
-      if (SHOWN.includes(frame.kind)) studio.buffers[frame.kind] = buffer;
-      if ((frame.kind === "motion" && !frame.ahead) || frame.kind === "refusal") {
-        studio.busy = false;
-        if (studio.stale) studio.sendState();
-      }
-      if (frame.kind === "refusal") {
-        studio.say(frame.reason, true);
-        if (!studio.busy) marks.none(`not computed: ${frame.reason}`, frame.serial);
-        return;
-      }
-      if (frame.kind === "progress") { progress(frame); return; }
-      marks.arrived(frame);
-      studio.frames[frame.kind] = frame;
-      if (frame.kind === "motion") {
-        const text = frame.message || `${frame.steps} steps, ${frame.status}`;
-        // What a link or a file held, and could not be taken, is told until something else is set.
-        if (!studio.notes && !frame.ahead) studio.say(text, frame.status !== "ok");
-        const t = frame.data.t;
-        studio.cursor = Math.min(studio.cursor, t[t.length - 1]);
-      }
-      arrived(frame);
+      if (SHOWN.includes(frame.kind) && !asked.has(frame.serial)) studio.buffers[frame.kind] = buffer;
+      accept(frame);
     },
+    accept,
   };
+
+  /** Take a frame: the answer to a question, or what views are drawn from. */
+  function accept(frame) {
+    if (asked.has(frame.serial) && frame.kind !== "progress") {
+      asked.get(frame.serial)(frame);
+      asked.delete(frame.serial);
+      return;
+    }
+    if ((frame.kind === "motion" && !frame.ahead) || frame.kind === "refusal") {
+      studio.busy = false;
+      if (studio.stale) studio.sendState();
+    }
+    if (frame.kind === "refusal") {
+      studio.say(frame.reason, true);
+      if (!studio.busy) marks.none(`not computed: ${frame.reason}`, frame.serial);
+      return;
+    }
+    if (frame.kind === "progress") { progress(frame); return; }
+    marks.arrived(frame);
+    studio.frames[frame.kind] = frame;
+    if (frame.kind === "motion") {
+      const text = frame.message || `${frame.steps} steps, ${frame.status}`;
+      // What a link or a file held, and could not be taken, is told until something else is set.
+      if (!studio.notes && !frame.ahead) studio.say(text, frame.status !== "ok");
+      const t = frame.data.t;
+      studio.cursor = Math.min(studio.cursor, t[t.length - 1]);
+    }
+    arrived(frame);
+  }
 }
 
 function honesty(hammer) {

@@ -38,7 +38,7 @@ const TEXTS = {
     return strobe?.reason === "" && k >= 0 && k < strobe.data.x.length ? `firing ${k + 1}: ${shown(strobe.data.x[k], "m")}, ${shown(strobe.data.v[k], "m/s", 3)}` : "";
   },
   energy: ({ motion, dots }, time) => {
-    const dot = dots?.dots[firingAt(motion, time)];
+    const dot = dots?.energy && dots.dots[firingAt(motion, time)];
     if (!dot) return "";
     return dot.struck ? `dot ${dot.index + 1}: ${shown(dot.loading_work, "J", 3)}, kept ${Math.round((100 * dot.net_loss) / dot.loading_work)} %` : `dot ${dot.index + 1}: lost`;
   },

@@ -1,0 +1,61 @@
+// Workers: each has one order at a time; the next one waits here, and can still be dropped.
+
+/** Start workers that run a script; `send` orders work of a role, and gives the frames or why there are none. */
+export function crewOf(script, shelf) {
+  const place = URL.createObjectURL(new Blob([script], { type: "text/javascript" }));
+  const count = Math.min(Math.max(navigator.hardwareConcurrency || 2, 1), 8);
+  let number = 0;
+  const start = () => {
+    const worker = new Worker(place);
+    const own = { worker, known: new Set(), order: null };
+    worker.postMessage({ limits: { ...shelf.limits, changes: shelf.sentences.changes, energy: shelf.sentences.energy } });
+    worker.onmessage = ({ data }) => {
+      const { order } = own;
+      own.order = null;
+      order.done(data);
+      next();
+    };
+    worker.onerror = (event) => {
+      const { order } = own;
+      own.order = null;
+      order?.done({ reason: `this could not be computed, ${event.message}` });
+      next();
+    };
+    return own;
+  };
+  // Curves have a worker of their own: a map never delays them.
+  const teams = { curves: { workers: [start()], orders: [] }, map: { workers: Array.from({ length: count }, start), orders: [] } };
+
+  async function hand(own, order) {
+    own.order = order;
+    const { name } = order;
+    if (!own.known.has(name)) {
+      const module = await shelf.module(name);
+      own.worker.postMessage({ name, module, hammer: shelf.hammers[name] });
+      own.known.add(name);
+    }
+    own.worker.postMessage(order.message);
+  }
+  function next() {
+    for (const { workers, orders } of Object.values(teams)) {
+      for (const own of workers) {
+        if (own.order) continue;
+        let order = orders.shift();
+        while (order && !order.wanted()) {
+          order.done(null);
+          order = orders.shift();
+        }
+        if (order) hand(own, order);
+      }
+    }
+  }
+  return {
+    count,
+    /** Order a work; `done` gets { frames } or { reason }, or null where it is not wanted any more when its turn comes. */
+    send(team, work, state, more, wanted, done) {
+      number += 1;
+      teams[team].orders.push({ name: state.hammer, message: { number, work, state, ...more }, wanted, done });
+      next();
+    },
+  };
+}

@@ -1,0 +1,79 @@
+// A state as texts: the file of its hammer and of its drive, a script, a command line.
+import { Refusal } from "./read.js";
+
+const HAMMER_FILE = "studio-hammer.toml";
+const DRIVE_FILE = "studio-drive.toml";
+const CLASSES = { "half-sine": "HalfSine", rectangle: "Rectangle", trapezoid: "Trapezoid", sampled: "Sampled", rail: "Rail", chopper: "Chopper", "peak-and-hold": "PeakAndHold", capacitor: "Capacitor", bridge: "Bridge" };
+
+const written = (number) => (Number.isInteger(number) && Math.abs(number) < 1e16 ? `${number}.0` : String(number).replace("e+", "e"));
+const python = (value) => (value === null ? "None" : typeof value === "number" ? written(value) : Array.isArray(value) ? `[${value.map(python).join(", ")}]` : JSON.stringify(value));
+
+/** Return the texts of a state by kind, as the exports of the studio name them. */
+export function textsOf(state, shelf) {
+  const hammer = shelf.hammers[state.hammer];
+  return {
+    get hammer() { return hammerFile(state, hammer); },
+    get drive() { throw new Refusal(shelf.sentences.drive); },
+    python: scriptOf(state, hammer),
+    command: commandOf(state, hammer),
+    state: `${JSON.stringify({ ...shelf.stateFile, state }, null, 1)}\n`,
+  };
+}
+
+/** The file of the hammer with the constants that are changed, each in SI. */
+function hammerFile(state, hammer) {
+  let { text } = hammer;
+  for (const [key, value] of Object.entries(state.constants)) {
+    const dot = key.lastIndexOf(".");
+    const [section, name] = dot < 0 ? ["", key] : [key.slice(0, dot), key.slice(dot + 1)];
+    const { unit } = [...hammer.described.constants, ...hammer.described.open].find((constant) => constant.key === key);
+    text = changed(text, section, name, unit === "1" ? written(value) : `"${value} ${unit}"`);
+  }
+  return text;
+}
+
+/** Set one value of a TOML text: the first line of a section that gives it, or a new one at the end of the section. */
+function changed(text, section, name, value) {
+  const lines = text.split("\n");
+  let here = "";
+  let last = -1;
+  for (let k = 0; k < lines.length; k += 1) {
+    const head = /^\s*\[([\w.-]+)\]/.exec(lines[k]);
+    if (head) [, here] = head;
+    if (here !== section) continue;
+    if (lines[k].trim()) last = k;
+    if (new RegExp(`^\\s*${name}\\s*=`).test(lines[k])) {
+      lines[k] = lines[k].includes("{") ? lines[k].replace(/(value\s*=\s*)("[^"]*"|[^,}\s]+)/, (_all, begin) => `${begin}${value}`) : `${name} = ${value}`;
+      return lines.join("\n");
+    }
+  }
+  lines.splice(last + 1, 0, `${name} = ${value}`);
+  return lines.join("\n");
+}
+
+function scriptOf(state, hammer) {
+  const lines = ["import printhammer as ph", ""];
+  lines.push(hammer.shipped ? `hammer = ph.load(${python(state.hammer)})` : `hammer = ph.Hammer.from_toml(${JSON.stringify(hammer.text)})`);
+  const changes = Object.entries(state.constants).sort();
+  if (changes.length) lines.push("hammer = hammer.replace(", "    {", ...changes.map(([key, value]) => `        ${python(key)}: ${python(value)},`), "    }", ")");
+  let waveform = "hammer.waveform";
+  if (state.waveform) {
+    const { shape, ...fields } = state.waveform;
+    lines.splice(1, 0, `from printhammer.drive.waveforms.shapes import ${CLASSES[shape]}`);
+    const { times, values, quantity } = fields;
+    lines.push(shape === "sampled"
+      ? `waveform = Sampled.from_samples(${python(times)}, ${python(values)}, quantity=${python(quantity)})`
+      : `waveform = ${CLASSES[shape]}(${Object.entries(fields).map(([key, value]) => `${key}=${python(value)}`).join(", ")})`);
+    waveform = "waveform";
+  }
+  const overlap = state.overlap === "add" ? "" : `, overlap=${python(state.overlap)}`;
+  if (state.pattern) lines.push(`times = [slot / ${python(state.rate)} for slot, mark in enumerate(${python(state.pattern)}) if mark == "1"]`, `drive = ph.PulseTrain(${waveform}, at=times${overlap})`);
+  else lines.push(`drive = ph.PulseTrain(${waveform}, rate=${python(state.rate)}, pulses=${state.pulses}${overlap})`);
+  return [...lines, "motion = ph.simulate(hammer, drive)", "print(motion.dots)", ""].join("\n");
+}
+
+function commandOf(state, { shipped }) {
+  const hammer = Object.keys(state.constants).length || !shipped ? HAMMER_FILE : state.hammer;
+  if (state.waveform || state.pattern) return `printhammer run ${hammer} --drive ${DRIVE_FILE}`;
+  return `printhammer run ${hammer} --rate '${written(state.rate)} Hz' --pulses ${state.pulses}${state.overlap === "add" ? "" : ` --overlap ${state.overlap}`}`;
+}

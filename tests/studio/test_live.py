@@ -1,0 +1,186 @@
+"""The page that computes by itself: its reader of states beside Python's, and the page opened from a file."""
+
+import json
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from tests.studio.browser import Page
+from tests.studio.server import STATE
+from tests.studio.test_state import JSON, SAMPLES
+
+import printhammer as ph
+from printhammer.studio.bundle import merged
+from printhammer.studio.live import content_of, live_page
+from printhammer.studio.states.controls import fields_of
+from printhammer.studio.states.shelf import Shelf
+from printhammer.studio.states.state import READERS, ProtocolError, read_state
+
+NAME = "hendriks-1983-1"
+
+
+class OneHammer(Shelf):
+    """A shelf with one hammer, whose module is all that has to be linked."""
+
+    names = (NAME,)  # type: ignore[assignment]
+
+
+READ = """
+const { createInterface } = require("node:readline");
+let readers;
+createInterface({ input: process.stdin }).on("line", (line) => {
+  const { limits, vocabulary, state } = JSON.parse(line);
+  if (limits) { readers = readersOf(limits, vocabulary); console.log("0"); return; }
+  try { readState(state, readers); console.log(JSON.stringify("")); }
+  catch (error) {
+    if (!(error instanceof Refusal)) throw error;
+    console.log(JSON.stringify(error.message));
+  }
+});
+"""
+
+
+class Reader:
+    """The reader of the page in Node."""
+
+    def __init__(self) -> None:
+        self.process = subprocess.Popen(
+            ["node", "--eval", merged("engine/read.js") + READ],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        content = content_of(OneHammer(), hammers=False)
+        self.ask({name: content[name] for name in ("limits", "vocabulary")})
+
+    def ask(self, message: dict[str, Any]) -> Any:
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        print(json.dumps(message), file=self.process.stdin, flush=True)
+        return json.loads(self.process.stdout.readline())
+
+
+@pytest.fixture(scope="module")
+def reader() -> Any:
+    made = Reader()
+    yield made
+    assert made.process.stdin is not None
+    assert made.process.stdout is not None
+    made.process.stdin.close()
+    made.process.stdout.close()
+    assert made.process.wait(20) == 0
+
+
+WAVES = [
+    SAMPLES,
+    fields_of(ph.load(NAME).waveform),
+    fields_of(ph.load("relay-5v").waveform),
+    {"shape": "half-sine", "amplitude": 101.0, "width": 1e-3, "quantity": "current"},
+    {"shape": "half-sine", "amplitude": 101.0, "width": 1e-3, "quantity": "voltage"},
+    {"shape": "half-sine", "amplitude": 1.0, "width": 0.51, "quantity": "force"},
+    {"shape": "half-sine", "amplitude": 1.0, "quantity": "force"},
+    {"shape": "half-sine", "amplitude": 1.0, "width": 0.1, "quantity": "force", "colour": 1},
+    {"shape": "constructor"},
+]
+VALUES = st.sampled_from(
+    [0, 1, 64, 65, 9.5, 10.0, 2e4, 2.1e4, -1, "", "101", "000", "12", "add", "x" * 201, [], ["map"], ["sky"]]
+)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(key=st.sampled_from(sorted(STATE)), value=VALUES | st.sampled_from(WAVES) | JSON)
+def test_the_page_takes_what_python_takes_and_refuses_the_rest(reader: Reader, key: str, value: Any) -> None:
+    try:
+        written = json.dumps({**STATE, key: value}, allow_nan=False)
+    except ValueError:
+        return
+    state = json.loads(written)
+    try:
+        read_state(state)
+        refused = ""
+    except ProtocolError as error:
+        refused = str(error)
+    assert bool(reader.ask({"state": state})) == bool(refused)
+
+
+@pytest.mark.parametrize("wave", WAVES)
+def test_a_pulse_is_read_as_python_reads_it(reader: Reader, wave: Any) -> None:
+    try:
+        READERS["waveform"](wave)
+        refused = ""
+    except ProtocolError as error:
+        refused = str(error)
+    assert reader.ask({"state": {**STATE, "waveform": wave}}) == refused
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("live") / "page.html"
+    path.write_text(live_page(OneHammer()), "utf-8")
+    return path
+
+
+WHOLE = "window.studio?.studio?.frames.map?.detail === 'full' && !document.querySelector('.outdated')"
+
+
+@pytest.fixture
+def live(written: Path, opened_browser: Any) -> Any:
+    page = opened_browser()
+    page.size(1280, 720)
+    page.open(written.as_uri())
+    page.wait(WHOLE)
+    yield page
+    assert page.complaints == []
+    assert [place for place in page.requests if not place.startswith(("blob:", "file:", "data:"))] == []
+    page.call("Page.close")
+
+
+@pytest.mark.slow
+def test_a_page_from_a_file_shows_what_python_computes(live: Page) -> None:
+    hammer = ph.load(NAME)
+    drive = ph.PulseTrain(hammer.waveform, rate=1200.0, pulses=9)
+    motion = ph.simulate(hammer, drive)
+    dots = live.run("window.studio.studio.frames.dots.dots")
+    assert [dot["struck"] for dot in dots] == [dot.struck for dot in motion.dots]
+    first = motion.dots[0]
+    assert dots[0]["flight_time"] == pytest.approx(first.flight_time, rel=1e-4)
+    assert dots[0]["peak_force"] == pytest.approx(first.peak_force, rel=1e-3)
+    chart = ph.frequency_map(hammer, rates=[500.0, 2000.0], times=[1e-3], pulses=9)
+    shown = live.run("[500, 2000].map((rate) => window.studio.studio.views.map.valueAt(1e-3, rate))")
+    stroke = hammer.front - hammer.position
+    assert abs(shown - chart["displacement"].to_numpy()[:, 0]).max() < 5e-3 * stroke
+
+
+@pytest.mark.slow
+def test_a_rate_is_followed_and_a_superseded_state_dropped(live: Page) -> None:
+    script = "for (let rate = 900; rate <= 1000; rate += 1) window.studio.studio.store.set({ rate }); 1"
+    live.run(script)
+    live.wait("window.studio.studio.frames.motion.fired[1] === 1e-3 && !window.studio.studio.busy")
+    live.wait(WHOLE)
+    live.run("window.studio.studio.store.set({ pattern: '1101' }); 1")
+    live.wait("window.studio.studio.frames.motion.fired.length === 3")
+    live.wait(f"window.studio.studio.frames.map.pattern === '1101' && {WHOLE}")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("link", "reason"),
+    [
+        ("pulses=999&pattern=zzz", "pulses is expected to be a whole number from 1 to 64"),
+        ("hammer=no-such", f"{NAME} is shown instead"),
+        ("text=<img src=x onerror=alert(1)>", "opened by `printhammer studio FILE`"),
+        ("mass=1", "mass = 1 kg: expected"),
+        ("__proto__=5&views=sky", "views is expected to be one of"),
+    ],
+)
+def test_a_hostile_link_does_no_harm(written: Path, opened_browser: Any, link: str, reason: str) -> None:
+    page = opened_browser()
+    page.open(f"{written.as_uri()}#{link}")
+    page.wait("window.studio?.studio?.frames.motion")
+    assert reason in page.run("document.querySelector('.status').textContent")
+    assert page.run("document.querySelectorAll('#studio img').length") == 0
+    assert page.complaints == []
+    page.call("Page.close")
