@@ -22,12 +22,13 @@ at every start.
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import numpy.typing as npt
+
+from printhammer.drive.tables import ROWS, fill_table, largest_value
 
 if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
@@ -112,51 +113,17 @@ def evaluate(segments: FloatArray, t: npt.ArrayLike, fired: npt.ArrayLike = 0.0)
     return np.where(np.isnan(tau), np.nan, value)
 
 
-def _inner_extremes(row: FloatArray, length: float) -> list[float]:
-    """Return the stationary points of a segment, as times s in (0, length) after its start."""
-    _, kind, _, p1, p2, p3 = (float(entry) for entry in row)
-    if kind == SINE:
-        if not math.isfinite(length):
-            length = 4.0 * math.pi / abs(p2)
-        first, last = sorted((p3, p3 + p2 * length))
-        steps = range(math.ceil(first / math.pi - 0.5), math.floor(last / math.pi - 0.5) + 1)
-        # Three turning points include both the maximum and the minimum.
-        return [((k + 0.5) * math.pi - p3) / p2 for k in list(steps)[:3]] if p2 != 0.0 else []
-    if kind == EXPONENTIAL:
-        return []
-    a, b, c = 3.0 * p3, 2.0 * p2, p1
-    if a == 0.0:
-        return [-c / b] if b != 0.0 else []
-    root = b * b - 4.0 * a * c
-    if root < 0.0:
-        return []
-    q = -0.5 * (b + math.copysign(math.sqrt(root), b))
-    return [q / a] + ([c / q] if q != 0.0 else [])
+def filled(shape: int, fields: Sequence[float]) -> FloatArray:
+    """Build the segment table of a shape, read-only, by its code in `printhammer.drive.tables`."""
+    rows = np.empty((ROWS, COLUMNS))
+    result = rows[: fill_table(shape, fields, rows)].copy()
+    result.flags.writeable = False
+    return result
 
 
 def largest(segments: FloatArray) -> float:
     """Return the largest absolute value that a segment table takes or approaches."""
-    best = 0.0
-    for row, after in itertools.pairwise(segments):
-        start, kind, p0, p1, p2, p3 = (float(entry) for entry in row)
-        length = float(after[0]) - start
-        if kind >= SWITCHED:
-            best = max(best, abs(p0) if kind != DECAY else 0.0)
-            continue
-        places = [0.0, *(s for s in _inner_extremes(row, length) if 0.0 < s < length)]
-        if math.isfinite(length):
-            places.append(length)
-        elif kind == EXPONENTIAL:
-            best = max(best, abs(p0))
-        for s in places:
-            if kind == EXPONENTIAL:
-                value = p0 + p1 * math.exp(-p2 * s)
-            elif kind == SINE:
-                value = p0 + p1 * math.sin(p2 * s + p3)
-            else:
-                value = p0 + s * (p1 + s * (p2 + s * p3))
-            best = max(best, abs(value))
-    return best
+    return largest_value(segments)
 
 
 def largest_sum(edges: FloatArray, value: Callable[[FloatArray], FloatArray]) -> float:

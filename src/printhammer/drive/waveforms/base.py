@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, NamedTuple, Self
 
 import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
-from printhammer.drive.segments import evaluate, largest
+from printhammer.drive import tables
+from printhammer.drive.segments import evaluate, filled, largest
 from printhammer.errors import InputError
 from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import invalid, quantities
@@ -18,10 +20,6 @@ QUANTITY_UNITS: Final[dict[str, QuantityName]] = {"A": "current", "N": "force", 
 """Driven quantity, by the SI unit of the amplitude."""
 UNITS: Final = {driven: unit for unit, driven in QUANTITY_UNITS.items()}
 """SI unit of each driven quantity."""
-
-DECAY_TIMES: Final = 27.6310211159
-"""Number of decay time constants after which a decaying current is set to zero: its value is then 1e-12 of
-the initial one."""
 
 
 class Supply(NamedTuple):
@@ -56,6 +54,8 @@ class Waveform(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     shape: ClassVar[str]
+    code: ClassVar[int] = tables.SAMPLED
+    """Code of the shape in `printhammer.drive.tables`, for shapes that have a table of a few segments."""
     quantity: QuantityName = "current"
 
     if not TYPE_CHECKING:
@@ -97,9 +97,14 @@ class Waveform(BaseModel):
                     raise
         return result
 
-    @abstractmethod
+    def numbers(self) -> tuple[float, ...]:
+        """Return the physical constants in order of declaration, SI; NaN for a missing one."""
+        values = (getattr(self, name) for name in quantities(type(self)))
+        return tuple(math.nan if value is None else float(value) for value in values)
+
     def segments(self) -> FloatArray:
         """Return the segment table (see `printhammer.drive.segments`), shape (segments + 1, 6), SI."""
+        return filled(self.code, self.numbers())
 
     @abstractmethod
     def scaled(self, factor: float) -> Self:

@@ -21,16 +21,18 @@ from typing import Any, ClassVar, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
+from printhammer.drive import tables
 from printhammer.drive.input import read_number
-from printhammer.drive.segments import DECAY, EXPONENTIAL, RESERVOIR, SWITCHED, table
-from printhammer.drive.waveforms.base import DECAY_TIMES, QUANTITY_UNITS, QuantityName, Supply, Waveform
+from printhammer.drive.segments import EXPONENTIAL, table
+from printhammer.drive.tables import DECAY_TIMES, DIODE
+from printhammer.drive.waveforms.base import QUANTITY_UNITS, QuantityName, Supply, Waveform
 from printhammer.errors import InputError
 from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import quantity
 from printhammer.support.constants import quantity as measured
 
-DIODE = 0.7
-"""Forward voltage of a silicon diode, V; the usual textbook value."""
+DECAYS: Final = ("diode", "zener", "rail")
+"""Paths of the current after the supply is switched off."""
 
 
 class _Driver(Waveform):
@@ -75,34 +77,26 @@ class _Driver(Waveform):
         """Time from the firing until the supply is off, s; the current may last longer."""
         return float(self.segments()[-2, 0])
 
+    def numbers(self) -> tuple[float, ...]:
+        """Return the physical constants, in order of declaration, and the index of the decay path."""
+        return (*super().numbers(), float(DECAYS.index(self.decay)))
+
     def supply(self) -> Supply:
         """Return the supply."""
-        return Supply(diode=self.diode_voltage, coils=self.coils)
+        numbers = [0.0] * len(Supply._fields)
+        tables.fill_supply(self.numbers(), self.code == tables.CAPACITOR, numbers, 0)
+        return Supply(*numbers)
 
     def scaled(self, factor: float) -> Self:
         """Return a copy with the supply voltage scaled by `factor`; chopper thresholds are unchanged."""
         return type(self)(**{**self.model_dump(), "voltage": self.voltage * factor})
-
-    def _off(self, at: float) -> tuple[float, ...]:
-        """Return the row of the segment that begins when the supply is switched off."""
-        against = self.decay_voltage
-        if against is None:
-            against = self.voltage if self.decay == "rail" else DIODE
-        series = self.decay_resistance + (self.series if self.decay == "rail" else 0.0)
-        return (at, DECAY, against, series, float(self.decay == "rail"), 0.0)
-
-    def _on(self, at: float, upper: float = math.inf, lower: float = 0.0) -> tuple[float, ...]:
-        return (at, SWITCHED, self.voltage, self.series, upper, lower)
 
 
 class Rail(_Driver):
     """Rail driver: the supply is on for the pulse width, then off."""
 
     shape: ClassVar[str] = "rail"
-
-    def segments(self) -> FloatArray:
-        """Return the segment table: supply on, supply off."""
-        return table([self._on(0.0), self._off(self.width)], math.inf)
+    code: ClassVar[int] = tables.RAIL_SHAPE
 
 
 class Chopper(_Driver):
@@ -112,6 +106,7 @@ class Chopper(_Driver):
     """
 
     shape: ClassVar[str] = "chopper"
+    code: ClassVar[int] = tables.CHOPPER
     upper: float = measured("A", "Iu", "current at which the chopper switches off", gt=0.0)
     lower: float | None = measured("A", "Il", "current at which it switches on again", gt=0.0, default=None)
     off_time: float | None = measured("s", "to", "time for which it stays off", gt=0.0, default=None)
@@ -124,16 +119,12 @@ class Chopper(_Driver):
             raise ValueError(f"lower = {self.lower:g} A: expected less than upper = {self.upper:g} A")
         return self
 
-    def segments(self) -> FloatArray:
-        """Return the segment table: supply chopped, supply off."""
-        lower = self.lower if self.lower is not None else -(self.off_time or 0.0)
-        return table([self._on(0.0, self.upper, lower), self._off(self.width)], math.inf)
-
 
 class PeakAndHold(_Driver):
     """Peak-and-hold driver: full supply for the peak time, then chopped between two lower currents."""
 
     shape: ClassVar[str] = "peak-and-hold"
+    code: ClassVar[int] = tables.PEAK_AND_HOLD
     peak_time: float = measured("s", "tp", "time of the full supply", gt=0.0)
     hold_upper: float = measured("A", "Iu", "upper current while it holds", gt=0.0)
     hold_lower: float = measured("A", "Il", "lower current while it holds", gt=0.0)
@@ -148,47 +139,24 @@ class PeakAndHold(_Driver):
             raise ValueError(f"peak_time = {self.peak_time:g} s: expected less than width = {self.width:g} s")
         return self
 
-    def segments(self) -> FloatArray:
-        """Return the segment table: full supply, supply chopped, supply off."""
-        hold = self._on(self.peak_time, self.hold_upper, self.hold_lower)
-        return table([self._on(0.0), hold, self._off(self.width)], math.inf)
-
 
 class Capacitor(_Driver):
     """Capacitor driver: a capacitor, always being charged, discharges through the coil for the width."""
 
     shape: ClassVar[str] = "capacitor"
+    code: ClassVar[int] = tables.CAPACITOR
     capacitance: float = measured("F", "C", "capacitance", gt=0.0)
     charging_resistance: float = measured(
         "ohm", "Rc", "resistance through which the capacitor is charged", gt=0.0
     )
-
-    def supply(self) -> Supply:
-        """Return the supply."""
-        return Supply(
-            diode=self.diode_voltage,
-            capacitance=self.capacitance,
-            charging=self.charging_resistance,
-            charged=self.voltage,
-            coils=self.coils,
-        )
-
-    def segments(self) -> FloatArray:
-        """Return the segment table: capacitor connected, supply off."""
-        on = (0.0, RESERVOIR, self.voltage, self.series, 0.0, 0.0)
-        return table([on, self._off(self.width)], math.inf)
 
 
 class Bridge(_Driver):
     """H-bridge: supply for the width, then reversed supply for a time, then off."""
 
     shape: ClassVar[str] = "bridge"
+    code: ClassVar[int] = tables.BRIDGE
     reverse: float = measured("s", "tr", "time of the reversed supply", gt=0.0)
-
-    def segments(self) -> FloatArray:
-        """Return the segment table: supply on, supply reversed, supply off."""
-        back = (self.width, SWITCHED, -self.voltage, self.series, math.inf, 0.0)
-        return table([self._on(0.0), back, self._off(self.width + self.reverse)], math.inf)
 
 
 DRIVERS: tuple[type[Waveform], ...] = (Rail, Chopper, PeakAndHold, Capacitor, Bridge)

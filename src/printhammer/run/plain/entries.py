@@ -22,6 +22,7 @@ _NO_LAWS: Final = Laws("", "", "", "", absent="printhammer.parts.absent")
 
 _ENTRIES: Final[dict[str, tuple[Any, ...]]] = {
     "firings": (tables.fill_firings, ("f", "i1", "b", "f1"), 1),
+    "pulse": (tables.pulse, ("i", "f1", "f2", "f1"), 1),
     "pulse_values": (tables.fill_values, ("f2", "f1", "f1")),
 }
 """Functions by name, with the types of their arguments (as in `printhammer.kernel.compile.calls.Signature`),
