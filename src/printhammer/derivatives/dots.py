@@ -17,9 +17,8 @@ import numpy as np
 from printhammer.derivatives.constants import flow, pack_push_changes, pack_push_rate, surface_moves
 from printhammer.derivatives.flow import Flow
 from printhammer.derivatives.parameters import Parameter
-from printhammer.kernel.model.dots import DOT
 from printhammer.results import Declared, part, scalar
-from printhammer.run.contacts import Contact, contact_numbers
+from printhammer.run.contacts import Contact
 from printhammer.run.motion import Motion
 from printhammer.run.problem import Problem, Record
 from printhammer.support.arrays import FloatArray
@@ -94,7 +93,11 @@ def dot_values(motion: Motion) -> FloatArray:
 
 def _touches(contacts: Sequence[Contact]) -> list[int]:
     """Return the row index of each contact that makes a dot, in order of the firings."""
-    return [row for row, number in enumerate(contact_numbers(contacts)) if number == DOT]
+    return [
+        row
+        for row, contact in enumerate(contacts)
+        if contact.surface == "pack" and contact.firing is not None and not (contact.initial or contact.extra)
+    ]
 
 
 def _back(contacts: Sequence[Contact], row: int) -> int | None:

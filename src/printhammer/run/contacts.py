@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 
 from printhammer.drive.batch import Ragged
 from printhammer.kernel.model import dots as layout
-from printhammer.kernel.model.dots import DOT, NO_DOT, contact_number, firing_before
-from printhammer.kernel.model.modes import BACKSTOP_SURFACE, PACK_SURFACE
+from printhammer.kernel.model.dots import DOT
+from printhammer.kernel.model.modes import PACK_SURFACE
+from printhammer.kernel.readout import contacts as readout
+from printhammer.kernel.readout.sums import PARTIALS
 from printhammer.results import Declared, Result, column, part, scalar
 from printhammer.run.problem import Problem, Record
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
@@ -68,46 +70,6 @@ class Dot(Declared):
     extra_contacts: int = part("further pack contacts before the next firing", default=0)
 
 
-class _Numbers:
-    """Counter that numbers the pack contacts of each firing."""
-
-    def __init__(self) -> None:
-        self._counts: dict[int, int] = {}
-
-    def count(self, surface: int, initial: bool, fired: int) -> int:
-        """Return the index of a contact among the pack contacts of its firing, and increment the counter."""
-        number = contact_number(surface, initial, fired, self._counts.get(fired, 0))
-        if number != NO_DOT:
-            self._counts[fired] = number + 1
-        return number
-
-
-def contact_numbers(contacts: Sequence[Contact]) -> list[int]:
-    """Return the index of each contact among the pack contacts of its firing; index `DOT` makes the dot."""
-    numbers = _Numbers()
-    return [
-        numbers.count(
-            PACK_SURFACE if contact.surface == "pack" else BACKSTOP_SURFACE,
-            contact.initial,
-            -1 if contact.firing is None else contact.firing,
-        )
-        for contact in contacts
-    ]
-
-
-def step_range(record: Record, row: int) -> tuple[int, int]:
-    """Return the range of integration steps within a contact: the first, and one past the last."""
-    first = int(record.contacts[row, 5])
-    t_out = record.contacts[row, 3]
-    last = len(record.nodes) - 1
-    if math.isfinite(t_out):
-        last = min(last, int(np.searchsorted(record.nodes[:, 0], t_out, side="left")))
-    if record.contacts[row, 3] == record.contacts[row, 1]:
-        # An impact on a rigid backstop is a step of zero duration between two nodes.
-        last = min(first + 1, len(record.nodes) - 1)
-    return first, last
-
-
 def touches_of(record: Record) -> list[tuple[Literal["pack", "backstop"], float]]:
     """Return surface and time, s, of every touch in a run; contacts open at the start are excluded."""
     return [
@@ -117,99 +79,85 @@ def touches_of(record: Record) -> list[tuple[Literal["pack", "backstop"], float]
     ]
 
 
-def contacts_of(problem: Problem, record: Record, increments: FloatArray, rigid: bool) -> list[Contact]:
-    """Build the contacts of a run from the kernel's record, with peak forces and energy losses.
+def contact_rows(problem: Problem, record: Record, increments: FloatArray, rigid: bool) -> FloatArray:
+    """Compute the contacts of a run, one row each, see `printhammer.kernel.readout.contacts`.
 
     `increments` is the result of `printhammer.run.energy.increments_of`; `rigid` states whether the backstop
     is rigid.
     """
-    if len(record.contacts) == 0:
-        return []
-    peaks = problem.peaks(record)
-    times = problem.firings
+    rows = np.empty((len(record.contacts), readout.CONTACT_WIDTH))
+    if len(rows):
+        readout.write_contacts(
+            record.contacts,
+            record.nodes,
+            problem.peaks(record),
+            increments,
+            problem.firings,
+            rigid,
+            np.empty(PARTIALS),
+            rows,
+        )
+    return rows
+
+
+def contacts_of(rows: FloatArray) -> list[Contact]:
+    """Build the contacts of a run from the rows of `contact_rows`."""
     contacts: list[Contact] = []
-    numbers = _Numbers()
-    for row, (surface, t_in, v_in, t_out, v_out, _node, initial) in enumerate(record.contacts):
-        is_pack = int(surface) == PACK_SURFACE
-        first, last = step_range(record, row)
-        fired = firing_before(t_in, times)
-        number = numbers.count(int(surface), bool(initial), fired)
-        hard = rigid and not is_pack
+    for row in rows.tolist():
+        t_out, peak_force, firing = row[readout.TIME_OUT], row[readout.FORCE], int(row[readout.FIRING])
+        is_open = math.isnan(t_out)
         contacts.append(
             Contact(
-                surface="pack" if is_pack else "backstop",
-                t_in=float(t_in),
-                v_in=float(v_in),
-                t_out=None if math.isnan(t_out) else float(t_out),
-                v_out=None if math.isnan(t_out) else float(v_out),
-                t_peak=float(t_in if hard else peaks[row, 0]),
-                depth=0.0 if hard else float(peaks[row, 1]),
-                peak_force=None if hard else float(peaks[row, 2]),
-                loss=float(increments[first:last, 2 if is_pack else 3].sum()),
-                firing=fired if fired >= 0 else None,
-                extra=number > DOT,
-                initial=bool(initial),
+                surface="pack" if row[readout.SURFACE] == PACK_SURFACE else "backstop",
+                t_in=row[readout.TIME_IN],
+                v_in=row[readout.SPEED_IN],
+                t_out=None if is_open else t_out,
+                v_out=None if is_open else row[readout.SPEED_OUT],
+                t_peak=row[readout.PEAK_TIME],
+                depth=row[readout.DEPTH],
+                peak_force=None if math.isnan(peak_force) else peak_force,
+                loss=row[readout.LOSS],
+                firing=firing if firing >= 0 else None,
+                extra=row[readout.NUMBER] > DOT,
+                initial=row[readout.INITIAL] != 0.0,
             )
         )
     return contacts
 
 
-def loading_works(
-    problem: Problem, record: Record, contacts: Sequence[Contact], increments: FloatArray
-) -> FloatArray:
-    """Return the work done on the pack up to the peak of each contact, J; 0 for the backstop."""
-    result = np.zeros(len(contacts))
-    rows, steps, starts, ends = [], [], [], []
-    for row, contact in enumerate(contacts):
-        if contact.surface != "pack":
-            continue
-        first, last = step_range(record, row)
-        step = int(np.searchsorted(record.nodes[:, 0], contact.t_peak, side="right")) - 1
-        step = min(max(step, first), last)
-        result[row] = increments[first:step, 2].sum()
-        if step < last and contact.t_peak > record.nodes[step, 0]:
-            rows.append(row)
-            steps.append(step)
-            starts.append(record.nodes[step, 0])
-            ends.append(contact.t_peak)
-    if rows:
-        rest = problem.quadratures(record, np.array(steps), np.array(starts), np.array(ends))
-        for row, work in zip(rows, rest[:, 2], strict=True):
-            result[row] += work
-    return result
+def dots_of(problem: Problem, record: Record, rows: FloatArray, increments: FloatArray) -> list[Dot]:
+    """Build the dots of all firings of a run, lost dots included, from the rows of `contact_rows`."""
+    count = len(rows)
+    works, starts, ends = np.zeros((3, count))
+    steps = np.zeros(count, np.int64)
+    readout.write_loading(rows, record.nodes, increments, np.empty(PARTIALS), works, steps, starts, ends)
+    rests = problem.quadratures(record, steps, starts, ends)
+    table = np.empty((problem.firings.size, readout.DOT_WIDTH))
+    end = float(record.nodes[-1, 0])
+    fired = readout.write_dots(problem.firings, end, rows, works, rests, table)
+    return [_dot_of(index, row) for index, row in enumerate(table[:fired].tolist())]
 
 
-def dots_of(times: FloatArray, contacts: Sequence[Contact], works: FloatArray, t_end: float) -> list[Dot]:
-    """Return the dots of all firings up to `t_end`, s, lost dots included."""
-    owned: dict[int, list[int]] = {}
-    for row, (contact, number) in enumerate(zip(contacts, contact_numbers(contacts), strict=True)):
-        if number != NO_DOT and contact.firing is not None:
-            owned.setdefault(contact.firing, []).append(row)
-    dots: list[Dot] = []
-    for index, fired_at in enumerate(times):
-        if fired_at > t_end:
-            break
-        rows = owned.get(index, [])
-        if not rows:
-            dots.append(Dot(index, float(fired_at), struck=False))
-            continue
-        contact = contacts[rows[0]]
-        dots.append(
-            Dot(
-                index=index,
-                fired_at=float(fired_at),
-                struck=True,
-                flight_time=contact.t_in - float(fired_at),
-                impact_speed=contact.v_in,
-                peak_force=contact.peak_force,
-                indentation=contact.depth,
-                contact_time=None if contact.t_out is None else contact.t_out - contact.t_in,
-                loading_work=float(works[rows[0]]),
-                net_loss=contact.loss,
-                extra_contacts=len(rows) - 1,
-            )
-        )
-    return dots
+_KNOWN: Final = (
+    "flight_time",
+    "impact_speed",
+    "peak_force",
+    "indentation",
+    "contact_time",
+    "loading_work",
+    "net_loss",
+)
+"""Fields of a struck dot in the order of the columns of `printhammer.kernel.readout.contacts`."""
+
+
+def _dot_of(index: int, row: list[float]) -> Dot:
+    if not row[readout.STRUCK]:
+        return Dot(index, row[readout.FIRED_AT], struck=False)
+    columns = range(readout.FLIGHT_TIME, readout.EXTRA_CONTACTS)
+    known = (None if math.isnan(row[column]) else row[column] for column in columns)
+    values: dict[str, Any] = dict(zip(_KNOWN, known, strict=True))
+    extra = int(row[readout.EXTRA_CONTACTS])
+    return Dot(index, row[readout.FIRED_AT], struck=True, **values, extra_contacts=extra)
 
 
 _FIRINGS: Final = "member firing"

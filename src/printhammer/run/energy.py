@@ -16,6 +16,7 @@ from printhammer.drive.trains import Drive
 from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.static_force import StaticForce
 from printhammer.kernel.model import layout
+from printhammer.kernel.readout.energy import TERMS, write_ledger
 from printhammer.parts import absent
 from printhammer.results import Declared, scalar
 from printhammer.run.problem import Problem, Record
@@ -232,8 +233,6 @@ def _function(part: Any, name: str) -> Any:
 def ledger_of(problem: Problem, record: Record, increments: FloatArray) -> Ledger:
     """Compute the ledger of a run from the result of `increments_of`."""
     sums = [float(math.fsum(column)) for column in increments.T]
-    coil, force, pack, backstop, damping = sums[:5]
-    supply, copper, driver, eddy = sums[5:] or (0.0, 0.0, 0.0, 0.0)
     field = 0.0
     if problem.laws.circuit:
         field = field_energy(problem, record, -1) - field_energy(problem, record, 0)
@@ -241,22 +240,8 @@ def ledger_of(problem: Problem, record: Record, increments: FloatArray) -> Ledge
     linked = problem.laws.circuit and winding_of(problem.hammer).back_emf
     start, end = record.nodes[0], record.nodes[-1]
     hammer = problem.hammer
-    kinetic = float(0.5 * hammer.mass * (end[2] ** 2 - start[2] ** 2))
     stored = stored_energy(hammer, float(end[1])) - stored_energy(hammer, float(start[1]))
-    return Ledger(
-        coil_work=coil,
-        drive_work=force,
-        pack_loss=pack,
-        backstop_loss=backstop,
-        damping_loss=damping,
-        supply_work=supply,
-        copper_loss=copper,
-        driver_loss=driver,
-        eddy_loss=eddy,
-        field=field,
-        electric_residual=supply - copper - driver - eddy - field - (coil if linked else 0.0),
-        kinetic=kinetic,
-        stored=stored,
-        throughput=float(np.abs(increments).sum()),
-        residual=coil + force - pack - backstop - damping - kinetic - stored,
-    )
+    throughput = float(np.abs(increments).sum())
+    terms = [0.0] * len(TERMS)
+    write_ledger(start.tolist(), end.tolist(), hammer.mass, [*sums, throughput], stored, field, linked, terms)
+    return Ledger(*terms)

@@ -30,7 +30,7 @@ from printhammer.results.summary import (
     quantity,
     styled,
 )
-from printhammer.run.contacts import Contact, Dot, contacts_of, dots_of, loading_works
+from printhammer.run.contacts import Contact, Dot, contact_rows, contacts_of, dots_of
 from printhammer.run.energy import CoilWork, Ledger, coil_work_of, increments_of, ledger_of
 from printhammer.run.problem import Problem, Record, message_of
 from printhammer.run.start import state_to_begin
@@ -268,18 +268,21 @@ class Motion(Result, fields=False):
         return increments_of(self._problem, self._record)
 
     @cached_property
-    def contacts(self) -> Rows[Contact]:
-        """All contacts in order of touch, including one open at the start; a tuple, shown as a table."""
+    def _contact_rows(self) -> FloatArray:
         rigid = self.hammer.backstop is not None and bool(
             getattr(import_module(self.hammer.backstop.module), "RIGID", False)
         )
-        return Rows(contacts_of(self._problem, self._record, self._increments, rigid), Contact)
+        return contact_rows(self._problem, self._record, self._increments, rigid)
+
+    @cached_property
+    def contacts(self) -> Rows[Contact]:
+        """All contacts in order of touch, including one open at the start; a tuple, shown as a table."""
+        return Rows(contacts_of(self._contact_rows), Contact)
 
     @cached_property
     def dots(self) -> Rows[Dot]:
         """Dots of all firings up to the end of the run, in order; a tuple, shown as a table."""
-        works = loading_works(self._problem, self._record, self.contacts, self._increments)
-        return Rows(dots_of(self.drive.times, self.contacts, works, self.end), Dot)
+        return Rows(dots_of(self._problem, self._record, self._contact_rows, self._increments), Dot)
 
     @cached_property
     def energy(self) -> Ledger:

@@ -17,7 +17,7 @@ from printhammer.chaos.strobe.map import IN_PACK, image_of, is_usable, margin_of
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Declared, column, part, scalar
-from printhammer.run.contacts import contacts_of
+from printhammer.run.contacts import contact_rows, contacts_of
 from printhammer.run.energy import increments_of
 from printhammer.run.problem import Problem, Record
 from printhammer.run.regime import Regime
@@ -207,7 +207,7 @@ class RegimeFamily:
         increments = increments_of(problem, record)
         forces = np.full(self.firings, np.nan)
         zero = problem.start - regime.phase * regime.period
-        for contact in contacts_of(problem, record, increments, has_rigid_backstop(regime)):
+        for contact in contacts_of(contact_rows(problem, record, increments, has_rigid_backstop(regime))):
             if contact.surface == "pack" and not contact.initial and contact.peak_force is not None:
                 fired = math.floor((contact.t_in - zero) / regime.period) % self.firings
                 forces[fired] = np.fmax(forces[fired], contact.peak_force)

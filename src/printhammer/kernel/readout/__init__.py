@@ -1,0 +1,1 @@
+"""Readout of a run as arrays: curves, contacts, dots, energies, maps, printed lines, strobe sections."""

@@ -1,0 +1,74 @@
+"""Frequency-time map in pieces: rates and firing times of its members, displacements as colour codes."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+GAP = 65535
+"""Code of a cell without a displacement; codes of known displacements are 0 to 65534."""
+_STEEPEST = 1e38
+
+
+def write_rates(low: float, high: float, rates: Any) -> None:
+    """Write evenly spaced rates [Hz] from `low` to `high`, as `numpy.linspace` spaces them."""
+    last = rates.shape[0] - 1
+    step = (high - low) / max(last, 1)
+    for i in range(last + 1):
+        rates[i] = i * step + low
+    if last > 0:
+        rates[last] = high
+
+
+def write_trains(rates: Any, slots: Any, pattern: bool, starts: Any, firings: Any) -> None:
+    """Write the firing times [s] of a train at each rate, and the start index of each train.
+
+    The firings are those of the `slots`, int64: at the slot number over the rate in a `pattern`, else at
+    the slot number times the period.
+    """
+    count = slots.shape[0]
+    starts[0] = 0
+    for i in range(rates.shape[0]):
+        starts[i + 1] = (i + 1) * count
+        for k in range(count):
+            firings[i * count + k] = slots[k] / rates[i] if pattern else slots[k] * (1.0 / rates[i])
+
+
+def widen_range(x: Any, ends: Any) -> None:
+    """Extend the range `ends` [m], shape (2,), to all known displacements of `x`, float32."""
+    for i in range(x.shape[0]):
+        for j in range(x.shape[1]):
+            if math.isfinite(x[i, j]):
+                ends[0] = min(ends[0], x[i, j])
+                ends[1] = max(ends[1], x[i, j])
+
+
+def write_codes(x: Any, low: float, high: float, codes: Any) -> None:
+    """Write displacements as codes from 0 (at `low` [m]) to 65534 (at `high` [m]); `GAP` if unknown.
+
+    `x` is float32 with two axes, `codes` is uint16 with one, row after row.
+    """
+    least, span = np.float32(low), np.float32(high - low)
+    # Without motion, both ends are adjacent floats.
+    steep = np.float32(min((GAP - 1) / (high - low), _STEEPEST))
+    at = 0
+    for i in range(x.shape[0]):
+        for j in range(x.shape[1]):
+            code = min(x[i, j] - least, span) * steep
+            if math.isnan(x[i, j]):
+                codes[at] = GAP
+            else:
+                codes[at] = int(min(max(code, np.float32(0.0)), np.float32(GAP - 1)))
+            at += 1
+
+
+def write_struck(dots: Any, starts: Any, firings: int, struck: Any) -> None:
+    """Write 1 for each firing that made a dot, else 0, `firings` for each member of a map.
+
+    `dots` and `starts` are `Kept.dots` and `Kept.dot_starts` of :mod:`printhammer.kernel.lanes.batch`.
+    """
+    for member in range(starts.shape[0] - 1):
+        for k in range(firings):
+            struck[member * firings + k] = 1 if dots[starts[member] + k, 0] > 0.0 else 0

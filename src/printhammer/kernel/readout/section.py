@@ -1,0 +1,83 @@
+"""Strobe section of an endless train: its largest exponent, and the distances at which states repeat."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+FEWEST = 8
+"""Smallest number of growth factors from which a standard error is estimated."""
+
+
+def write_exponent(growth: Any, work: Any, out: Any) -> None:
+    """Write mean and standard error of the largest growth per firing to `out`, shape (2,).
+
+    The standard error of the mean of the n autocorrelated numbers is that of overlapping batch means, see
+    `printhammer.derivatives.states.standard_error`: infinite for fewer than eight numbers or if a number
+    is not finite.
+
+    Parameters
+    ----------
+    growth : float64 array, shape (n, any)
+        Logarithm of the growth from each firing to the next; the largest in column 0.
+    work : float64 array, shape (n + 1,)
+        Working space.
+    out : float64 array, shape (2,)
+        Output.
+    """
+    n = growth.shape[0]
+    mean = 0.0
+    for i in range(n):
+        mean += growth[i, 0]
+    mean /= max(n, 1)
+    out[0], out[1] = mean, math.inf
+    if n < FEWEST or not math.isfinite(mean):
+        return
+    b = int(math.sqrt(n))
+    b -= 1 if b * b > n else 0
+    work[0] = 0.0
+    for i in range(n):
+        work[i + 1] = work[i] + (growth[i, 0] - mean)
+    squares = 0.0
+    for i in range(n + 1 - b):
+        batch = (work[i + b] - work[i]) / b
+        squares += batch * batch
+    out[1] = math.sqrt(b / ((n - b) * (n - b + 1.0)) * squares)
+
+
+def write_distances(states: Any, branches: Any, scales: Any, distances: Any) -> int:
+    """Write the largest distance of states q firings apart; return the smallest q that repeats.
+
+    Parameters
+    ----------
+    states : float64 array, shape (n, any)
+        States at successive firings.
+    branches : int64 array, shape (n,)
+        Branch of the pack's law of each state, 0 outside the pack.
+    scales : float64 array
+        Scale of each component; the last element is the distance up to which states agree, in these units.
+    distances : float64 array, shape (any,)
+        Largest absolute difference of a component in units of its scale: infinite if states q apart lie on
+        different branches, if a state is unknown, or if q exceeds half of n.
+
+    Returns
+    -------
+    int
+        Smallest q at which all states agree; 0 if there is none.
+    """
+    n, parts = states.shape
+    period = 0
+    for place in range(distances.shape[0]):
+        q = place + 1
+        largest = 0.0 if q <= n // 2 else math.inf
+        for i in range(n - q if q <= n // 2 else 0):
+            if branches[i] != branches[i + q]:
+                largest = math.inf
+            for k in range(parts):
+                apart = abs(states[i + q, k] / scales[k] - states[i, k] / scales[k])
+                if not apart <= largest:
+                    largest = apart if math.isfinite(apart) else math.inf
+        distances[place] = largest
+        if period == 0 and largest <= scales[parts]:
+            period = q
+    return period

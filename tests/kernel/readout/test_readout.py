@@ -1,0 +1,191 @@
+"""What is read out of runs: curves, contacts and dots, codes of maps, printed lines, strobe sections."""
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import printhammer as ph
+from printhammer.chaos.strobe.verdict import AGREEMENT, LARGEST_PERIOD, period_of, repeats
+from printhammer.derivatives.states import standard_error
+from printhammer.drive.batch import PulseTrains, Ragged
+from printhammer.drive.waveforms.shapes import Rectangle
+from printhammer.kernel.model.modes import BACKSTOP_SURFACE, PACK_SURFACE
+from printhammer.kernel.readout import codes, contacts, curves, energy, line, section
+from printhammer.printing.dots.judging import PRESETS
+from printhammer.printing.dots.strategy import FIRST_SLOT, slot_times
+from printhammer.printing.page.page import head_of, print_page
+from printhammer.printing.page.pattern import Pattern
+from printhammer.run.energy import Ledger
+from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
+from printhammer.run.ensemble_group import Job
+from printhammer.run.window import wait_of
+
+FEWEST = 200
+
+
+@given(st.lists(st.just(0.0) | st.floats(1e-9, 1e-3), min_size=1, max_size=60).filter(any))
+def test_a_curve_passes_every_step_and_has_no_wide_gap(steps: list[float]) -> None:
+    nodes = np.concatenate([[0.0], np.cumsum(steps)])[:, np.newaxis]
+    times = np.empty(FEWEST + 3 * len(nodes) + 1)
+    times = times[: curves.write_times(nodes, FEWEST, 1000, times)]
+    assert np.isin(nodes, times).all()
+    assert (np.diff(times) >= 0.0).all()
+    assert np.diff(times).max() <= 1.000001 * nodes[-1, 0] / FEWEST
+
+
+def test_curves_are_the_columns_of_the_run_and_their_sum() -> None:
+    table = np.random.default_rng(0).normal(size=(7, 10))
+    out, largest = np.empty((curves.CURVES, 7), np.float32), np.empty(1)
+    curves.write_curves(table, True, out, largest)
+    assert largest[0] == np.abs(table[:, 2]).max()
+    np.testing.assert_allclose(out[curves.TOTAL], table[:, 2:9].sum(axis=1), rtol=1e-5, atol=1e-6)
+    np.testing.assert_array_equal(out[[0, 1, 2, 3]], np.float32([*table[:, :3].T, np.zeros(7)]))
+
+
+def test_contacts_are_numbered_from_each_firing() -> None:
+    pack, stop = float(PACK_SURFACE), float(BACKSTOP_SURFACE)
+    record = np.array(
+        [
+            [pack, 0.0, 0.0, 0.5, -1.0, 0, 1],
+            [stop, 0.6, -1.0, 0.7, 1.0, 1, 0],
+            [pack, 1.0, 1.0, 1.5, -0.5, 2, 0],
+            [pack, 1.7, 0.4, 1.8, -0.2, 3, 0],
+            [pack, 2.5, 1.0, math.nan, math.nan, 4, 0],
+        ]
+    )
+    nodes = np.column_stack([[0.0, 0.6, 1.0, 1.7, 2.5, 3.0]])
+    losses = np.arange(25.0).reshape(5, 5)
+    firings = np.array([0.9, 2.0, 2.9, 5.0])
+    rows = np.empty((5, contacts.CONTACT_WIDTH))
+    peaks = record[:, [1, 2, 2]]
+    contacts.write_contacts(record, nodes, peaks, losses, firings, True, np.empty(128), rows)
+    assert rows[:, contacts.NUMBER].tolist() == [-1, -1, 0, 1, 0]
+    assert rows[:, contacts.FIRING].tolist() == [-1, -1, 0, 0, 1]
+    assert np.isnan(rows[:, contacts.FORCE]).tolist() == [False, True, False, False, False]
+    dots = np.empty((4, contacts.DOT_WIDTH))
+    assert contacts.write_dots(firings, 3.0, rows, np.ones(5), np.ones((5, 3)), dots) == 3
+    assert dots[:3, contacts.STRUCK].tolist() == [1.0, 1.0, 0.0]
+    assert dots[:3, contacts.EXTRA_CONTACTS].tolist() == [1.0, 0.0, 0.0]
+    np.testing.assert_array_equal(dots[:3, contacts.LOADING_WORK], [2.0, 2.0, math.nan])
+    assert dots[0, contacts.FLIGHT_TIME] == pytest.approx(0.1)
+    assert math.isnan(dots[1, contacts.CONTACT_TIME])
+    quality = np.empty(6)
+    contacts.write_quality(dots, 3, quality)
+    assert quality.tolist() == pytest.approx([2.0, 1.0, 1.0, 1.0, 0.1, 0.5])
+
+
+def test_the_terms_of_the_ledger_are_its_fields() -> None:
+    assert tuple(field.name for field in dataclasses.fields(Ledger)) == energy.TERMS
+
+
+@given(st.lists(st.floats(-0.5, 1.5, width=32), min_size=1, max_size=40), st.floats(0.1, 10.0))
+def test_codes_divide_the_range_evenly(places: list[float], scale: float) -> None:
+    x = np.float32([[*np.float32(places) * np.float32(scale), math.nan]])
+    found = np.empty(x.size, np.uint16)
+    codes.write_codes(x, 0.0, scale, found)
+    assert found[-1] == codes.GAP
+    clipped = np.clip(x[0, :-1], 0.0, scale)
+    np.testing.assert_allclose(found[:-1] / (codes.GAP - 1) * scale, clipped, atol=1.1 * scale / codes.GAP)
+    ends = np.array([math.inf, -math.inf])
+    codes.widen_range(x, ends)
+    assert ends.tolist() == [x[0, :-1].min(), x[0, :-1].max()]
+
+
+@given(st.floats(10.0, 1e3), st.floats(1.0, 1e3), st.integers(1, 64), st.integers(1, 9))
+def test_the_trains_of_a_map_are_those_of_the_library(
+    low: float, span: float, count: int, pulses: int
+) -> None:
+    rates, starts, firings = np.empty(count), np.empty(count + 1, np.int64), np.empty(count * pulses)
+    codes.write_rates(low, low + span, rates)
+    np.testing.assert_array_equal(rates, np.linspace(low, low + span, count))
+    pulse = Rectangle(amplitude=1.0, width=1e-4, rise=0.0, decay=0.0)
+    slots = np.arange(pulses)
+    codes.write_trains(rates, slots, False, starts, firings)
+    trains = PulseTrains.at_rates(pulse, rates, pulses)
+    np.testing.assert_array_equal(firings.reshape(count, -1), [train.times for train in trains])
+    codes.write_trains(rates, slots, True, starts, firings)
+    np.testing.assert_array_equal(firings.reshape(count, -1), slots / rates[:, np.newaxis])
+    assert starts.tolist() == [k * pulses for k in range(count + 1)]
+
+
+@given(st.lists(st.floats(-5.0, 5.0), max_size=60))
+def test_the_error_of_an_exponent_is_that_of_batch_means(growth: list[float]) -> None:
+    out = np.empty(2)
+    section.write_exponent(np.reshape(growth, (-1, 1)), np.empty(len(growth) + 1), out)
+    assert out[1] == pytest.approx(standard_error(growth), rel=1e-9, abs=1e-12)
+    assert out[0] == pytest.approx(math.fsum(growth) / max(len(growth), 1), abs=1e-12)
+
+
+@given(st.integers(2, 40), st.integers(1, 20), st.integers(0, 2**32 - 1))
+def test_the_distances_of_repeats_are_those_of_the_verdict(count: int, period: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    states = np.resize(rng.normal(size=(period, 3)), (count, 3))
+    branches = np.resize(rng.integers(0, 2, period), count)
+    scales = np.array([1.0, 2.0, 0.5, AGREEMENT])
+    out = np.empty(LARGEST_PERIOD)
+    found = section.write_distances(states, branches, scales, out)
+    expected = repeats(states, branches, scales[:3])
+    np.testing.assert_array_equal(out, expected)
+    assert (found or None) == period_of(expected)
+
+
+def kept_of(hammer: ph.Hammer, trains: PulseTrains, ends: Any) -> Any:
+    """Raw results of an ensemble, with all extra contacts."""
+    (group,) = Ensemble(hammer, trains, ends, tolerance=DISPLAY_TOLERANCE).groups
+    job = Job(group, True, True, Ragged.empty(len(ends)), np.zeros(0), np.empty((len(ends), 0), np.float32))
+    job.piece(0, len(ends))
+    while job.make_room():
+        job.piece(0, job.order.size)
+    return job.kept
+
+
+def test_a_printed_line_is_that_of_the_page(hammer: ph.Hammer, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Ensemble, "run", _plain(Ensemble.run))
+    rate, pulse = 1500.0, hammer.waveform
+    assert pulse is not None
+    pattern = Pattern("noise", np.random.default_rng(5).random((2, 9, 10)) < 0.6)
+    page = print_page(hammer, pattern, rate)
+    runs = [np.flatnonzero(row) for row in pattern.dots.reshape(-1, 10)]
+    trains = PulseTrains(pulse, [slot_times(slots, rate) for slots in runs])
+    ends = np.array([times[-1] for times in trains.firings]) + wait_of(hammer, pulse)
+    kept = kept_of(hammer, trains, ends)
+    slots = np.concatenate(runs)
+    starts = np.cumsum([0, *map(len, runs)])
+    firings = np.empty(slots.size)
+    line.write_slots(slots, rate, FIRST_SLOT, firings)
+    head = head_of(9)
+    limits = PRESETS["slots"]
+    single = page.nominal
+    dots, extra = np.empty((slots.size, line.DOT_WIDTH)), np.empty((1000, 2))
+    count = line.write_line(
+        (starts, np.arange(18) // 9, np.arange(18) % 9),
+        slots,
+        firings,
+        (kept.status, kept.reached, kept.extra, kept.dot_starts, kept.dots),
+        rate,
+        np.array([single.force, single.flight_time, single.extra_contacts]),
+        np.array([limits.force, limits.arrival, limits.extra_contacts]),
+        np.array([head.pitch, head.wire_pitch, head.line_pitch, head.density]),
+        dots,
+        extra,
+    )
+    expected = [*page.places, *page.intended, page.darkness, page.fault, page.force_ratio]
+    np.testing.assert_array_equal(dots[:, line.FAULT], page.fault)
+    np.testing.assert_allclose(dots[:, :7], np.transpose(expected), rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(extra[:count].T, page.extra_places, rtol=1e-12, atol=1e-15)
+    totals = np.empty(11)
+    line.write_totals(dots, kept.status, totals)
+    assert totals[0] == page.good.sum()
+    assert totals[1:6].tolist() == list(page.fault_counts.values())
+    assert page.lost.any()
+    assert count
+    assert 0 < totals[0] < slots.size
+
+
+def _plain(run: Any) -> Any:
+    return lambda ensemble, **options: run(ensemble, **{**options, "engine": "plain"})
