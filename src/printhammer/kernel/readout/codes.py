@@ -48,24 +48,30 @@ def widen_range(x: Any, ends: Any) -> None:
 def write_codes(x: Any, low: float, high: float, codes: Any) -> None:
     """Write displacements as codes from 0 (at `low` [m]) to 65534 (at `high` [m]); `GAP` if unknown.
 
-    `x` is float32 with two axes, `codes` is uint16 with one, row after row.
+    `x` is float32 with two axes. `codes` is int64 with one axis: the codes are unsigned integers of 16 bits,
+    row after row, four in each element, the first in the lowest bits.
     """
     least, span = np.float32(low), np.float32(high - low)
     # Without motion, both ends are adjacent floats.
     steep = np.float32(min((GAP - 1) / (high - low), _STEEPEST))
+    for at in range(codes.shape[0]):
+        codes[at] = 0
     at = 0
     for i in range(x.shape[0]):
         for j in range(x.shape[1]):
-            code = min(x[i, j] - least, span) * steep
-            if math.isnan(x[i, j]):
-                codes[at] = GAP
-            else:
-                codes[at] = int(min(max(code, np.float32(0.0)), np.float32(GAP - 1)))
+            code = GAP
+            if not math.isnan(x[i, j]):
+                scaled = min(x[i, j] - least, span) * steep
+                code = int(min(max(scaled, np.float32(0.0)), np.float32(GAP - 1)))
+            # The highest bit of an element is its sign.
+            codes[at // 4] += (code - (GAP + 1) if at % 4 == 3 and code > GAP // 2 else code) << (
+                16 * (at % 4)
+            )
             at += 1
 
 
 def write_struck(dots: Any, starts: Any, firings: int, struck: Any) -> None:
-    """Write 1 for each firing that made a dot, else 0, `firings` for each member of a map.
+    """Write 1 to `struck` for each firing that made a dot, else 0, with `firings` for each member of a map.
 
     `dots` and `starts` are `Kept.dots` and `Kept.dot_starts` of :mod:`printhammer.kernel.lanes.batch`.
     """

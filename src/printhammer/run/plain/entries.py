@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.drive import tables
 from printhammer.kernel.model.laws import Laws
+from printhammer.kernel.readout import codes, contacts, curves, energy, line, section
 
 if TYPE_CHECKING:
     from printhammer.kernel.compile.modules import Module, WebModule
@@ -24,6 +25,29 @@ _ENTRIES: Final[dict[str, tuple[Any, ...]]] = {
     "firings": (tables.fill_firings, ("f", "i1", "b", "f1"), 1),
     "pulse": (tables.pulse, ("i", "f1", "f2", "f1"), 1),
     "pulse_values": (tables.fill_values, ("f2", "f1", "f1")),
+    "curve_times": (curves.write_times, ("f2", "i", "i", "f1"), 1),
+    "curves": (curves.write_curves, ("f2", "b", "s2", "f1")),
+    "steps": (contacts.write_steps, ("f2", "i1", "f1", "f1")),
+    "contacts": (contacts.write_contacts, ("f2", "f2", "f2", "f2", "f1", "b", "f1", "f2")),
+    "loading": (contacts.write_loading, ("f2", "f2", "f2", "f1", "f1", "i1", "f1", "f1")),
+    "dots": (contacts.write_dots, ("f1", "f", "f2", "f1", "f2", "f2"), 1),
+    "quality": (contacts.write_quality, ("f2", "i", "f1")),
+    "sums": (energy.write_sums, ("f2", "f1", "f1")),
+    "energies": (energy.write_energies, ("f2", "f2", "f1", "f", "f1", "f1"), 0, True),
+    "map_rates": (codes.write_rates, ("f", "f", "f1")),
+    "map_trains": (codes.write_trains, ("f1", "i1", "b", "i1", "f1")),
+    "map_range": (codes.widen_range, ("s2", "f1")),
+    "map_codes": (codes.write_codes, ("s2", "f", "f", "i1")),
+    "map_struck": (codes.write_struck, ("f2", "i1", "i", "i1")),
+    "line_slots": (line.write_slots, ("i1", "f", "f", "f1")),
+    "line_dots": (
+        line.write_line,
+        (("i1", "i1", "i1"), "i1", "f1", ("i1", "f1", "i1", "i1", "f2"), "f", "f1", "f1", "f1", "f2", "f2"),
+        1,
+    ),
+    "line_totals": (line.write_totals, ("f2", "i1", "f1")),
+    "exponent": (section.write_exponent, ("f2", "f1", "f1")),
+    "distances": (section.write_distances, ("f2", "i1", "f1", "f1"), 1),
 }
 """Functions by name, with the types of their arguments (as in `printhammer.kernel.compile.calls.Signature`),
 the number of integers that they return, and whether they use names of the kernel."""
