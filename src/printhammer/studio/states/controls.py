@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, get_args
 
+from printhammer import __version__
 from printhammer.drive.waveforms.drivers import DRIVERS, Rail
 from printhammer.drive.waveforms.shapes import SHAPES, Waveform
 from printhammer.studio import bounds
@@ -96,7 +97,7 @@ def describe(hammer: Hammer) -> dict[str, Any]:
         `name`, `title`, `note`, `constants` (a list), `open` (coil constants that the file leaves open),
         `rail` (default rail driver, or None), `combined` (controls that move several constants),
         `waveform` (shape and constants, or None), `start` (entries of the opening state that differ from the
-        default), `places`.
+        default), `places`, `rigid` (whether the backstop acts in no time).
     """
     constants = []
     for key, constant in hammer.constants.items():
@@ -113,6 +114,7 @@ def describe(hammer: Hammer) -> dict[str, Any]:
         "waveform": None if hammer.waveform is None else fields_of(hammer.waveform),
         "start": opening_of(hammer),
         "places": {"backstop": hammer.position, "front": hammer.front, "platen": hammer.platen},
+        "rigid": hammer.backstop is not None and hammer.backstop.law == "rigid",
     }
 
 
@@ -231,7 +233,14 @@ def vocabulary(hammer: Hammer | None = None) -> dict[str, Any]:
     }
     drivers = [shape.shape for shape in DRIVERS]
     decays = list(get_args(Rail.model_fields["decay"].annotation))
-    return {"units": units, "shapes": shapes, "drivers": drivers, "decays": decays, "limits": limits}
+    return {
+        "version": __version__,
+        "units": units,
+        "shapes": shapes,
+        "drivers": drivers,
+        "decays": decays,
+        "limits": limits,
+    }
 
 
 def _large(hammer: Hammer) -> dict[str, tuple[str, str]]:

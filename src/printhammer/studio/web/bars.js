@@ -1,5 +1,6 @@
 // What each firing did: energies of the dots, and the line that they print.
 import { axes, broken, extent, line, refusal } from "./axes.js";
+import { flightText } from "./captions.js";
 import { surface } from "./pen.js";
 import { colours, FONT } from "./theme.js";
 import { digits, shown, unitOf } from "./units.js";
@@ -20,7 +21,7 @@ export function energyView(body, studio) {
     const most = Math.max(...dots.map((dot) => dot.loading_work ?? 0), 1e-12);
     pen.font = FONT;
     const supply = energy.supply_work ? `supply ${of("supply_work")}, copper ${of("copper_loss")}, driver ${of("driver_loss")}${energy.eddy_loss ? `, eddy currents ${of("eddy_loss")}` : ""}, ` : "";
-    const words = broken(pen, `${supply}coil ${of("coil_work")}, pack ${of("pack_loss")}, backstop ${of("backstop_loss")}${energy.damping_loss ? `, damping ${of("damping_loss")}` : ""} ${unit.name}`, width - 12);
+    const words = broken(pen, `${supply}${energy.drive_work ? `drive ${of("drive_work")}` : `coil ${of("coil_work")}`}, pack ${of("pack_loss")}, backstop ${of("backstop_loss")}${energy.damping_loss ? `, damping ${of("damping_loss")}` : ""} ${unit.name}`, width - 12);
     const margin = { left: 46, right: 10, top: 24 + 14 * words.length, bottom: 32 };
     const plane = axes(pen, width, height, { low: 0.5, high: dots.length + 0.5, label: "firing", factor: 1, space: 30, whole: true }, { low: 0, high: 1.08 * most, label: `energy, ${unit.name}`, factor: unit.factor }, margin);
     where = plane;
@@ -96,7 +97,7 @@ function burst(pen, width, height, { dots, quality }, motion, studio, worded) {
   const gaps = dots.slice(1).map((dot, k) => X(dot.fired_at) - X(dots[k].fired_at));
   const pitch = Math.min(...gaps, 44);
   const words = worded
-    ? [`${quality.struck} of ${quality.fired} dots struck, ${quality.extra} extra contacts`, quality.struck ? `force ${shown(quality.force_low, "N", 3)} to ${shown(quality.force_high, "N", 3)}` : "", quality.struck ? `flight time ${shown(quality.flight_low, "s", 4)} to ${shown(quality.flight_high, "s", 4)}` : ""]
+    ? [`${quality.struck} of ${quality.fired} dots struck, ${quality.extra} extra contacts`, quality.struck ? `force ${shown(quality.force_low, "N", 3)} to ${shown(quality.force_high, "N", 3)}` : "", flightText(dots)]
     : [];
   const middle = 0.5 * (height - 15 * words.length);
   const reach = Math.min(pitch, middle * 1.5);

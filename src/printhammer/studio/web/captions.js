@@ -5,7 +5,7 @@ import { digits, shown } from "./units.js";
 const NUMBERS = ["no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve"];
 const ORDINALS = ["first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth", "eleventh", "twelfth"];
 
-const count = (number, noun) => `${NUMBERS[number] ?? number} ${noun}${number === 1 ? "" : "s"}`;
+const count = (number, noun, nouns = `${noun}s`) => `${NUMBERS[number] ?? number} ${number === 1 ? noun : nouns}`;
 export const ordinal = (number) => ORDINALS[number - 1] ?? `${number}th`;
 const listed = (names) => (names.length < 2 ? names.join("") : `${names.slice(0, -1).join(", ")} and ${names.at(-1)}`);
 const large = (text) => text.charAt(0).toUpperCase() + text.slice(1);
@@ -23,10 +23,50 @@ export function burstText(frame) {
 
 const most = (values) => values.reduce((high, value) => Math.max(high, Math.abs(value)), 0);
 
-/** Return the largest force at the backstop and at the pack, N. */
-export function hardest(frame) {
+/** Return the largest force at the backstop and at the pack, N; none at a rigid stop, which acts without one. */
+export function hardest(frame, rigid = false) {
   const [stop, damping, pack] = ["F backstop", "F damping", "F pack"].map((name) => frame.data[name]);
-  return { backstop: most(stop.map((force, k) => force + damping[k])), pack: most(pack) };
+  return { backstop: rigid ? null : most(stop.map((force, k) => force + damping[k])), pack: most(pack) };
+}
+
+const SOON = 0.25; // of the flight time of the first dot: a touch sooner after a firing was under way before
+
+/** Return the range of the flight times of dots, and how many touches come too soon to be their own firing's. */
+export function flightsOf(dots) {
+  const all = dots.filter((dot) => dot.struck).map((dot) => dot.flight_time);
+  const own = all.filter((time) => time >= SOON * all[0]);
+  return { low: Math.min(...own), high: Math.max(...own), soon: all.length - own.length };
+}
+
+/** Tell the flight times of dots. */
+export function flightText(dots) {
+  if (!dots.some((dot) => dot.struck)) return "";
+  const { low, high, soon } = flightsOf(dots);
+  return `From firing to paper ${range(low, high, "s")}${soon ? `; ${count(soon, "touch", "touches")} too soon after a firing to be its own` : ""}.`;
+}
+
+/** Return what packs keep of the work of their dots: its share, or nothing where some were pushed once more. */
+export function keptText(dots) {
+  const struck = dots.filter((dot) => dot.struck && dot.loading_work > 0);
+  const again = struck.filter((dot) => dot.net_loss > dot.loading_work).length;
+  if (again) return `, up to the first peak; ${again === struck.length ? "each" : NUMBERS[again] ?? again} of them ${again === 1 || again === struck.length ? "is" : "are"} pushed again before leaving, and the pack keeps more`;
+  const [work, loss] = ["loading_work", "net_loss"].map((name) => struck.reduce((sum, dot) => sum + dot[name], 0));
+  return `, of which it keeps ${Math.round((100 * loss) / work)} %`;
+}
+
+/** Tell where the rates of a map lose a dot: nothing of a coarse one, which has not looked. */
+export function lostText(map, first) {
+  if (!map.data.struck || map.front === null) return "";
+  const rates = `${map.data.codes.shape[0]} rates of the map`;
+  return first ? `Of the ${rates}, ${shown(first.rate, "Hz", 4)} is the lowest with a lost dot: the ${ordinal(first.dot)}. ` : `At none of the ${rates} a dot is lost. `;
+}
+
+/** Tell the shape of a single run in the phase plane. */
+function loopText({ places: { backstop, front }, data: { x } }) {
+  const back = backstop !== null && front !== null && Math.abs(x.at(-1) - backstop) < 0.2 * (front - backstop);
+  if (front === null) return backstop === null ? "One loop after one firing." : "From the stop and back, with bounces.";
+  if (!x.some((place) => place > front)) return "One loop that does not reach the paper.";
+  return back ? "One loop: out to the paper, back to the backstop, bounces." : "Out to the paper, and not back at the end of the run.";
 }
 
 const TEXTS = {
@@ -43,7 +83,7 @@ const TEXTS = {
     const coil = motion.data.u ? ` The coil takes up to ${shown(motion.peak, "A", 3)} from ${shown(motion.supply, "V", 3)}.` : "";
     if (!dots) return `The face of the armature against time${gap}.${coil}`;
     const { quality } = dots;
-    const flight = quality.struck ? ` From firing to paper ${range(quality.flight_low, quality.flight_high, "s")}.` : "";
+    const flight = quality.struck ? ` ${flightText(dots.dots)}` : "";
     return `${burstText(dots)}${gap}.${flight}${coil}`;
   },
   line: ({ dots, line }, studio) => {
@@ -55,16 +95,16 @@ const TEXTS = {
   },
   map: ({ map }, studio) => {
     if (!map || map.reason) return map?.reason ?? "";
-    const { lost } = studio.views.map;
-    const first = lost?.()?.first;
-    const said = first ? `In this range the ${ordinal(first.dot)} dot is lost first, from about ${shown(first.rate, "Hz", 3)}.` : "In this range no dot is lost.";
-    return `${said} The line is at ${shown(studio.store.state.rate, "Hz", 4)}.`;
+    return `${lostText(map, studio.views.map.lost?.()?.first)}The line is at ${shown(studio.store.state.rate, "Hz", 4)}.`;
   },
-  forces: ({ motion }) => {
-    const { backstop, pack } = hardest(motion);
-    return `${shown(backstop, "N", 3)} at the backstop, ${shown(pack, "N", 3)} at the pack${backstop > 2 * pack ? ": the hardest blow prints nothing" : ""}.`;
+  forces: ({ motion }, studio) => {
+    const { backstop, pack } = hardest(motion, studio.described?.rigid);
+    const { places } = motion;
+    const stop = places.backstop === null ? [] : [backstop === null ? "a rigid backstop, whose blows take no time and have no force" : `${shown(backstop, "N", 3)} at the backstop`];
+    const parts = [...stop, ...(places.front === null ? [] : [`${shown(pack, "N", 3)} at the pack`])];
+    return parts.length ? `${large(parts.join(", "))}${backstop > 2 * pack && places.front !== null ? ": the hardest blow prints nothing" : ""}.` : "Neither stop nor pack: the force of flight.";
   },
-  phase: ({ motion }) => (motion.fired.length > 1 ? "Where the states at the firings fall together, the train repeats itself." : "One loop: out to the paper, back to the backstop, bounces.") + (most(motion.data.v) > 0 ? ` Fastest: ${shown(most(motion.data.v), "m/s", 3)}.` : ""),
+  phase: ({ motion }) => (motion.fired.length > 1 ? "Where the states at the firings fall together, the train repeats itself." : loopText(motion)) + (most(motion.data.v) > 0 ? ` Fastest: ${shown(most(motion.data.v), "m/s", 3)}.` : ""),
   strobe: ({ strobe }) => {
     if (!strobe || strobe.reason) return strobe?.reason ?? "";
     const { verdict } = strobe;
@@ -74,16 +114,17 @@ const TEXTS = {
     if (verdict.verdict === "strange") return `The train never repeats itself: what is small grows by a factor of ${digits(Math.exp(verdict.exponent_per_firing), 3)} with each firing.`;
     return "Neither a period nor chaos can be told from these firings.";
   },
-  loops: ({ motion }) => {
-    const { backstop, pack } = hardest(motion);
-    return `What a loop encloses is lost. Up to ${shown(pack, "N", 3)} at the pack, ${shown(backstop, "N", 3)} at the backstop.`;
+  loops: ({ motion }, studio) => {
+    const { backstop, pack } = hardest(motion, studio.described?.rigid);
+    const { places } = motion;
+    const parts = [...(places.front === null ? [] : [`${shown(pack, "N", 3)} at the pack`]), ...(places.backstop === null || backstop === null ? [] : [`${shown(backstop, "N", 3)} at the backstop`])];
+    return parts.length ? `What a loop encloses is lost. Up to ${parts.join(", ")}.` : places.backstop === null ? "" : "The backstop is rigid: its blows take no time and have no loop.";
   },
   energy: ({ dots }) => {
     const struck = dots?.dots.filter((dot) => dot.struck && dot.loading_work > 0) ?? [];
     if (!struck.length) return dots ? `${burstText(dots)}.` : "";
     const works = struck.map((dot) => dot.loading_work);
-    const kept = struck.reduce((sum, dot) => sum + dot.net_loss, 0) / works.reduce((sum, work) => sum + work, 0);
-    return `${range(Math.min(...works), Math.max(...works), "J")} into the pack for each dot, of which it keeps ${Math.round(100 * kept)} %.`;
+    return `${range(Math.min(...works), Math.max(...works), "J")} into the pack for each dot${keptText(struck)}.`;
   },
 };
 

@@ -123,18 +123,25 @@ function searched(holder, search) {
 }
 
 /** A control that moves several constants: its value is that of the first, less where that one starts. */
-function moving(control, studio) {
+export function moving(control, studio) {
   const base = Object.fromEntries(studio.described.constants.map((constant) => [constant.key, constant.value]));
   const keys = Object.keys(control.moves);
   const now = (state, key) => state.constants[key] ?? base[key];
+  const ends = Object.fromEntries(studio.described.constants.map(({ key, low, high }) => [key, [low, high]]));
+  /** A change, as far as every constant that it moves can follow, whatever other controls have done. */
+  const within = (state, wanted) => keys.reduce((change, key) => {
+    const [share, at] = [control.moves[key], now(state, key)];
+    const [low, high] = ends[key].map((end) => (end - at) / share).sort((a, b) => a - b);
+    return Math.min(Math.max(change, low), high);
+  }, wanted);
   const value = (state) => control.value + (now(state, keys[0]) - base[keys[0]]) / control.moves[keys[0]];
   return {
     get: value,
     set: (wanted) => {
       const { state } = studio.store;
-      const change = wanted - value(state);
+      const change = within(state, wanted - value(state));
       const constants = { ...state.constants };
-      for (const key of keys) constants[key] = now(state, key) + control.moves[key] * change;
+      for (const key of keys) constants[key] = Math.min(Math.max(now(state, key) + control.moves[key] * change, ends[key][0]), ends[key][1]);
       return { constants };
     },
     reset: () => {

@@ -1,6 +1,6 @@
 // What leaves the studio: files to keep, texts to copy.
 import { SvgPen } from "./pen.js";
-import { colours } from "./theme.js";
+import { colours, FONT } from "./theme.js";
 
 export function save(name, content, type) {
   const link = document.createElement("a");
@@ -28,22 +28,28 @@ export function csvOf(table) {
   return `${rows.join("\n")}\n`;
 }
 
-export function svgOf(view, width, height) {
-  const pen = new SvgPen(width, height);
+export function svgOf(view, width, height, title) {
+  const pen = new SvgPen(width, height, title);
   pen.fillStyle = colours().panel;
   pen.fillRect(0, 0, width, height);
   view.paint(pen, width, height);
   return pen.text();
 }
 
-export async function pngOf(view, width, height) {
+const FOOT = 16; // pixels below a picture for where it is from
+
+export async function pngOf(view, width, height, origin) {
   const canvas = document.createElement("canvas");
-  [canvas.width, canvas.height] = [2 * width, 2 * height];
+  [canvas.width, canvas.height] = [2 * width, 2 * (height + FOOT)];
   const pen = canvas.getContext("2d");
   pen.scale(2, 2);
   pen.fillStyle = colours().panel;
-  pen.fillRect(0, 0, width, height);
+  pen.fillRect(0, 0, width, height + FOOT);
+  pen.save();
   view.paint(pen, width, height);
+  pen.restore();
+  Object.assign(pen, { fillStyle: colours().muted, font: FONT, textAlign: "right", textBaseline: "bottom" });
+  pen.fillText(origin, width - 6, height + FOOT - 3);
   return new Promise((done) => { canvas.toBlob(done, "image/png"); });
 }
 
@@ -57,11 +63,11 @@ export async function savePage(studio) {
 }
 
 function kept(studio) {
-  const { described, limits, shapes, drivers, decays, unitTable, offered, overlay } = studio;
+  const { described, limits, shapes, drivers, decays, unitTable, offered, overlay, version } = studio;
   const frames = Object.fromEntries(Object.entries(studio.buffers).map(([kind, buffer]) => [kind, base64(buffer)]));
   const measured = overlay && { ...overlay, data: { t: [...overlay.data.t], values: [...overlay.data.values] } };
   const saved = new Date().toISOString().slice(0, 16).replace("T", " ");
-  return { state: studio.store.state, frames, hammer: described, limits, shapes, drivers, decays, units: unitTable, offered, overlay: measured, saved };
+  return { state: studio.store.state, frames, hammer: described, limits, shapes, drivers, decays, units: unitTable, offered, overlay: measured, saved, version };
 }
 
 function base64(buffer) {

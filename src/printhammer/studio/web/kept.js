@@ -3,11 +3,11 @@ import { element } from "./dom.js";
 import { mount } from "./mount.js";
 
 /** Show in an element what was kept. */
-export function show(holder, { state, frames, hammer, limits, shapes, drivers, decays, units, offered, overlay, saved }) {
+export function show(holder, { state, frames, hammer, limits, shapes, drivers, decays, units, offered, overlay, saved, version }) {
   // What a server would say is said here, as soon as it is asked for.
   const answers = {
     open: () => ({ state, notes: [] }),
-    hammer: () => ({ hammer, limits, shapes, drivers, decays, units, offered, asked: state.hammer, text: state.text }),
+    hammer: () => ({ hammer, limits, shapes, drivers, decays, units, offered, version, asked: state.hammer, text: state.text }),
   };
   let page = null;
   const send = (text) => {

@@ -99,6 +99,7 @@ export function mapView(body, studio) {
     scale(pen, box, frame, c);
     pen.imageSmoothingEnabled = false;
     pen.drawImage(image, box.x, box.y, box.w, box.h);
+    if (lost.list.length) lostKey(pen, box, c);
     pen.save();
     const rate = studio.store.state.rate;
     const place = plane.Y(rate);
@@ -141,18 +142,23 @@ export function mapView(body, studio) {
     write("left", box.x, digits(frame.low * unit.factor, 3));
     write("right", box.x + box.w, shown(frame.high, "m", 3));
     if (border !== null && border > 0.2 && border < 0.75) write("center", box.x + border * box.w, `pack ${digits(frame.front * unit.factor, 3)}`);
-    if (lost.list.length) {
-      pen.textBaseline = "middle";
-      pen.fillStyle = c.panel;
-      pen.globalAlpha = 0.85;
-      pen.fillRect(box.x + box.w - 62, box.y + 2, 60, 13);
-      pen.globalAlpha = 1;
-      pen.fillStyle = `rgb(${LOST})`;
-      pen.fillRect(box.x + box.w - 58, box.y + 6, 8, 4);
-      pen.fillStyle = c.ink;
-      pen.textAlign = "right";
-      pen.fillText("lost dot", box.x + box.w - 6, box.y + 8.5);
-    }
+    pen.restore();
+  }
+
+  /** The key of lost dots, upon the map. */
+  function lostKey(pen, box, c) {
+    pen.save();
+    pen.font = SMALL;
+    pen.textBaseline = "middle";
+    pen.fillStyle = c.panel;
+    pen.globalAlpha = 0.85;
+    pen.fillRect(box.x + box.w - 62, box.y + 2, 60, 13);
+    pen.globalAlpha = 1;
+    pen.fillStyle = `rgb(${LOST})`;
+    pen.fillRect(box.x + box.w - 58, box.y + 6, 8, 4);
+    pen.fillStyle = c.ink;
+    pen.textAlign = "right";
+    pen.fillText("lost dot", box.x + box.w - 6, box.y + 8.5);
     pen.restore();
   }
 

@@ -146,7 +146,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
   async function load(state, step = true, fresh = false) {
     const frame = await studio.ask("hammer", { name: state.text ? "" : state.hammer, text: state.text });
     if (frame.kind === "refusal") { studio.say(frame.reason, true); return; }
-    Object.assign(studio, { described: frame.hammer, offered: frame.offered, limits: frame.limits, shapes: frame.shapes, drivers: frame.drivers, decays: frame.decays, unitTable: frame.units });
+    Object.assign(studio, { described: frame.hammer, offered: frame.offered, limits: frame.limits, shapes: frame.shapes, drivers: frame.drivers, decays: frame.decays, unitTable: frame.units, version: frame.version });
     setUnits(frame.units);
     // A hammer without a pulse opens with one that shows it; what a link sets stays.
     const start = state.waveform ? {} : Object.fromEntries(Object.entries(frame.hammer.start).filter(([key]) => fresh || state[key] === START[key]));

@@ -18,6 +18,9 @@ const PRESETS = {
   "fast burst": { pulses: 9, pattern: "", rate: 1800 }, "letters": { pattern: "1101011100101", rate: 1200 }, "long train": { pulses: 40, pattern: "", rate: 1000 },
 };
 
+/** What a picture that leaves the studio says of where it is from. */
+const origin = ({ described, store, version }) => `${described.name}, ${Number(store.state.rate.toPrecision(6))} Hz, printhammer ${version}`;
+
 export function layout(studio, makers) {
   const button = (text, label, action, extra = {}) => make("button", { type: "button", title: label, "aria-label": label, onclick: action, ...extra }, text);
   const hammers = make("select", { "aria-label": "hammer", onchange: () => studio.choose(hammers.value) });
@@ -103,10 +106,10 @@ export function layout(studio, makers) {
     const caption = captions[name] = make("p", { class: "caption", id: `caption-${name}` });
     const leave = make("select", { class: "leave", "aria-label": `save ${TITLES[name]}` }, ...["save", "PNG", "SVG", "CSV"].map((kind, k) => make("option", { value: k ? kind : "" }, kind)));
     const panel = make("section", { class: `panel view-${name}`, "aria-label": TITLES[name], hidden: true },
-      make("h2", {}, make("span", {}, TITLES[name]), leave, button("⤢", `Enlarge ${TITLES[name]}`, () => enlarge(name), { class: "enlarge" })), caption, body);
+      make("h2", {}, make("span", {}, TITLES[name]), make("output", { class: "readout" }), leave, button("⤢", `Enlarge ${TITLES[name]}`, () => enlarge(name), { class: "enlarge" })), caption, body);
     (OPENING.includes(name) ? opening : grid).append(panel);
     panels[name] = panel;
-    studio.views[name] = withReadout(name, makers[name](body, studio), body, studio);
+    studio.views[name] = withReadout(name, makers[name](body, studio), panel, studio);
     leave.addEventListener("change", () => { leaveView(name, leave.value, body); leave.value = ""; });
     chooser.append(make("button", { type: "button", "aria-pressed": "false", title: TITLES[name], "aria-label": `${VIEWS.indexOf(name) + 1} ${TITLES[name]}`, "data-view": name, onclick: () => toggle(name) }, String(VIEWS.indexOf(name) + 1)));
   }
@@ -116,9 +119,10 @@ export function layout(studio, makers) {
     const [width, height] = [Math.max(body.clientWidth, 480), Math.max(body.clientHeight, 320)];
     const table = view.table();
     if (!table) return;
-    if (kind === "CSV") save(`${name}.csv`, csvOf(table), "text/csv");
-    if (kind === "SVG") save(`${name}.svg`, svgOf(view, width, height), "image/svg+xml");
-    if (kind === "PNG") save(`${name}.png`, await pngOf(view, width, height), "image/png");
+    const whole = `${studio.described.name}-${Number(studio.store.state.rate.toPrecision(6))}Hz-${name}`;
+    if (kind === "CSV") save(`${whole}.csv`, csvOf(table), "text/csv");
+    if (kind === "SVG") save(`${whole}.svg`, svgOf(view, width, height, `${TITLES[name]}: ${captionOf(name, studio)} ${origin(studio)}`), "image/svg+xml");
+    if (kind === "PNG") save(`${whole}.png`, await pngOf(view, width, height, origin(studio)), "image/png");
   }
   function toggle(name) {
     const { views } = studio.store.state;
@@ -175,9 +179,9 @@ export function layout(studio, makers) {
   return { page, bar, controls, hint, status, grid, dialog, hammers, honesty, layout: { show, enlarge } };
 }
 
-/** Return a view that tells below its picture what is there at the time of the cursor. */
-function withReadout(name, view, body, studio) {
-  const tip = body.appendChild(make("div", { class: "tip readout" }));
+/** Return a view that tells beside its title what is there at the time of the cursor. */
+function withReadout(name, view, panel, studio) {
+  const [tip, body] = [panel.querySelector(".readout"), panel.querySelector(".body")];
   const read = () => {
     const text = readoutOf(name, studio, body.clientWidth > 440);
     if (tip.textContent !== text) tip.textContent = text;

@@ -2,9 +2,9 @@
 
 /** Writes as SVG what is drawn with the commands of a canvas that the views use. */
 export class SvgPen {
-  constructor(width, height) {
+  constructor(width, height, title = "") {
     Object.assign(this, {
-      width, height, parts: [], path: "", fillStyle: "#000", strokeStyle: "#000", lineWidth: 1, globalAlpha: 1,
+      width, height, parts: title ? [`<title>${escape(title)}</title>`] : [], path: "", fillStyle: "#000", strokeStyle: "#000", lineWidth: 1, globalAlpha: 1,
       font: "11px sans-serif", textAlign: "left", textBaseline: "alphabetic", lineJoin: "round", dash: [], stack: [],
       shift: [0, 0], turned: "", clips: 0, open: 0,
     });

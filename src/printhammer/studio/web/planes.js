@@ -129,14 +129,16 @@ export function strobeView(body, studio) {
     // A periodic train has a few points only, whose differences would fill the whole plane.
     const around = ([low, high], least) => (high - low < least ? [0.5 * (low + high - least), 0.5 * (low + high + least)] : [low, high]);
     const spread = studio.frames.motion ? [extent(studio.frames.motion.data.x), extent(studio.frames.motion.data.v)] : [[0, 1e-4], [0, 1]];
-    const [xe, ve] = [around(extent(xs), 0.3 * (spread[0][1] - spread[0][0])), around(extent(vs), 0.3 * (spread[1][1] - spread[1][0]))];
+    const settled = Math.min(SETTLING, xs.length);
+    // Where there are points after settling, the plane is theirs.
+    const seen = (list) => (xs.length > 2 * SETTLING ? list.slice(settled) : list);
+    const [xe, ve] = [around(extent(seen(xs)), 0.3 * (spread[0][1] - spread[0][0])), around(extent(seen(vs)), 0.3 * (spread[1][1] - spread[1][0]))];
     pen.font = FONT;
     const told = strobeText(frame);
     const lines = broken(pen, told, width - 12);
     const margin = { left: 46, right: 10, top: 8 + 14 * lines.length, bottom: 32 };
     const plane = axes(pen, width, height, displacementAxis(...widened(...xe)), velocityAxis(...widened(...ve)), margin);
     inside(pen, plane);
-    const settled = Math.min(SETTLING, xs.length);
     pen.fillStyle = c.ghost;
     dots(pen, plane, xs.slice(0, settled), vs.slice(0, settled), 2);
     pen.fillStyle = c.x;

@@ -40,7 +40,7 @@ const TEXTS = {
   energy: ({ motion, dots }, time) => {
     const dot = dots?.energy && dots.dots[firingAt(motion, time)];
     if (!dot) return "";
-    return dot.struck ? `dot ${dot.index + 1}: ${shown(dot.loading_work, "J", 3)}, kept ${Math.round((100 * dot.net_loss) / dot.loading_work)} %` : `dot ${dot.index + 1}: lost`;
+    return dot.struck ? `dot ${dot.index + 1}: ${shown(dot.loading_work, "J", 3)}, ${dot.net_loss > dot.loading_work ? `kept ${shown(dot.net_loss, "J", 3)}, pushed again` : `kept ${Math.round((100 * dot.net_loss) / dot.loading_work)} %`}` : `dot ${dot.index + 1}: lost`;
   },
   line: ({ motion, dots }, time) => {
     const dot = dots?.dots[firingAt(motion, time)];

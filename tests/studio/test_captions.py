@@ -1,0 +1,128 @@
+"""What captions and controls say, in Node: modules of the page without a page."""
+
+import json
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from printhammer.studio.files import page_files
+
+
+@pytest.fixture(scope="module")
+def modules(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("web")
+    (root / "package.json").write_text('{"type": "module"}', "utf-8")
+    for name, content in page_files().items():
+        (root / name).parent.mkdir(exist_ok=True)
+        (root / name).write_bytes(content)
+    return root
+
+
+SAY = """
+const { captionOf } = await import("./captions.js");
+const floats = ([name, list]) => [name, Float32Array.from(list)];
+const seen = ({ view, frames, rigid, first }) => {
+  for (const frame of Object.values(frames)) {
+    if (frame.data) frame.data = Object.fromEntries(Object.entries(frame.data).map(floats));
+  }
+  if (frames.map) frames.map.data.codes.shape = [512, 512];
+  const store = { state: { rate: 1000, line: "" } };
+  const studio = { frames, described: { rigid }, store, views: { map: { lost: () => ({ first }) } } };
+  return captionOf(view, studio).replaceAll("\\u00a0", " ");
+};
+console.log(JSON.stringify(%s.map(seen)));
+"""
+FORCES = {f"F {name}": [0.0, 0.0] for name in ("backstop", "damping", "pack")}
+PLACES = {"backstop": 0.0, "front": 1e-4, "platen": 2e-4}
+MAP = {"reason": "", "front": 1e-4, "data": {"codes": [0], "struck": [1]}}
+
+
+def motion(x: tuple[float, ...] = (0.0, 0.0), **more: Any) -> dict[str, Any]:
+    data = {"t": [0.0, 1e-3], "x": x, "v": [0.0, 1.0], **FORCES}
+    return {"fired": [0.0], "places": PLACES, "data": data, **more}
+
+
+def dots(*rows: tuple[float, float, float]) -> dict[str, Any]:
+    listed = [
+        {"struck": True, "flight_time": flight, "loading_work": work, "net_loss": loss}
+        for flight, work, loss in rows
+    ]
+    return {"dots": listed, "quality": {"struck": len(rows)}, "energy": {}}
+
+
+def said(modules: Path, *cases: dict[str, Any]) -> list[str]:
+    filled = [{"rigid": False, "first": None, **case} for case in cases]
+    command = ["node", "--input-type=module", "--eval", SAY % json.dumps(filled)]
+    answer = subprocess.run(command, cwd=modules, capture_output=True, text=True, check=False)
+    assert answer.returncode == 0, answer.stderr
+    return list(json.loads(answer.stdout))
+
+
+def test_captions_claim_only_what_was_computed(modules: Path) -> None:
+    coarse = {**MAP, "data": {"codes": [0]}}
+    whole, lost = {**MAP}, {"dot": 5, "rate": 1450.1}
+    end_at_pole = motion((0.0, 1.5e-4))
+    back = motion((0.0, 1.5e-4, 1e-6), data={"t": [0, 1, 2], "x": [0, 1.5e-4, 1e-6], "v": [0, 1, 0]})
+    texts = said(
+        modules,
+        {"view": "map", "frames": {"motion": motion(), "map": coarse}},
+        {"view": "map", "frames": {"motion": motion(), "map": whole}},
+        {"view": "map", "frames": {"motion": motion(), "map": whole}, "first": lost},
+        {"view": "forces", "frames": {"motion": motion()}, "rigid": True},
+        {"view": "loops", "frames": {"motion": motion()}, "rigid": True},
+        {"view": "phase", "frames": {"motion": end_at_pole}},
+        {"view": "phase", "frames": {"motion": back}},
+    )
+    assert "lost" not in texts[0]
+    assert "At none of the 512 rates of the map a dot is lost." in texts[1]
+    assert "1450 Hz is the lowest with a lost dot: the fifth." in texts[2]
+    assert "N at the backstop" not in texts[3] + texts[4]
+    assert "rigid" in texts[3]
+    assert "back to the backstop" not in texts[5]
+    assert "back to the backstop" in texts[6]
+
+
+def test_a_flight_too_short_and_a_dot_pushed_again_are_told_apart(modules: Path) -> None:
+    soon = dots((2.8e-4, 1.0, 0.7), (6.81e-7, 1.0, 0.7), (2.5e-4, 1.0, 0.7))
+    again = dots((2.8e-4, 1.0, 0.7), (2.8e-4, 1.0, 1.2))
+    texts = said(
+        modules,
+        {"view": "motion", "frames": {"motion": motion(), "dots": soon}},
+        {"view": "energy", "frames": {"motion": motion(), "dots": soon}},
+        {"view": "energy", "frames": {"motion": motion(), "dots": again}},
+    )
+    assert "From firing to paper 2.5e-4 to 2.8e-4" in texts[0]
+    assert "one touch too soon after a firing to be its own" in texts[0]
+    assert "keeps 70 %" in texts[1]
+    assert "%" not in texts[2]
+    assert "pushed again" in texts[2]
+
+
+MOVE = """
+const { moving } = await import("./controls.js");
+const constants = [
+  { key: "platen", value: 4, low: 2, high: 5 }, { key: "pack.front", value: 2, low: 1, high: 2.5 },
+  { key: "pack.thickness", value: 2, low: 1, high: 3 },
+];
+const studio = { described: { constants }, store: { state: { constants: {} } } };
+const controls = [
+  moving({ value: 4, moves: { platen: 1, "pack.front": 1 } }, studio),
+  moving({ value: 2, moves: { "pack.thickness": 1, "pack.front": -1 } }, studio),
+];
+for (const [which, wanted] of %s) Object.assign(studio.store.state, controls[which].set(wanted));
+console.log(JSON.stringify(studio.store.state.constants));
+"""
+
+
+def test_two_controls_that_move_a_constant_leave_it_in_its_range(modules: Path) -> None:
+    steps = [[int(k % 2), float(w)] for k, w in enumerate(np.random.default_rng(1).uniform(-9.0, 9.0, 40))]
+    for count in (1, 2, 3, 40):
+        command = ["node", "--input-type=module", "--eval", MOVE % json.dumps(steps[:count])]
+        answer = subprocess.run(command, cwd=modules, capture_output=True, text=True, check=True)
+        found = json.loads(answer.stdout)
+        assert 2.0 <= found.get("platen", 4.0) <= 5.0
+        assert 1.0 <= found["pack.front"] <= 2.5
+        assert 1.0 <= found.get("pack.thickness", 2.0) <= 3.0
