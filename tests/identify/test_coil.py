@@ -290,3 +290,11 @@ def test_a_shipped_magnet_gives_its_resistance(tmp_path: Path) -> None:
     assert list(fit.constants) == ["coil.resistance"]
     assert abs(fit["coil.resistance"].value - 6.0) < 3.0 * fit["coil.resistance"].standard_error < 0.3
     assert not fit.rejected
+
+
+def test_a_record_that_determines_no_constant_is_refused(tmp_path: Path) -> None:
+    """Samples a second apart show neither the rise of the current nor, after the pulse, the current."""
+    rows = " ".join(f"{k},{value}" for k, value in enumerate((0, 9.99, 10.02, 9.97, 10.01, 9.98, 10, 10.01)))
+    path = case(tmp_path / "slow.csv", "time [s],current [mA]", rows)
+    with refused("record"):
+        ph.fit("coil", path, hammer=on_a_rail("9 ohm", "5 mH", "9 V"), locked=0.0)

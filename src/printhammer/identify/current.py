@@ -82,7 +82,7 @@ def probe_current(
         raise InputError(
             f"a record of {after[-1]:.6g} s is too long for the probe",
             key="record",
-            expected="a shorter record",
+            expected="a shorter record, or another unit of its times",
         )
     fine = np.interp(np.arange(count + 1) / each, np.arange(len(knots)), knots)
     state = None

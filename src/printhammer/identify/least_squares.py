@@ -209,7 +209,7 @@ def _undetermined(solution: Solution, data: FloatArray) -> int | None:
     bound = [k for k in free.tolist() if _at_bound(solution)[k]]
     if bound:
         return int(bound[0])
-    if len(free) < 2 and space.size is None:
+    if len(free) < (2 if space.size is None else 1):
         return None
     rows, limit = solution.rows, _SINGULAR
     if space.size is None:

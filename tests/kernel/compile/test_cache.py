@@ -188,6 +188,12 @@ def test_a_record_that_is_none_is_passed_over(tmp_path: Path, text: str) -> None
     records.note(tmp_path, lowered, 12.0)
     assert records.expected([tmp_path], lowered) == 12.0
     assert records.expected([tmp_path], "runs") == 2.5
+    # So do those with the circuit of a coil.
+    circuit = cache.Code("runs.code", "runs", "a line", lambda: False, True).work
+    assert records.expected([], circuit) > records.expected([], lowered)
+    records.note(tmp_path, circuit, 24.0)
+    assert records.expected([tmp_path], circuit) == 24.0
+    assert records.expected([tmp_path], lowered) == 12.0
 
 
 def test_what_may_follow_is_told_until_it_is_there(folder: Path, said: list[str]) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from tests.errors import refused
 
+from printhammer.errors import InputError
 from printhammer.support.tables.readings import Readings, read_table
 from printhammer.support.tables.text import decoded, read_cells, split_cells
 
@@ -120,6 +121,29 @@ def test_a_name_with_brackets_is_no_unit(tmp_path: Path) -> None:
     with refused("i(t)"):
         read(tmp_path, "time [us],i(t)\n0,0\n1,1\n")
     shows(read(tmp_path, "time [us],i(t)\n0,0\n1,1\n", "current=2*1 mA"), [0.0, 1e-6], current=[0.0, 1e-3])
+
+
+def test_a_channel_with_a_number_has_no_unit(tmp_path: Path) -> None:
+    """A1 is a channel, not an ampere."""
+    for text in ("time [us],A1\n0,0\n1,1\n", "time [us],probe_A1\n0,0\n1,1\n", "A1\n0\n1\n"):
+        with refused(text.splitlines()[0].split(",")[-1]):
+            read(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    ("text", "columns"),
+    [
+        # Start and step stand in the file: no column of sample numbers is the time.
+        ("X,CH1,Start,Increment\nSequence,Volt,0,1e-6\n0,0\n1,1\n2,2\n", "'current=2*1 A/V'"),
+        ("CH1\nV\n0\n1\n2\n", "'time=0 s + STEP, current=1*1 A/V'"),
+        ("Time,CH1\ns,V\n0,0\n1e-6,1\n2e-6,2\n", "'time=1, current=2*1 A/V'"),
+    ],
+)
+def test_a_refusal_names_columns_that_may_be_stated(tmp_path: Path, text: str, columns: str) -> None:
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, text)
+    assert caught.value.expected is not None
+    assert caught.value.expected.endswith(f"--columns {columns}")
 
 
 @pytest.mark.parametrize(

@@ -217,12 +217,16 @@ class Code(File):
     """Cached machine code of an entry point, compiled on first use.
 
     `kind` is the name of the code in the records of compile times; `label` describes the laws in messages.
-    `is_lowered` returns whether all modules of the code are already lowered, as in a wheel.
+    `is_lowered` returns whether all modules of the code are already lowered, as in a wheel; `circuit` states
+    whether the coil has a circuit.
     """
 
-    def __init__(self, name: str, kind: str, label: str, is_lowered: Callable[[], bool]) -> None:
+    def __init__(
+        self, name: str, kind: str, label: str, is_lowered: Callable[[], bool], circuit: bool = False
+    ) -> None:
         super().__init__(name)
         self.kind, self.label, self._is_lowered = kind, label, is_lowered
+        self._circuit = circuit
         self.with_it: tuple[Code, ...] = ()
         """Other machine code that is often needed after this one, announced in the same message."""
         self.is_begun = False
@@ -246,8 +250,9 @@ class Code(File):
 
     @property
     def work(self) -> str:
-        """Kind of compilation in the records, which distinguishes compilations that also lower modules."""
-        return self.kind if self._is_lowered() else f"{self.kind}, {records.LOWERED}"
+        """Kind of compilation in the records, with what makes it longer: a circuit, modules to lower."""
+        variants = {records.CIRCUIT: self._circuit, records.LOWERED: not self._is_lowered()}
+        return ", ".join([self.kind, *(name for name, holds in variants.items() if holds)])
 
     def _noted(self, work: str, make: Callable[[], bytes]) -> bytes:
         """Compile the machine code, and record the compile time."""

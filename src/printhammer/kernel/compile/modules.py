@@ -229,6 +229,7 @@ class Entry:
             KINDS.get(name, name),
             label,
             lambda: all(module.is_there() for module in modules),
+            variant.get("HAS_CIRCUIT", False),
         )
 
     def is_ready(self) -> bool:

@@ -7,6 +7,7 @@ machines. The record explains why code in the folder cannot be used, and gives t
 from __future__ import annotations
 
 import json
+import math
 import os
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Final
@@ -25,6 +26,9 @@ FILE: Final = "printhammer-machine-code.json"
 LOWERED: Final = "lowered first"
 """Suffix of the kind of a compilation that first has to lower modules, as in a source checkout."""
 
+CIRCUIT: Final = "circuit"
+"""Suffix of the kind of a compilation for a hammer whose coil has a circuit."""
+
 _USUAL: Final = {
     "runs": 3.0,
     "curves": 1.0,
@@ -36,7 +40,9 @@ _USUAL: Final = {
 }
 """Typical compile times of the entry points, s, by kind; used where no time has been recorded."""
 
-_LOWERING: Final = 4.0  # Factor of the compile time if modules have to be lowered first
+# Factors of the compile time, from processor times of a run, a map and a Lyapunov exponent
+_LOWERING: Final = 4.0
+_CIRCUIT: Final = 2.0
 
 _ANOTHER: Final = 5.0
 
@@ -90,8 +96,9 @@ def expected(folders: Iterable[Path], name: str) -> float:
     for entry in (*own, *(entry for entries in records for entry in entries)):
         if name in entry["seconds"]:
             return float(entry["seconds"][name])
-    kind, _, lowered = name.partition(", ")
-    return _USUAL.get(kind, _ANOTHER) * (_LOWERING if lowered else 1.0)
+    kind, *variants = name.split(", ")
+    factors = {LOWERED: _LOWERING, CIRCUIT: _CIRCUIT}
+    return _USUAL.get(kind, _ANOTHER) * math.prod(factors[variant] for variant in variants)
 
 
 def mismatch(folder: Path) -> str:

@@ -134,7 +134,9 @@ def read_columns(text: str, where: str = "--columns") -> Columns:
             raise InputError.of(
                 name,
                 value,
-                "a column, counted from 1, such as '2*-10 A/V + 0.1 A'",
+                "a start and a step, such as '-1 ms + 20 us', or a column, counted from 1"
+                if name == "time"
+                else "a column, counted from 1, such as '2*-10 A/V + 0.1 A'",
                 file=where,
             )
     return Columns(sources, clock, delays, where)

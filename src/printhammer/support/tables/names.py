@@ -22,6 +22,7 @@ _MEASURED: Final = ("s", "V", "A", "m", "N", "Hz", "m/s", "ohm", "Wb", "H")
 _COUNTS: Final = frozenset({"number", "sequence", "samples", "sample", "#", "pts", "points"})
 _BRACKETS: Final = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\)|\{([^{}]*)\})", re.DOTALL)
 _BESIDE: Final = re.compile(r"(.*?)(?:(?:^|\s+)in\s+|\s*/\s*|\s*,\s*|_)([^\s,/_]+)", re.DOTALL)
+_NUMBERED: Final = re.compile(r"[A-Za-z]+\d+")  # "A1" and "V2" are names of channels, not powers of units
 _CURRENTS: Final = re.compile(r"I\w*\(.+\)")
 _VOLTAGES: Final = re.compile(r"V\(.+\)")
 
@@ -68,6 +69,8 @@ def split_heading(cell: str) -> Heading:
 def unit_of(text: str) -> str:
     """Parse a cell such as "(us)", "Volts" or "V DC" as a unit; empty if the cell is no unit."""
     bare = re.sub(r"\s*(DC|AC|dc|ac)$", "", text.strip().strip("()[]{}").strip()) or text.strip()
+    if _NUMBERED.fullmatch(bare):
+        return ""
     for word in (bare, bare.lower()):
         for si in _MEASURED:
             with suppress(InputError):

@@ -440,10 +440,21 @@ def _listed(table: Table) -> str:
 
 
 def _example(table: Table, numbers: Mapping[str, str]) -> str:
-    """Return an example of the option `--columns` for a table."""
+    """Return an example of the option `--columns`; STEP stands for an unknown sampling interval."""
+    names, clock = dict(numbers), table.clock
+    places = [place for place in range(1, len(table.columns) + 1) if any(table.cells(place - 1))]
     entries = []
-    for place, ((name, si), heading) in enumerate(zip(numbers.items(), table.columns, strict=False), 1):
-        own = heading.unit
+    if "time" in names:
+        unit = table.columns[places[0] - 1].unit if places else ""
+        is_first = len(places) > 1 and (not unit or is_unit_of(unit, names["time"]))
+        counted = clock is not None and clock.numbers is not None
+        if counted or not is_first:
+            del names["time"]
+            entries = [] if clock else ["time=0 s + STEP"]
+        if counted:
+            places = [place for place in places if clock and place - 1 != clock.numbers]
+    for place, (name, si) in zip(places, names.items(), strict=False):
+        own = table.columns[place - 1].unit
         factor = "" if own and is_unit_of(own, si) else f"*1 {si}/{own}" if own else f"*1 {si}"
         entries.append(f"{name}={place}{factor}")
     return f"'{', '.join(entries)}'"
