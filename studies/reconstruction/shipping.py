@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 TITLE: Final = "The stored-energy print hammer of Hendriks (1983), reconstructed"
 NOTE: Final = """\
-The paper prints no constants; only its geometry is stated, in the captions of its figures. Everything else
-here is a reconstruction: found by a search for constants with which the model behaves as the paper tells,
-claim by claim. Other constants do about as well, see the family. A reconstructed constant is no measurement.
+The paper prints no constants; only its geometry is stated, in the captions of its figures. All other
+constants are reconstructed: a search found constants with which the model satisfies the claims of the paper.
+Other constants do so about as well, see the family. A reconstructed constant is not a measurement.
 """
 
 

@@ -64,26 +64,26 @@ def header_text(
 
 /* Dead time of the hammer {c_code.comment(hammer)},
    fingerprint {fingerprint}.
-   [rail][temperature of the coil]; times are in nanoseconds, 0 where no pulse gives the blow.
-   A dot is fired `dead_time` before its impact with a pulse of `width`. */
+   Tables are indexed [rail][coil temperature]; times are in nanoseconds, 0 if no pulse width gives the
+   impact speed. A dot is fired `dead_time` before its impact, with a pulse of `width`. */
 
 #include <stdint.h>
 
 #define {upper}_RAILS {voltage.size}
 #define {upper}_TEMPERATURES {temperature.size}
 
-/* Rails, in millivolts. */
+/* Rail voltages, in millivolts. */
 static const int32_t {prefix}_rail[{voltage.size}] = {{
 {c_code.numbers(np.rint(1e3 * voltage))}
 }};
 
-/* Temperatures of the coil, in tenths of a degree Celsius. */
+/* Coil temperatures, in tenths of a degree Celsius. */
 static const int32_t {prefix}_temperature[{temperature.size}] = {{
 {c_code.numbers(np.rint(10.0 * temperature))}
 }};
 
 {arrays}
-/* Between the entries of a table, and at its edges beyond them; 0 where one of the four is 0. */
+/* Interpolate a table bilinearly, clipped to its edges; 0 if one of the four entries is 0. */
 static inline int32_t {prefix}_between(
   const int32_t table[{upper}_RAILS][{upper}_TEMPERATURES], int32_t millivolts, int32_t tenths)
 {{

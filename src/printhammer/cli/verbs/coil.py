@@ -91,8 +91,8 @@ def impact_time(
     ),
     hammers: int = opt.whole("Number of hammers drawn from the production spread.", default=20),
     record: list[Path] | None = opt.source(
-        "Record of one shot (columns: time, and current or voltage) whose impact time is estimated, instead"
-        " of simulated shots; repeatable.",
+        "Record of one shot to analyse instead of simulated shots: columns time, and current or voltage;"
+        " repeatable.",
         many=True,
     ),
     columns: str | None = opt.text(

@@ -128,7 +128,7 @@ def energy(
     run=opt.files(
         "Output file for one run: a picture (.svg, .png, .pdf) or its drive (.toml); repeatable.",
         ".toml",
-        panel="The run that is shown",
+        panel="Run to show",
     ),
 )
 def feedback(

@@ -112,9 +112,9 @@ def lyapunov(
     period: str | None = _trains("TIMES", "Times between firings, e.g. '1.15 ms, 1.30 ms'."),
     rate: str | None = _trains("RATES", "Firings per second, e.g. '952 Hz'."),
     lowest: str | None = _trains(
-        "TIME", "Shortest time between firings of a range, e.g. '0.8 ms'.", flag="--from"
+        "TIME", "Lower end of a range of times between firings, e.g. '0.8 ms'.", flag="--from"
     ),
-    highest: str | None = _trains("TIME", "Longest time between firings of the range.", flag="--to"),
+    highest: str | None = _trains("TIME", "Upper end of the range of times between firings.", flag="--to"),
     steps: int | None = opt.whole(
         f"Number of times between firings in the range (default: {_STEPS}).", panel=_TRAINS
     ),

@@ -109,9 +109,8 @@ def tune(
     budget: int | None = opt.whole("Maximum size of the arrays in the C header, bytes."),
     along: str | None = opt.text(
         "AXIS LOW, HIGH, N",
-        "Quantity and range of values, for each of which a table is tuned, e.g. 'rail 90 V, 110 V, 3': rail"
-        " (voltage), temperature (of the coil), gap (added distance of the pack) or forms (relative change of"
-        " the thickness of the pack).",
+        "Additional axis of the table, with its range, e.g. 'rail 90 V, 110 V, 3': rail (voltage), temperature"
+        " (of the coil), gap (added distance of the pack) or forms (relative change of the pack thickness).",
     ),
     variability: bool = opt.switch("Minimise the RMS deviation over the production spread of the constants."),
     tolerance: float | None = opt.TOLERANCE,

@@ -52,14 +52,16 @@ class Guess:
 
 
 GUESSES: Final = {
-    "turns": Guess(1000.0, 0.7, "1000 turns within a factor 2"),
+    "turns": Guess(1000.0, 0.7, "1000 turns, within a factor of 2"),
     "residual_gap": Guess(
-        0.1e-3, 1.0, "air beside the armature and a film at the stop, 0.1 mm within a factor e"
+        0.1e-3, 1.0, "air beside the armature and a film at the stop, 0.1 mm within a factor of e"
     ),
-    "core": Guess(0.05e-3, 1.0, "iron like 0.05 mm of air, within a factor e"),
+    "core": Guess(0.05e-3, 1.0, "iron equivalent to 0.05 mm of air, within a factor of e"),
     "field": Guess(1.6, 0.2, "1.6 T in the core at saturation, within 20 %"),
-    "fringe": Guess(0.5, 0.7, "flanks that fringe half as high as the pole's radius, within a factor 2"),
-    "leakage": Guess(0.3, 1.0, "a third of the printed inductance passes the armature, within a factor e"),
+    "fringe": Guess(0.5, 0.7, "fringing flanks half as high as the pole radius, within a factor of 2"),
+    "leakage": Guess(
+        0.3, 1.0, "a third of the stated inductance bypasses the armature, within a factor of e"
+    ),
 }
 """Log-normal priors of the magnet's constants, SI; "core" is an air gap, "fringe" and "leakage" fractions."""
 
@@ -212,16 +214,16 @@ def implausible(sheet: DataSheet, part: ReluctanceMagnet) -> list[str]:
     least, mass = IRON * part.pole_area * 0.25 * diameter, sheet.si("mass")
     if "pole_diameter" not in sheet.entries and least > _HEAVY * mass:
         found.append(
-            f"a pole of {1e4 * part.pole_area:.3g} cm2 is fitted to the forces: an iron armature for it has"
-            f" {1e3 * least:.3g} g or more, the sheet {1e3 * mass:.3g} g; check force, gap and current"
+            f"the fitted pole area is {1e4 * part.pole_area:.3g} cm2: an iron armature for it weighs at least"
+            f" {1e3 * least:.3g} g, but the sheet states {1e3 * mass:.3g} g; check force, gap and current"
         )
     current = sheet.si("current", sheet.si("rail") / sheet.si("resistance"))
     field = 0.5 * law.magnet_inductance(part.packed(0.0), 0.0, 0.0) * current**2
     supplied = sheet.si("rail") * current * sheet.si("on_time")
     if field > supplied:
         found.append(
-            f"the field at {current:.3g} A holds {1e3 * field:.3g} mJ, a pulse supplies {1e3 * supplied:.3g}"
-            " mJ at most: check force, gap, current and on_time"
+            f"the field energy at {current:.3g} A is {1e3 * field:.3g} mJ, but a pulse supplies at most"
+            f" {1e3 * supplied:.3g} mJ: check force, gap, current and on_time"
         )
     return found
 
@@ -286,9 +288,9 @@ def _head(sheet: DataSheet, magnet: SheetMagnet, current: float) -> str:
 
     points = len(sheet.force)
     said = (
-        f"Made of a data sheet: {sheet.texts['source']}. The law of the magnet meets its {points}"
-        f" force{'s' if points > 1 else ''} at {current:.3g} A within {100.0 * magnet.misfit:.2g} %. What is"
-        " assumed is what such devices have, no property of this one."
+        f"Built from a data sheet: {sheet.texts['source']}. The magnet law reproduces its {points}"
+        f" force{'s' if points > 1 else ''} at {current:.3g} A within {100.0 * magnet.misfit:.2g} %. Assumed"
+        " values are typical of such devices, not properties of this one."
     )
     note = " ".join([sheet.texts.get("note", ""), said]).strip()
     lines = textwrap.wrap(note, 110, break_long_words=False)
@@ -322,16 +324,20 @@ def _magnet(sheet: DataSheet, magnet: SheetMagnet) -> dict[str, Any]:
         if name in sheet.entries:
             table[name] = sheet.constant(name)
         elif name == "closed_at":
-            table[name] = _made(value, "m", *_derived_from(sheet, "stroke", "stroke and the gap at its end"))
+            table[name] = _made(value, "m", *_derived_from(sheet, "stroke", "stroke plus the gap at its end"))
         elif name == "pole_area" and "pole_diameter" in sheet.entries:
             table[name] = _made(
-                value, note.si, *_derived_from(sheet, "pole_diameter", "a round pole of the diameter")
+                value,
+                note.si,
+                *_derived_from(sheet, "pole_diameter", "area of a round pole of the stated diameter"),
             )
         elif name == "pole_area":
             table[name] = _made(value, note.si, fitted, what)
         elif name == "fringe_perimeter":
             status = table["pole_area"]["status"]
-            table[name] = _made(value, note.si, status, "circumference of a round pole of that area")
+            table[name] = _made(
+                value, note.si, status, "circumference of a round pole of the area `pole_area`"
+            )
         elif name in magnet.derived:
             error = 100.0 * magnet.derived[name]
             table[name] = _made(value, note.si, fitted, f"{what}, within {error:.2g} %")
@@ -340,7 +346,7 @@ def _magnet(sheet: DataSheet, magnet: SheetMagnet) -> dict[str, Any]:
                 value,
                 note.si,
                 "assumed",
-                f"{magnet.assumed[name]}, and {what}, which hardly tell",
+                f"{magnet.assumed[name]}; hardly constrained by the fit{what.removeprefix('fitted')}",
             )
     return table
 
@@ -365,8 +371,8 @@ def _spring(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, 
             written=f"{preload:g}",
             unit="N",
         )
-    zero: dict[str, Any] = {"preload": _made(0.0, "N", "assumed", "the sheet does not tell")}
-    zero["stiffness"] = _made(0.0, "N/m", "assumed", "the sheet does not tell")
+    zero: dict[str, Any] = {"preload": _made(0.0, "N", "assumed", "not stated in the data sheet")}
+    zero["stiffness"] = _made(0.0, "N/m", "assumed", "not stated in the data sheet")
     table: dict[str, Any] = {
         "law": "preload",
         **zero,
@@ -380,7 +386,7 @@ def _spring(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, 
 def _restitution(sheet: DataSheet) -> dict[str, Any]:
     if "stop.restitution" in sheet.entries:
         return sheet.constant("stop.restitution")
-    return _made(RESTITUTION, "1", "assumed", "steel on steel with a thin film between")
+    return _made(RESTITUTION, "1", "assumed", "steel on steel, with a thin film between the surfaces")
 
 
 def _pack(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, Any]:
@@ -394,13 +400,15 @@ def _pack(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, An
     left = magnet.part.closed_at - front + magnet.part.residual_gap
     stiffness = 2.0 * work / (INDENTATION * left) ** 2
     why = (
-        f"the magnet's work of {1e3 * work:.3g} mJ presses it in by a quarter of the gap left,"
-        f" {1e6 * left:.3g} um"
+        f"the magnet's work of {1e3 * work:.3g} mJ indents the struck object by a quarter of the remaining"
+        f" gap, {1e6 * left:.3g} um"
     )
     restitution = _restitution(sheet)
     damping = 2.0 * damping_ratio(restitution["value"]) * math.sqrt(stiffness * sheet.si("mass"))
     table["stiffness"] = _made(stiffness, "N/m", "assumed", why)
-    table["damping"] = _made(damping, "N s/m", "assumed", f"returns {restitution['value']:g} of the speed")
+    table["damping"] = _made(
+        damping, "N s/m", "assumed", f"the armature rebounds with {restitution['value']:g} of its speed"
+    )
     return table
 
 
