@@ -102,7 +102,7 @@ def quality(
     ),
     judged_by: str | None = _more(
         "own|design",
-        "Reference dot, with --yield: single pulse of the same hammer (own) or of the nominal hammer (design).",
+        "Reference dot, with --yield: single pulse of the same hammer (own) or of the nominal one (design).",
     ),
     seed: int | None = opt.whole("Seed for drawing the hammers of --yield (default: 0).", panel=_MORE),
     current: str | None = _more("CURRENT", "Limit on the current, with --damping (default: 2 A)."),

@@ -110,7 +110,8 @@ def tune(
     along: str | None = opt.text(
         "AXIS LOW, HIGH, N",
         "Additional axis of the table, with its range, e.g. 'rail 90 V, 110 V, 3': rail (voltage),"
-        " temperature (of the coil), gap (added distance of the pack) or forms (relative change of the pack thickness).",
+        " temperature (of the coil), gap (added distance of the pack) or forms (relative change of the pack"
+        " thickness).",
     ),
     variability: bool = opt.switch("Minimise the RMS deviation over the production spread of the constants."),
     tolerance: float | None = opt.TOLERANCE,
