@@ -18,7 +18,7 @@ def test_show_tells_every_constant_with_status_and_source(cli, hammer: "ph.Hamme
         assert constant.status in line
         assert constant.source in sources
     assert "a reconstruction: 3 stated, 1 derived, 13 reconstructed" in outcome.out
-    assert "A reconstructed constant is no measurement." in " ".join(outcome.out.split())
+    assert "A reconstructed constant is not a measurement." in " ".join(outcome.out.split())
 
 
 def test_show_tells_the_statics(cli, hammer: "ph.Hammer") -> None:
