@@ -123,7 +123,15 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-WHOLE = "window.studio?.studio?.frames.map?.detail === 'full' && !document.querySelector('.outdated')"
+def test_the_script_of_workers_declares_no_name_twice() -> None:
+    script = f"new Function({json.dumps(merged('engine/worker.js'))});"
+    assert subprocess.run(["node", "--eval", script], check=False).returncode == 0
+
+
+WHOLE = "window.studio?.studio?.frames.map?.detail === 'full'"
+WHOLE += (
+    " && window.studio.studio.frames.strobe?.data.x.length === 400 && !document.querySelector('.outdated')"
+)
 
 
 @pytest.fixture
@@ -148,6 +156,12 @@ def test_a_page_from_a_file_shows_what_python_computes(live: Page) -> None:
     first = motion.dots[0]
     assert dots[0]["flight_time"] == pytest.approx(first.flight_time, rel=1e-4)
     assert dots[0]["peak_force"] == pytest.approx(first.peak_force, rel=1e-3)
+    assert dots[0]["loading_work"] == pytest.approx(first.loading_work, rel=1e-3)
+    energy = live.run("window.studio.studio.frames.dots.energy")
+    assert energy["coil_work"] == pytest.approx(motion.energy.coil_work, rel=1e-3)
+    points = live.run("[...window.studio.studio.frames.strobe.data.x].slice(0, 20)")
+    section = ph.strobe(hammer, rate=1200.0, points=20, verdict=False)
+    assert points == pytest.approx(section.x.tolist(), rel=1e-6)
     chart = ph.frequency_map(hammer, rates=[500.0, 2000.0], times=[1e-3], pulses=9)
     shown = live.run("[500, 2000].map((rate) => window.studio.studio.views.map.valueAt(1e-3, rate))")
     stroke = hammer.front - hammer.position

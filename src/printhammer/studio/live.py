@@ -11,12 +11,14 @@ import gzip
 import json
 import math
 from base64 import b64encode
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer import __version__
 from printhammer.drive.waveforms.shapes import SHAPES
+from printhammer.run.energy import Ledger
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
-from printhammer.run.problem import Problem, fresh_carry
+from printhammer.run.problem import TOLERANCE, Problem, control_of, fresh_carry
 from printhammer.run.simulate import end_of_run
 from printhammer.run.start import initial_state
 from printhammer.studio import bounds
@@ -24,6 +26,7 @@ from printhammer.studio.bundle import PLACE, merged, sources, style
 from printhammer.studio.frames import plain
 from printhammer.studio.pictures.chart import FULL, GAP, PREVIEW, PREVIEW_BY_VOLTAGE
 from printhammer.studio.pictures.engine import MOST_ENDS, POINTS, pulse_of
+from printhammer.studio.pictures.section import AT_ONCE, LATER
 from printhammer.studio.states.controls import describe, vocabulary
 from printhammer.studio.states.links import FORMAT, KIND
 from printhammer.studio.states.state import VIEWS, State, read_state
@@ -142,6 +145,8 @@ def _limits() -> dict[str, Any]:
         }
         for name, shape in SHAPES.items()
     }
+    named["POINTS_OF_SECTION"] = (*AT_ONCE, *LATER)
+    named["ENERGIES"] = [field.name for field in fields(Ledger)]
     return named | {"PREVIEW": {"true": PREVIEW_BY_VOLTAGE, "false": PREVIEW}}
 
 
@@ -164,7 +169,7 @@ def _numbers(state: State, modules: dict[str, str]) -> dict[str, Any]:
     """Return the arguments of the kernel for a state, and the index of its module."""
     hammer, drive = state.changed, state.drive
     problem = Problem(hammer, drive, initial_state(hammer, None), 0.0, DISPLAY_TOLERANCE)
-    module = problem.kernel.web_module()
+    module = problem.page_module
     if module.name not in modules:
         modules[module.name] = b64encode(gzip.compress(module.content(), 9, mtime=0)).decode()
     return {
@@ -173,6 +178,8 @@ def _numbers(state: State, modules: dict[str, str]) -> dict[str, Any]:
         "quantity": drive.quantity,
         "constants": _numbers_of(problem.constants),
         "control": problem.control,
+        "exact": control_of(problem.scales, TOLERANCE),
+        "mass": hammer.mass,
         "bounds": _numbers_of(problem.bounds),
         "carry": _numbers_of(fresh_carry(0.0, problem.state)),
         "replaces": drive.overlap == "replace",

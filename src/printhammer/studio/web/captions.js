@@ -108,7 +108,7 @@ const TEXTS = {
   strobe: ({ strobe }) => {
     if (!strobe || strobe.reason) return strobe?.reason ?? "";
     const { verdict } = strobe;
-    if (!verdict) return strobe.status === "ok" ? "The state at each firing of an endless train; the verdict on it follows." : `An endless train cannot be followed at this rate: ${strobe.status}.`;
+    if (!verdict) return strobe.status === "ok" ? `The state at each firing of an endless train${strobe.unjudged ? "" : "; the verdict on it follows"}.` : `An endless train cannot be followed at this rate: ${strobe.status}.`;
     const period = /^period-(\d+)$/.exec(verdict.verdict)?.[1];
     if (period) return period === "1" ? "One point in the end: the train repeats itself with every firing." : `${large(NUMBERS[period] ?? period)} points in the end: the train repeats itself after as many firings.`;
     if (verdict.verdict === "strange") return `The train never repeats itself: what is small grows by a factor of ${digits(Math.exp(verdict.exponent_per_firing), 3)} with each firing.`;

@@ -5,7 +5,8 @@ import { checkConstant, readFile, readState, Refusal, taken } from "./read.js";
 import { textsOf } from "./texts.js";
 
 const MAP = ["hammer", "text", "constants", "waveform", "pattern", "pulses", "overlap", "low", "high"];
-const LATER = ["strobe", "line"]; // views that are not computed here
+const SECTION = ["hammer", "text", "constants", "waveform", "rate", "overlap"];
+const LATER = ["line"]; // views that are not computed here
 const QUESTIONS = ["curves", "dots", "exponent", "verdict"];
 const BEFORE = "this still belongs to what was set before";
 const NOT_YET = "being computed";
@@ -16,7 +17,8 @@ export function engineOf(shelf, script, receive, page) {
   const crew = crewOf(script, shelf);
   let latest = null; // the newest state, with its number
   const map = { shown: null, whole: null, serial: 0 };
-  const keyOf = (state) => JSON.stringify(MAP.map((name) => state[name]));
+  const keyOf = (state, names = MAP) => JSON.stringify(names.map((name) => state[name]));
+  const strobe = { shown: null, whole: null };
   const refuse = (serial, reason) => receive({ kind: "refusal", serial, reason: reason.slice(0, shelf.limits.LONGEST_REASON), data: {} });
 
   /** Read a state and check what can be checked without its run. */
@@ -38,12 +40,26 @@ export function engineOf(shelf, script, receive, page) {
       if (answer.reason) { refuse(serial, answer.reason); return; }
       const outdated = {};
       if (state.views.includes("map") && map.shown !== keyOf(state)) outdated.map = map.shown ? BEFORE : NOT_YET;
+      if (state.views.includes("strobe") && strobe.shown !== keyOf(state, SECTION)) outdated.strobe = strobe.shown ? BEFORE : NOT_YET;
       const [motion, dots] = answer.frames;
       receive({ ...motion, serial, outdated });
       receive({ ...dots, serial });
       for (const view of LATER) if (state.views.includes(view) && (view !== "line" || state.line.trim())) receive({ kind: view, serial, reason: shelf.sentences[view], ...NOTHING[view], data: {} });
       if (state.views.includes("map") && map.whole !== keyOf(state)) draw(serial, state);
+      if (state.views.includes("strobe") && strobe.whole !== keyOf(state, SECTION)) follow(serial, state);
     });
+  }
+
+  /** Follow an endless train: more and more of its points, until the state is replaced. */
+  async function follow(serial, state) {
+    for (const points of shelf.limits.POINTS_OF_SECTION) {
+      const answer = await new Promise((done) => { crew.send("map", "section", state, { points }, () => latest === serial, done); });
+      if (!answer || latest !== serial) return;
+      strobe.shown = keyOf(state, SECTION);
+      receive(answer.reason ? { kind: "strobe", serial, reason: answer.reason, ...NOTHING.strobe, data: {} } : { ...answer.frames[0], last: shelf.limits.POINTS_OF_SECTION.at(-1), serial });
+      if (answer.reason) return;
+    }
+    strobe.whole = strobe.shown;
   }
 
   /** Draw the map of a state: coarse at once, then whole, unless the state is replaced meanwhile. */
@@ -66,7 +82,7 @@ export function engineOf(shelf, script, receive, page) {
       }
       map.shown = key;
       if (whole) map.whole = key;
-      receive({ ...codesOf(parts, state, shelf), serial, detail: whole ? "full" : "preview" });
+      receive({ detail: whole ? "full" : "preview", ...await codesOf(crew, parts, state), serial });
     }
   }
 

@@ -16,29 +16,22 @@ export async function pictureOf(crew, state, [rows, columns], wanted, isWanted) 
 }
 
 /** Join pieces to the frame of a map: displacements as integers, 0 at its lowest place, 65534 at its highest. */
-export function codesOf({ rows, columns, pieces }, state, { hammers, limits }) {
-  const { backstop, front, platen } = hammers[state.hammer].described.places;
-  const x = new Float32Array(rows * columns);
-  const struck = pieces[0].struck && new Uint8Array(pieces.reduce((sum, each) => sum + each.struck.length, 0));
-  let [at, from] = [0, 0];
-  for (const each of pieces) {
-    x.set(each.x, at);
-    struck?.set(each.struck, from);
-    at += each.x.length;
-    from += each.struck?.length ?? 0;
+export async function codesOf(crew, { rows, columns, pieces }, state) {
+  const { end, places } = pieces[0];
+  const joined = (name, type) => {
+    const whole = new type(pieces.reduce((sum, each) => sum + each[name].length, 0));
+    pieces.reduce((at, each) => { whole.set(each[name], at); return at + each[name].length; }, 0);
+    return whole;
+  };
+  const part = { x: joined("x", Float32Array), rows, columns, places };
+  const { frames, reason } = await new Promise((done) => { crew.send("map", "codes", state, { part }, () => true, done); });
+  if (reason) return { kind: "map", reason, detail: "none", data: {} };
+  const [{ low, high, data }] = frames;
+  data.codes.shape = [rows, columns];
+  if (pieces[0].struck) {
+    data.struck = joined("struck", Uint8Array);
+    data.struck.shape = [rows, data.struck.length / rows];
   }
-  let [least, most] = [Infinity, -Infinity];
-  for (const value of x) {
-    if (value < least) least = value;
-    if (value > most) most = value;
-  }
-  const low = backstop ?? (Number.isFinite(least) ? least : 0);
-  let high = platen ?? (Number.isFinite(most) ? most : 0);
-  high = Math.max(high, low + 1e-7 * Math.max(Math.abs(low), 1e-30));
-  const { GAP } = limits;
-  const codes = Uint16Array.from(x, (value) => (Number.isNaN(value) ? GAP : Math.min(Math.max(((value - low) / (high - low)) * (GAP - 1), 0), GAP - 1)));
-  codes.shape = [rows, columns];
-  if (struck) struck.shape = [rows, struck.length / rows];
   const failed = pieces.reduce((sum, each) => sum + each.ok.filter((ok) => !ok).length, 0);
-  return { kind: "map", rates: [state.low, state.high], end: pieces[0].end, low, high, front, pattern: state.pattern, pulses: state.pulses, failed, reason: "", data: { codes, ...(struck ? { struck } : {}) } };
+  return { kind: "map", rates: [state.low, state.high], end, low, high, front: places.front, pattern: state.pattern, pulses: state.pulses, failed, reason: "", data };
 }

@@ -4,10 +4,14 @@ import { Refusal } from "./read.js";
 const FLIGHTS = { nodes: 2048, contacts: 256, each: 40, most: 1e6 }; // sizes of the first working space
 export const STATUS = ["ok", "range left", "runaway", "step limit", "step underflow"];
 
-/** Return the firing times of a state at a rate, s. */
-export function firingsOf(state, rate = state.rate) {
-  const slots = state.pattern || "1".repeat(state.pulses);
-  return [...slots].flatMap((mark, k) => (mark === "1" ? [k / rate] : []));
+/** Return the firing times of a state, s. */
+export function firingsOf(kernel, { rate, pattern, pulses }) {
+  return kernel.temporarily(() => {
+    const marks = kernel.copy("i", [...(pattern || "1".repeat(pulses))].map(Number));
+    const times = kernel.array("f", marks.shape[0]);
+    const [count] = kernel.call("firings", rate, marks, Boolean(pattern), times);
+    return Array.from(times.values.subarray(0, count));
+  });
 }
 
 /** Whether a pulse is the one that the hammer opens with. */
@@ -25,7 +29,8 @@ export function pose(kernel, hammer, state, limits) {
   return {
     constants, pieces, control: numbers(hammer.control), bounds: numbers(hammer.bounds), scales: hammer.scales, rest: hammer.rest, wait: hammer.wait,
     replace: state.overlap === "replace" || hammer.replaces, carry: numbers(hammer.carry),
-    width: hammer.circuit ? 9 : 5, columns: hammer.circuit ? 15 : 10, pulse: hammer.pulse, peak: hammer.peak,
+    exact: numbers(hammer.exact), mass: hammer.mass, places: { ...hammer.described.places, thickness: hammer.thickness },
+    circuit: hammer.circuit, width: hammer.circuit ? 9 : 5, columns: hammer.circuit ? 15 : 10, pulse: hammer.pulse, peak: hammer.peak,
   };
 }
 
@@ -54,10 +59,9 @@ export function run(kernel, posed, firings, end, most) {
 /** An array of the module with only its first rows. */
 const cut = (array, rows) => ({ letter: array.letter, at: array.at, shape: [rows, ...array.shape.slice(1)], get values() { return array.values.subarray(0, rows * (array.shape[1] ?? 1)); } });
 
-/** Return states and forces of a record at ascending times, s, as the columns of a table. */
+/** Return states and forces of a record at ascending times, s, as a table in the memory of the module. */
 export function resample(kernel, posed, { nodes, train }, times) {
   const out = kernel.array("f", times.length, posed.columns);
   kernel.call("resample", kernel.copy("f", times), nodes, train, posed.constants, out);
-  const { values } = out;
-  return (column) => Float32Array.from({ length: times.length }, (_, k) => values[k * posed.columns + column]);
+  return out;
 }

@@ -1,6 +1,7 @@
 // A worker: it has the kernels of the hammers it was sent, and answers one order after the other.
 import { Kernel } from "./call.js";
-import { curves, piece } from "./pictures.js";
+import { codes, piece, section } from "./many.js";
+import { curves } from "./pictures.js";
 import { Refusal } from "./read.js";
 
 const kernels = new Map();
@@ -9,6 +10,8 @@ let limits = {};
 const WORKS = {
   curves: (kernel, hammer, { state }) => curves(kernel, hammer, state, limits),
   piece: (kernel, hammer, { state, part }) => [piece(kernel, hammer, state, limits, part)],
+  codes: (kernel, _hammer, { part }) => [codes(kernel, part)],
+  section: (kernel, hammer, { state, points }) => [section(kernel, hammer, state, limits, points)],
 };
 
 onmessage = ({ data }) => {

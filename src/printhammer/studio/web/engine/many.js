@@ -1,0 +1,89 @@
+// Many runs of a state: pieces of its map, its strobe section.
+import { firingsOf, pose, STATUS } from "./problem.js";
+
+const ROW = 6; // columns of a row of dots
+const CONTACTS = 0; // column of the contacts of a firing
+const STATE = 8; // columns of a state at which a run begins
+const STRETCH = [2048, 256]; // rows of nodes and of contacts of one stretch of a run
+const CARRY = 32; // size of the state of a run
+
+/** Integrate runs from rest, each with as many firings as the others, to a common end; return what is kept of them. */
+export function many(kernel, posed, firings, each, end, { grid = [], strobes = [], dots = false, most, control = posed.control }) {
+  const runs = firings.shape[0] / each;
+  const starts = (step) => kernel.copy("i", Array.from({ length: runs + 1 }, (_, k) => k * step));
+  const states = new Float64Array(runs * STATE);
+  for (let k = 0; k < runs; k += 1) states.set([0, posed.rest, 0, -1, 0, 0, 0, NaN], k * STATE);
+  const batch = {
+    hammer_of: kernel.array("i", runs), hammers: { letter: "f", at: posed.constants.at, shape: [1, posed.constants.shape[0]] },
+    controls: kernel.copy("f", control, 1, 4), bounds: kernel.copy("f", posed.bounds, 1, 4), waveform_of: kernel.array("i", runs),
+    piece_starts: kernel.copy("i", [0, posed.pieces.shape[0]]), pieces: posed.pieces, rates: kernel.array("f", 1, 3), firing_starts: starts(each),
+    firings, begins: kernel.array("i", firings.shape[0]), replace: posed.replace, states: kernel.copy("f", states, runs, STATE),
+    ends: kernel.copy("f", new Float64Array(runs).fill(end)), max_steps: most,
+  };
+  const kept = {
+    strobe_starts: starts(strobes.length / runs), strobe_times: kernel.copy("f", strobes), grid: kernel.copy("f", grid), want_dots: dots, status: kernel.array("i", runs),
+    reached: kernel.array("f", runs), steps: kernel.array("i", runs), extra: kernel.array("i", runs), dot_starts: starts(dots ? each : 0),
+    dots: kernel.array("f", dots ? firings.shape[0] : 0, ROW), strobes: kernel.array("f", strobes.length, posed.circuit ? 7 : 4), x: kernel.array("s", runs, grid.length),
+  };
+  let [nodes, contacts] = STRETCH;
+  for (let done = 0; done < runs;) {
+    const which = Array.from({ length: runs - done }, (_, k) => done + k);
+    const room = () => [kernel.array("i", 2, each), kernel.array("f", 2, 3 + 7 * each), kernel.array("f", nodes, posed.width), kernel.array("f", contacts, 7), kernel.array("f", CARRY)];
+    [done] = kernel.temporarily(() => kernel.call("members", kernel.copy("i", which), batch, kept, ...room())).map((count) => done + count);
+    [nodes, contacts] = [4 * nodes, 4 * contacts];
+  }
+  return kept;
+}
+
+/** Some rates of the map of a state: displacements, whether runs ended well, and which dots were struck. */
+export function piece(kernel, hammer, state, limits, { rates, columns, wanted }) {
+  return kernel.temporarily(() => {
+    const posed = pose(kernel, hammer, state, limits);
+    const slots = state.pattern || "1".repeat(state.pulses);
+    const fired = [...slots].flatMap((mark, k) => (mark === "1" ? [k] : []));
+    const end = (slots.length - 1) / state.low + posed.wait;
+    const grid = kernel.array("f", columns);
+    kernel.call("map_rates", 0, end, grid);
+    const [starts, firings] = [kernel.array("i", rates.length + 1), kernel.array("f", rates.length * fired.length)];
+    kernel.call("map_trains", kernel.copy("f", rates), kernel.copy("i", fired), Boolean(state.pattern), starts, firings);
+    const kept = many(kernel, posed, firings, fired.length, end, { grid: grid.values.slice(), dots: wanted, most: limits.MOST_MAP_STEPS });
+    const struck = wanted ? kernel.array("i", firings.shape[0]) : null;
+    if (struck) kernel.call("map_struck", kept.dots, kept.dot_starts, fired.length, struck);
+    return { end, places: posed.places, x: kept.x.values.slice(), ok: Array.from(kept.status.values, (code) => code === 0n), struck: struck && Uint8Array.from(struck.values, Number) };
+  });
+}
+
+/** The displacements of a map as integers for colours, from its lowest place to its highest. */
+export function codes(kernel, { x, rows, columns, places }) {
+  return kernel.temporarily(() => {
+    const table = kernel.copy("s", x, rows, columns);
+    const ends = kernel.copy("f", [Infinity, -Infinity]);
+    kernel.call("map_range", table, ends);
+    const found = Array.from(ends.values, (end) => (Number.isFinite(end) ? end : 0));
+    const low = places.backstop ?? found[0];
+    const high = Math.max(places.platen ?? found[1], nextFloat(low));
+    const out = kernel.array("i", Math.ceil((rows * columns) / 4));
+    kernel.call("map_codes", table, low, high, out);
+    return { low, high, data: { codes: new Uint16Array(kernel.memory.buffer, out.at, rows * columns).slice() } };
+  });
+}
+
+/** The next larger number of single precision. */
+function nextFloat(value) {
+  const [float, bits] = [Float32Array.of(value), new Uint32Array(1)];
+  new Float32Array(bits.buffer)[0] = float[0];
+  bits[0] += float[0] >= 0 ? 1 : -1;
+  return new Float32Array(bits.buffer)[0] || 1e-45;
+}
+
+/** The states at the firings of an endless train. */
+export function section(kernel, hammer, state, limits, points) {
+  return kernel.temporarily(() => {
+    const posed = pose(kernel, hammer, state, limits);
+    const times = firingsOf(kernel, { ...state, pattern: "", pulses: points + 1 });
+    const kept = many(kernel, posed, kernel.copy("f", times), times.length, times.at(-1), { strobes: times, most: limits.MOST_SECTION_STEPS * Math.ceil(points / 25), control: posed.exact });
+    const width = kept.strobes.shape[1];
+    const column = (k) => Float32Array.from({ length: points }, (_, row) => kept.strobes.values[row * width + k]);
+    return { kind: "strobe", status: STATUS[Number(kept.status.values[0])], rate: state.rate, verdict: null, exponent: null, unjudged: true, last: points, reason: "", data: { x: column(0), v: column(1) } };
+  });
+}
