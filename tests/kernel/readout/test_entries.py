@@ -1,17 +1,19 @@
 """The machine code that a page runs after a run computes the results of the library."""
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.webassembly import Wasmtime
 
 import printhammer as ph
 from printhammer.hammer.hammer import shipped
 from printhammer.kernel.readout import contacts, curves
 from printhammer.kernel.readout.sums import PARTIALS
 from printhammer.run.motion import Motion
-from printhammer.run.plain.entries import compiled
+from printhammer.run.plain.entries import compiled, entries, page_module
 
 FEWEST = 300
 
@@ -22,40 +24,44 @@ def fields_of(rows: Any) -> np.ndarray:
     return np.array(table, dtype=np.float64)
 
 
-def check_read_out(motion: Motion) -> None:
+def machine_code(motion: Motion) -> Callable[..., Any]:
+    """Call of an entry point by name, as machine code for the laws of a run."""
+    return lambda name, *arguments: compiled(name, motion._problem.laws)(*arguments)
+
+
+def check_read_out(motion: Motion, call: Callable[..., Any]) -> None:
     """Read a run out as a page does, with its entry points only, and compare."""
     problem, record = motion._problem, motion._record
     nodes, firings = record.nodes, problem.firings
     times = np.empty(FEWEST + 3 * len(nodes) + 1)
-    times = times[: compiled("curve_times")(nodes, FEWEST, 20_000, times)].copy()
+    times = times[: call("curve_times", nodes, FEWEST, 20_000, times)].copy()
     out, largest = np.empty((curves.CURVES, times.size), np.float32), np.empty(1)
     force = motion.drive.quantity == "force"
-    compiled("curves")(problem.resample(record, times), force, out, largest)
+    call("curves", problem.resample(record, times), force, out, largest)
     x, v, driven, voltage, forces = motion.curves_at(times)
     named = [forces.get(name, np.zeros(times.size)) for name in ph.run.motion.FORCES]
     for own, expected in zip(out, [x, v, driven, voltage, *named], strict=True):
         np.testing.assert_allclose(own, expected, rtol=1e-5, atol=1e-6 * max(1e-9, np.abs(expected).max()))
     steps = np.empty(len(nodes) - 1, np.int64)
     starts, ends = np.empty((2, len(nodes) - 1))
-    compiled("steps")(nodes, steps, starts, ends)
+    call("steps", nodes, steps, starts, ends)
     increments = problem.quadratures(record, steps, starts, ends)
     count, work = len(record.contacts), np.empty(PARTIALS)
     rows = np.empty((count, contacts.CONTACT_WIDTH))
     rigid = motion.hammer.backstop is not None and motion.hammer.backstop.law == "rigid"
     peaks = problem.peaks(record)
-    compiled("contacts")(record.contacts, nodes, peaks, increments, firings, rigid, work, rows)
+    call("contacts", record.contacts, nodes, peaks, increments, firings, rigid, work, rows)
     works, starts, ends = np.empty((3, count))
     steps = np.empty(count, np.int64)
-    compiled("loading")(rows, nodes, increments, work, works, steps, starts, ends)
+    call("loading", rows, nodes, increments, work, works, steps, starts, ends)
     rests = problem.quadratures(record, steps, starts, ends)
     dots = np.empty((firings.size, contacts.DOT_WIDTH))
-    found = compiled("dots")(firings, motion.end, rows, works, rests, dots)
+    found = call("dots", firings, motion.end, rows, works, rests, dots)
     np.testing.assert_array_equal(dots[:found], fields_of(motion.dots).reshape(found, -1))
     sums, terms = np.empty(increments.shape[1] + 1), np.empty(15)
-    compiled("sums")(increments, work, sums)
+    call("sums", increments, work, sums)
     table = problem.resample(record, nodes[[0, -1], 0])
-    energies = compiled("energies", problem.laws)
-    energies(nodes, table, problem.constants, motion.hammer.mass, sums, terms)
+    call("energies", nodes, table, problem.constants, motion.hammer.mass, sums, terms)
     expected = np.array(dataclasses.astuple(motion.energy))
     np.testing.assert_allclose(terms, expected, rtol=1e-9, atol=1e-12 * motion.energy.throughput)
 
@@ -73,7 +79,8 @@ def motion_of(name: str, rng: np.random.Generator) -> Motion:
 
 
 def test_a_run_is_read_out_as_by_the_library() -> None:
-    check_read_out(motion_of("hendriks-1983-1", np.random.default_rng(0)))
+    motion = motion_of("hendriks-1983-1", np.random.default_rng(0))
+    check_read_out(motion, machine_code(motion))
 
 
 @pytest.mark.slow
@@ -87,4 +94,11 @@ def test_runs_of_all_hammers_are_read_out_as_by_the_library(name: str) -> None:
         except ph.InputError:
             continue
         tried += 1
-        check_read_out(motion)
+        check_read_out(motion, machine_code(motion))
+
+
+@pytest.mark.slow
+def test_the_module_of_a_page_reads_a_run_out() -> None:
+    motion = motion_of("hendriks-1983-1", np.random.default_rng(2))
+    host, results = Wasmtime(page_module(motion._problem.laws).content()), entries()
+    check_read_out(motion, lambda name, *given: host.call(name, *given, results=results[name].results))

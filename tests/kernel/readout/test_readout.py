@@ -6,10 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import printhammer as ph
+from printhammer.chaos.orbits import settled
+from printhammer.chaos.orbits.settled import _by_states, shown
 from printhammer.chaos.strobe.verdict import AGREEMENT, LARGEST_PERIOD, period_of, repeats
 from printhammer.derivatives.states import standard_error
 from printhammer.drive.batch import PulseTrains, Ragged
@@ -133,6 +135,36 @@ def test_the_distances_of_repeats_are_those_of_the_verdict(count: int, period: i
     expected = repeats(states, branches, scales[:3])
     np.testing.assert_array_equal(out, expected)
     assert (found or None) == period_of(expected)
+
+
+@given(
+    st.integers(1, 6),
+    st.sampled_from([0.0, 1e-12, 1e-5]),
+    st.floats(-1.0, 0.9),
+    st.integers(0, 2**32 - 1),
+)
+def test_the_states_decide_the_period_as_in_the_library(
+    period: int, size: float, multiplier: float, seed: int
+) -> None:
+    """States about an orbit that they approach, or about which they alternate."""
+    rng = np.random.default_rng(seed)
+    decay = multiplier ** (np.arange(120) // period)
+    orbit = rng.normal(size=(period, 3)) * rng.choice([1.0, 1e-4])
+    states = np.resize(orbit, (120, 3)) + size * rng.normal(size=3) * decay[:, np.newaxis]
+    scales = np.array([1.0, 2.0, 0.5])
+    agreed = period_of(repeats(states, np.zeros(120, np.int64), scales))
+    assume(agreed is not None)
+    assert agreed is not None
+    counts = [count for count in range(1, agreed + 1) if agreed % count == 0]
+    expected = next((count for count in counts if shown((states / scales)[np.newaxis], count)[0]), None)
+    assert section.settled_period(states, scales, agreed, True) == (expected or 0)
+    by_states = expected or _by_states(states, (states / scales)[np.newaxis], agreed).period
+    assert section.settled_period(states, scales, agreed, False) == (by_states or 0)
+
+
+def test_the_limits_of_settled_states_are_those_of_the_library() -> None:
+    own = (section.AGREES, section.DISTINCT, section.SHRINKS, section.NOISE)
+    assert own == (settled.AGREES, settled.DISTINCT, settled._SHRINKS, settled._NOISE)
 
 
 def kept_of(hammer: ph.Hammer, trains: PulseTrains, ends: Any) -> Any:

@@ -9,6 +9,13 @@ FEWEST = 8
 """Smallest number of growth factors from which a standard error is estimated."""
 
 
+AGREES, DISTINCT = 1e-8, 1e-3
+"""Distances, in units of the scales, below which states agree completely and above which they differ by more
+than noise; as in `printhammer.chaos.orbits.settled`."""
+SHRINKS, NOISE = 1e-5, 1e-9
+"""Smallest decreases of a distance that count as shrinking: relative, and absolute in units of the scales."""
+
+
 def write_exponent(growth: Any, work: Any, out: Any) -> None:
     """Write mean and standard error of the largest growth per firing to `out`, shape (2,).
 
@@ -80,4 +87,69 @@ def write_distances(states: Any, branches: Any, scales: Any, distances: Any) -> 
         distances[place] = largest
         if period == 0 and largest <= scales[parts]:
             period = q
+    return period
+
+
+def mean_apart(states: Any, scales: Any, count: int, period: int, late: bool) -> float:
+    """Return the mean distance of states `count` firings apart, at the end of the series or its beginning."""
+    n, parts = states.shape
+    pairs = n - count
+    used = min(period * max(pairs // (4 * period), 1), pairs)
+    total = 0.0
+    for i in range(pairs - used if late else 0, pairs if late else used):
+        largest = 0.0
+        for k in range(parts):
+            largest = max(largest, abs(states[i + count, k] / scales[k] - states[i, k] / scales[k]))
+        total += largest
+    return float(total / used)
+
+
+def is_shrinking(states: Any, scales: Any, count: int, period: int) -> bool:
+    """Whether the distance of states `count` firings apart still decreases."""
+    early = mean_apart(states, scales, count, period, False)
+    return early - mean_apart(states, scales, count, period, True) > SHRINKS * early + NOISE
+
+
+def is_prime(number: int) -> bool:
+    """Whether a number has no divisor but 1 and itself."""
+    for divisor in range(2, number):
+        if number % divisor == 0:
+            return False
+    return number > 1
+
+
+def is_shown(states: Any, scales: Any, period: int) -> bool:
+    """Whether states that agree `period` firings apart alone prove the period."""
+    if not mean_apart(states, scales, period, period, True) <= AGREES:
+        return False
+    for prime in range(2, period + 1):
+        if period % prime == 0 and is_prime(prime):
+            count = period // prime
+            if is_shrinking(states, scales, count, period):
+                return False
+            if not mean_apart(states, scales, count, period, True) >= DISTINCT:
+                return False
+    return True
+
+
+def settled_period(states: Any, scales: Any, period: int, planar: bool) -> int:
+    """Return the period to which a motion has settled whose states agree `period` firings apart, or 0.
+
+    The period is 0 if the states do not decide it. The rules are those of
+    `printhammer.chaos.orbits.settled`, without Newton's method: a `planar` motion
+    that the states alone do not decide is undecided here. One that is not planar has more components of
+    the state than displacement and velocity at a section; its states decide unless they still move.
+    `states` and `scales` are as for `write_distances`.
+    """
+    for count in range(1, period + 1):
+        if period % count == 0 and is_shown(states, scales, count):
+            return count
+    if planar:
+        return 0
+    early = mean_apart(states, scales, period, period, False)
+    if not mean_apart(states, scales, period, period, True) <= max(AGREES, early):
+        return 0
+    for prime in range(2, period + 1):
+        if period % prime == 0 and is_prime(prime) and is_shrinking(states, scales, period // prime, period):
+            return 0
     return period

@@ -48,6 +48,7 @@ _ENTRIES: Final[dict[str, tuple[Any, ...]]] = {
     "line_totals": (line.write_totals, ("f2", "i1", "f1")),
     "exponent": (section.write_exponent, ("f2", "f1", "f1")),
     "distances": (section.write_distances, ("f2", "i1", "f1", "f1"), 1),
+    "settled": (section.settled_period, ("f2", "f1", "i", "b"), 1),
 }
 """Functions by name, with the types of their arguments (as in `printhammer.kernel.compile.calls.Signature`),
 the number of integers that they return, and whether they use names of the kernel."""
