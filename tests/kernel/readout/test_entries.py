@@ -9,11 +9,14 @@ import pytest
 from tests.webassembly import Wasmtime
 
 import printhammer as ph
+from printhammer.derivatives.states import strobe_exponent
 from printhammer.hammer.hammer import shipped
 from printhammer.kernel.readout import contacts, curves
 from printhammer.kernel.readout.sums import PARTIALS
+from printhammer.kernel.variational import layout
 from printhammer.run.motion import Motion
 from printhammer.run.plain.entries import compiled, entries, page_module
+from printhammer.run.problem import TOLERANCE, Problem
 
 FEWEST = 300
 
@@ -101,4 +104,36 @@ def test_runs_of_all_hammers_are_read_out_as_by_the_library(name: str) -> None:
 def test_the_module_of_a_page_reads_a_run_out() -> None:
     motion = motion_of("hendriks-1983-1", np.random.default_rng(2))
     host, results = Wasmtime(page_module(motion._problem.laws).content()), entries()
-    check_read_out(motion, lambda name, *given: host.call(name, *given, results=results[name].results))
+
+    def call(name: str, *given: Any) -> Any:
+        return host.call(name, *given, results=results[name].results if name in results else None)
+
+    check_read_out(motion, call)
+    check_exponent(motion.hammer, call)
+
+
+def check_exponent(hammer: ph.Hammer, call: Callable[..., Any]) -> None:
+    """Compute the exponent of an endless train as a page does, and compare."""
+    assert hammer.waveform is not None
+    first, last, period = 21, 40, 1e-3
+    train = ph.PulseTrain(hammer.waveform, period=period, pulses=last)
+    problem = Problem(hammer, train, (hammer.rest, 0.0), 0.0, TOLERANCE)
+    nodes, marks = problem.run(float(train.times[-1])).nodes, np.array(train.times)
+    scale, speed = problem.scales
+    initial = np.array([[scale, 0.0], [0.0, speed], [0.0, 0.0]])
+    carried = layout.Carried(
+        columns=np.zeros((3, 2)),
+        work=np.zeros((layout.WORK_ROWS, layout.work_width(2, False))),
+        track=np.array([0.0, 1.0, 0.0, 0.0]),
+        states=np.full((last, 4), np.nan),
+        changes=np.full((last, 3, 2), np.nan),
+        growth=np.full((last, 2), np.nan),
+        passed=np.zeros((0, 2, 3, 2)),
+    )
+    parts = problem.drive_arrays(), problem.constants, problem.scales, problem.bounds
+    call("flow", nodes, *parts, (), marks, np.zeros(0, np.int64), True, True, initial, carried)
+    growth, found = carried.growth[first:].copy(), np.empty(2)
+    call("exponent", growth, np.empty(len(growth) + 1), found)
+    expected = strobe_exponent(hammer, train, first=first, last=last)
+    assert expected.ok
+    assert found.tolist() == pytest.approx([expected.value, expected.standard_error], rel=1e-6)

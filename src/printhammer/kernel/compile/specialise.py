@@ -77,11 +77,15 @@ class Kernel:
     def web_module(self, names: Sequence[str] = ENTRIES, further: Mapping[str, Plain] = _NONE) -> WebModule:
         """Return the WebAssembly module of the entry points `names` and of `further` plain functions.
 
+        The names may include "flow", the variational equations by states.
         The calling convention is described in :mod:`printhammer.kernel.compile.web.build`. The wheel contains
         the modules for the laws of shipped hammers; building other modules needs the extra `page`.
         """
         plain = [_plain_entry(name, function, self.laws) for name, function in further.items()]
-        return web_module_of([*(self._entries[name] for name in names), *plain])
+        known = dict(self._entries)
+        if "flow" in names:
+            known |= variational(self, forced=False)._entries
+        return web_module_of([*(known[name] for name in names), *plain])
 
     def plain(self, name: str, function: Plain) -> Callable[..., Any]:
         """Return a plain function, with the laws of the kernel, as machine code that Python calls."""

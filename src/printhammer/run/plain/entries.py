@@ -78,6 +78,6 @@ def compiled(name: str, laws: Laws = _NO_LAWS) -> Callable[..., Any]:
 
 def page_module(laws: Laws) -> WebModule:
     """Return the WebAssembly module of a page: entry points of the kernel, and all plain functions."""
-    from printhammer.kernel.compile.specialise import specialise
+    from printhammer.kernel.compile.specialise import ENTRIES, specialise
 
-    return specialise(laws).web_module(further=entries())
+    return specialise(laws).web_module((*ENTRIES, "flow"), entries())
