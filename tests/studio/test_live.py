@@ -13,6 +13,8 @@ from tests.studio.server import STATE
 from tests.studio.test_state import JSON, SAMPLES
 
 import printhammer as ph
+from printhammer.printing.page.page import print_page
+from printhammer.printing.page.pattern import Pattern
 from printhammer.studio.bundle import merged
 from printhammer.studio.live import content_of, live_page
 from printhammer.studio.states.controls import fields_of
@@ -159,6 +161,9 @@ def test_a_page_from_a_file_shows_what_python_computes(live: Page) -> None:
     assert dots[0]["loading_work"] == pytest.approx(first.loading_work, rel=1e-3)
     energy = live.run("window.studio.studio.frames.dots.energy")
     assert energy["coil_work"] == pytest.approx(motion.energy.coil_work, rel=1e-3)
+    printed = print_page(hammer, Pattern.from_text("HAMMER"), 1200.0)
+    counts = live.run("(({ wanted, good, lost }) => [wanted, good, lost])(window.studio.studio.frames.line)")
+    assert counts == [printed.lost.size, printed.good.sum(), printed.lost.sum()]
     points = live.run("[...window.studio.studio.frames.strobe.data.x].slice(0, 20)")
     section = ph.strobe(hammer, rate=1200.0, points=20, verdict=False)
     assert points == pytest.approx(section.x.tolist(), rel=1e-6)

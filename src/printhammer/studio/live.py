@@ -65,10 +65,8 @@ begin();
 _SENTENCES: Final = {
     "files": "a hammer file is opened by `printhammer studio FILE`, not by this page",
     "tables": "a measured table is opened by `printhammer studio`, not by this page",
-    "strobe": "the strobe section is computed by `printhammer strobe` on a computer with Python",
-    "line": "the printed line is computed by `printhammer print` on a computer with Python",
+    "strobe": "exponents are computed by `printhammer strobe` on a computer with Python",
     "drive": "the file of a drive is written by `printhammer studio` on a computer with Python",
-    "energy": "energies are computed by `printhammer run` on a computer with Python",
     "changes": "changed constants and pulses are computed by `printhammer` on a computer with Python",
 }
 """What the page says of work that only Python does, by name."""
@@ -147,7 +145,32 @@ def _limits() -> dict[str, Any]:
     }
     named["POINTS_OF_SECTION"] = (*AT_ONCE, *LATER)
     named["ENERGIES"] = [field.name for field in fields(Ledger)]
+    named["LINE"] = _line()
     return named | {"PREVIEW": {"true": PREVIEW_BY_VOLTAGE, "false": PREVIEW}}
+
+
+def _line() -> dict[str, Any]:
+    """Return font, head and limits of the printed line."""
+    from printhammer.printing.dots import lettering
+    from printhammer.printing.dots.judging import FAULTS, PRESETS
+    from printhammer.printing.dots.strategy import FIRST_SLOT
+    from printhammer.printing.page.page import head_of
+
+    head, limits = head_of(lettering.WIRES), PRESETS["slots"]
+    drawn = {
+        mark: ["".join(".#"[int(dot)] for dot in row) for row in dots]
+        for mark, dots in lettering.glyphs().items()
+    }
+    return {
+        "font": {"glyphs": drawn, "columns": lettering.COLUMNS, "name": lettering.NAME},
+        "head": {
+            "numbers": [head.pitch, head.wire_pitch, head.line_pitch, head.density],
+            "wire": head.wire_diameter,
+        },
+        "limits": [limits.force, limits.arrival, limits.extra_contacts],
+        "faults": FAULTS,
+        "first": FIRST_SLOT,
+    }
 
 
 def _hammer(shelf: Shelf, name: str, modules: dict[str, str]) -> dict[str, Any]:

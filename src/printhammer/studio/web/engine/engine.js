@@ -4,9 +4,9 @@ import { codesOf, pictureOf } from "./map.js";
 import { checkConstant, readFile, readState, Refusal, taken } from "./read.js";
 import { textsOf } from "./texts.js";
 
-const MAP = ["hammer", "text", "constants", "waveform", "pattern", "pulses", "overlap", "low", "high"];
-const SECTION = ["hammer", "text", "constants", "waveform", "rate", "overlap"];
-const LATER = ["line"]; // views that are not computed here
+const DEVICE = ["hammer", "text", "constants", "waveform"];
+const KEYS = { map: [...DEVICE, "pattern", "pulses", "overlap", "low", "high"], strobe: [...DEVICE, "rate", "overlap"], line: [...DEVICE, "rate", "line", "overlap"] };
+const WORKS = { strobe: "section", line: "line" };
 const QUESTIONS = ["curves", "dots", "exponent", "verdict"];
 const BEFORE = "this still belongs to what was set before";
 const NOT_YET = "being computed";
@@ -16,9 +16,10 @@ const NOTHING = { map: { detail: "none" }, strobe: { verdict: null } };
 export function engineOf(shelf, script, receive, page) {
   const crew = crewOf(script, shelf);
   let latest = null; // the newest state, with its number
-  const map = { shown: null, whole: null, serial: 0 };
-  const keyOf = (state, names = MAP) => JSON.stringify(names.map((name) => state[name]));
-  const strobe = { shown: null, whole: null };
+  let drawn = 0; // the number of the newest state whose map is drawn
+  const [shown, whole] = [{}, {}]; // the keys of what views show, and of what is complete
+  const keyOf = (state, names) => JSON.stringify(names.map((name) => state[name]));
+  const isWanted = (state, view) => state.views.includes(view) && (view !== "line" || state.line.trim());
   const refuse = (serial, reason) => receive({ kind: "refusal", serial, reason: reason.slice(0, shelf.limits.LONGEST_REASON), data: {} });
 
   /** Read a state and check what can be checked without its run. */
@@ -39,50 +40,44 @@ export function engineOf(shelf, script, receive, page) {
       if (!answer) return;
       if (answer.reason) { refuse(serial, answer.reason); return; }
       const outdated = {};
-      if (state.views.includes("map") && map.shown !== keyOf(state)) outdated.map = map.shown ? BEFORE : NOT_YET;
-      if (state.views.includes("strobe") && strobe.shown !== keyOf(state, SECTION)) outdated.strobe = strobe.shown ? BEFORE : NOT_YET;
+      for (const [view, names] of Object.entries(KEYS)) if (isWanted(state, view) && shown[view] !== keyOf(state, names)) outdated[view] = shown[view] ? BEFORE : NOT_YET;
       const [motion, dots] = answer.frames;
       receive({ ...motion, serial, outdated });
       receive({ ...dots, serial });
-      for (const view of LATER) if (state.views.includes(view) && (view !== "line" || state.line.trim())) receive({ kind: view, serial, reason: shelf.sentences[view], ...NOTHING[view], data: {} });
-      if (state.views.includes("map") && map.whole !== keyOf(state)) draw(serial, state);
-      if (state.views.includes("strobe") && strobe.whole !== keyOf(state, SECTION)) follow(serial, state);
+      const isBehind = (view) => isWanted(state, view) && whole[view] !== keyOf(state, KEYS[view]);
+      if (isBehind("map")) draw(serial, state);
+      if (isBehind("line")) follow(serial, state, "line", [{}]);
+      if (isBehind("strobe")) follow(serial, state, "strobe", shelf.limits.POINTS_OF_SECTION.map((points) => ({ points })));
     });
   }
 
-  /** Follow an endless train: more and more of its points, until the state is replaced. */
-  async function follow(serial, state) {
-    for (const points of shelf.limits.POINTS_OF_SECTION) {
-      const answer = await new Promise((done) => { crew.send("map", "section", state, { points }, () => latest === serial, done); });
+  /** Order a view that is behind: once, or step by step, until the state is replaced. */
+  async function follow(serial, state, view, steps) {
+    for (const more of steps) {
+      const answer = await new Promise((done) => { crew.send("map", WORKS[view], state, more, () => latest === serial, done); });
       if (!answer || latest !== serial) return;
-      strobe.shown = keyOf(state, SECTION);
-      receive(answer.reason ? { kind: "strobe", serial, reason: answer.reason, ...NOTHING.strobe, data: {} } : { ...answer.frames[0], last: shelf.limits.POINTS_OF_SECTION.at(-1), serial });
+      shown[view] = keyOf(state, KEYS[view]);
+      receive(answer.reason ? { kind: view, serial, reason: answer.reason, ...NOTHING[view], data: {} } : { ...answer.frames[0], ...(view === "strobe" ? { last: steps.at(-1).points } : {}), serial });
       if (answer.reason) return;
     }
-    strobe.whole = strobe.shown;
+    whole[view] = shown[view];
   }
 
   /** Draw the map of a state: coarse at once, then whole, unless the state is replaced meanwhile. */
   async function draw(serial, state) {
-    const key = keyOf(state);
-    if (state.low >= state.high) {
-      receive({ kind: "map", serial, reason: `map: rates from ${state.low} Hz to ${state.high} Hz: expected ascending ones`, ...NOTHING.map, data: {} });
-      return;
-    }
-    map.serial = serial;
+    const key = keyOf(state, KEYS.map);
+    const empty = (reason) => receive({ kind: "map", serial, reason, ...NOTHING.map, data: {} });
+    if (state.low >= state.high) { empty(`map: rates from ${state.low} Hz to ${state.high} Hz: expected ascending ones`); return; }
+    drawn = serial;
     // A coarse map is delivered even while a slider moves; of several that wait, the newest.
-    const sizes = [[shelf.limits.PREVIEW[shelf.hammers[state.hammer].circuit], () => map.serial === serial], [shelf.limits.FULL, () => latest === serial]];
-    for (const [size, wanted] of sizes) {
-      const whole = size === shelf.limits.FULL;
-      const parts = await pictureOf(crew, state, size, whole, wanted);
+    const sizes = [[shelf.limits.PREVIEW[shelf.hammers[state.hammer].circuit], false, () => drawn === serial], [shelf.limits.FULL, true, () => latest === serial]];
+    for (const [size, full, wanted] of sizes) {
+      const parts = await pictureOf(crew, state, size, full, wanted);
       if (!parts) return;
-      if (parts.reason) {
-        receive({ kind: "map", serial, reason: parts.reason, ...NOTHING.map, data: {} });
-        return;
-      }
-      map.shown = key;
-      if (whole) map.whole = key;
-      receive({ detail: whole ? "full" : "preview", ...await codesOf(crew, parts, state), serial });
+      if (parts.reason) { empty(parts.reason); return; }
+      receive({ detail: full ? "full" : "preview", ...await codesOf(crew, parts, state), serial });
+      shown.map = key;
+      if (full) whole.map = key;
     }
   }
 

@@ -7,29 +7,38 @@ const STATE = 8; // columns of a state at which a run begins
 const STRETCH = [2048, 256]; // rows of nodes and of contacts of one stretch of a run
 const CARRY = 32; // size of the state of a run
 
-/** Integrate runs from rest, each with as many firings as the others, to a common end; return what is kept of them. */
-export function many(kernel, posed, firings, each, end, { grid = [], strobes = [], dots = false, most, control = posed.control }) {
-  const runs = firings.shape[0] / each;
-  const starts = (step) => kernel.copy("i", Array.from({ length: runs + 1 }, (_, k) => k * step));
+/** Return where the rows of runs begin, and after the last one where they end. */
+export function startsOf(kernel, counts) {
+  const starts = kernel.array("i", counts.length + 1);
+  counts.reduce((at, count, k) => (starts.values[k + 1] = at + BigInt(count)), 0n);
+  return starts;
+}
+
+/** Integrate runs from rest with `counts` firings each, to their ends; `room` is that for dots of each. Return what is kept of them. */
+export function many(kernel, posed, firings, counts, ends, { grid = [], strobes = [], room = null, most, control = posed.control }) {
+  const runs = counts.length;
+  const starts = (step) => startsOf(kernel, counts.map(() => step));
+  const each = Math.max(...counts);
+  const rows = room ?? counts.map(() => 0);
   const states = new Float64Array(runs * STATE);
   for (let k = 0; k < runs; k += 1) states.set([0, posed.rest, 0, -1, 0, 0, 0, NaN], k * STATE);
   const batch = {
     hammer_of: kernel.array("i", runs), hammers: { letter: "f", at: posed.constants.at, shape: [1, posed.constants.shape[0]] },
     controls: kernel.copy("f", control, 1, 4), bounds: kernel.copy("f", posed.bounds, 1, 4), waveform_of: kernel.array("i", runs),
-    piece_starts: kernel.copy("i", [0, posed.pieces.shape[0]]), pieces: posed.pieces, rates: kernel.array("f", 1, 3), firing_starts: starts(each),
+    piece_starts: kernel.copy("i", [0, posed.pieces.shape[0]]), pieces: posed.pieces, rates: kernel.array("f", 1, 3), firing_starts: startsOf(kernel, counts),
     firings, begins: kernel.array("i", firings.shape[0]), replace: posed.replace, states: kernel.copy("f", states, runs, STATE),
-    ends: kernel.copy("f", new Float64Array(runs).fill(end)), max_steps: most,
+    ends: kernel.copy("f", ends), max_steps: most,
   };
   const kept = {
-    strobe_starts: starts(strobes.length / runs), strobe_times: kernel.copy("f", strobes), grid: kernel.copy("f", grid), want_dots: dots, status: kernel.array("i", runs),
-    reached: kernel.array("f", runs), steps: kernel.array("i", runs), extra: kernel.array("i", runs), dot_starts: starts(dots ? each : 0),
-    dots: kernel.array("f", dots ? firings.shape[0] : 0, ROW), strobes: kernel.array("f", strobes.length, posed.circuit ? 7 : 4), x: kernel.array("s", runs, grid.length),
+    strobe_starts: starts(strobes.length / runs), strobe_times: kernel.copy("f", strobes), grid: kernel.copy("f", grid), want_dots: room !== null, status: kernel.array("i", runs),
+    reached: kernel.array("f", runs), steps: kernel.array("i", runs), extra: kernel.array("i", runs), dot_starts: startsOf(kernel, rows),
+    dots: kernel.array("f", rows.reduce((sum, count) => sum + count, 0), ROW), strobes: kernel.array("f", strobes.length, posed.circuit ? 7 : 4), x: kernel.array("s", runs, grid.length),
   };
   let [nodes, contacts] = STRETCH;
   for (let done = 0; done < runs;) {
     const which = Array.from({ length: runs - done }, (_, k) => done + k);
-    const room = () => [kernel.array("i", 2, each), kernel.array("f", 2, 3 + 7 * each), kernel.array("f", nodes, posed.width), kernel.array("f", contacts, 7), kernel.array("f", CARRY)];
-    [done] = kernel.temporarily(() => kernel.call("members", kernel.copy("i", which), batch, kept, ...room())).map((count) => done + count);
+    const space = () => [kernel.array("i", 2, each), kernel.array("f", 2, 3 + 7 * each), kernel.array("f", nodes, posed.width), kernel.array("f", contacts, 7), kernel.array("f", CARRY)];
+    [done] = kernel.temporarily(() => kernel.call("members", kernel.copy("i", which), batch, kept, ...space())).map((count) => done + count);
     [nodes, contacts] = [4 * nodes, 4 * contacts];
   }
   return kept;
@@ -46,7 +55,8 @@ export function piece(kernel, hammer, state, limits, { rates, columns, wanted })
     kernel.call("map_rates", 0, end, grid);
     const [starts, firings] = [kernel.array("i", rates.length + 1), kernel.array("f", rates.length * fired.length)];
     kernel.call("map_trains", kernel.copy("f", rates), kernel.copy("i", fired), Boolean(state.pattern), starts, firings);
-    const kept = many(kernel, posed, firings, fired.length, end, { grid: grid.values.slice(), dots: wanted, most: limits.MOST_MAP_STEPS });
+    const counts = rates.map(() => fired.length);
+    const kept = many(kernel, posed, firings, counts, rates.map(() => end), { grid: grid.values.slice(), room: wanted ? counts : null, most: limits.MOST_MAP_STEPS });
     const struck = wanted ? kernel.array("i", firings.shape[0]) : null;
     if (struck) kernel.call("map_struck", kept.dots, kept.dot_starts, fired.length, struck);
     return { end, places: posed.places, x: kept.x.values.slice(), ok: Array.from(kept.status.values, (code) => code === 0n), struck: struck && Uint8Array.from(struck.values, Number) };
@@ -81,7 +91,7 @@ export function section(kernel, hammer, state, limits, points) {
   return kernel.temporarily(() => {
     const posed = pose(kernel, hammer, state, limits);
     const times = firingsOf(kernel, { ...state, pattern: "", pulses: points + 1 });
-    const kept = many(kernel, posed, kernel.copy("f", times), times.length, times.at(-1), { strobes: times, most: limits.MOST_SECTION_STEPS * Math.ceil(points / 25), control: posed.exact });
+    const kept = many(kernel, posed, kernel.copy("f", times), [times.length], [times.at(-1)], { strobes: times, most: limits.MOST_SECTION_STEPS * Math.ceil(points / 25), control: posed.exact });
     const width = kept.strobes.shape[1];
     const column = (k) => Float32Array.from({ length: points }, (_, row) => kept.strobes.values[row * width + k]);
     return { kind: "strobe", status: STATUS[Number(kept.status.values[0])], rate: state.rate, verdict: null, exponent: null, unjudged: true, last: points, reason: "", data: { x: column(0), v: column(1) } };

@@ -1,5 +1,6 @@
 // A worker: it has the kernels of the hammers it was sent, and answers one order after the other.
 import { Kernel } from "./call.js";
+import { line } from "./line.js";
 import { codes, piece, section } from "./many.js";
 import { curves } from "./pictures.js";
 import { Refusal } from "./read.js";
@@ -11,6 +12,7 @@ const WORKS = {
   curves: (kernel, hammer, { state }) => curves(kernel, hammer, state, limits),
   piece: (kernel, hammer, { state, part }) => [piece(kernel, hammer, state, limits, part)],
   codes: (kernel, _hammer, { part }) => [codes(kernel, part)],
+  line: (kernel, hammer, { state }) => [line(kernel, hammer, state, limits)],
   section: (kernel, hammer, { state, points }) => [section(kernel, hammer, state, limits, points)],
 };
 
