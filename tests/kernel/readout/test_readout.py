@@ -12,11 +12,19 @@ from hypothesis import strategies as st
 import printhammer as ph
 from printhammer.chaos.orbits import settled
 from printhammer.chaos.orbits.settled import _by_states, shown
-from printhammer.chaos.strobe.verdict import AGREEMENT, LARGEST_PERIOD, period_of, repeats
-from printhammer.derivatives.states import standard_error
+from printhammer.chaos.strobe.train import pack_branches
+from printhammer.chaos.strobe.verdict import (
+    AGREEMENT,
+    LARGEST_PERIOD,
+    SIGNIFICANT,
+    period_of,
+    repeats,
+    verdict,
+)
+from printhammer.derivatives.states import Exponent, standard_error
 from printhammer.drive.batch import PulseTrains, Ragged
 from printhammer.drive.waveforms.shapes import Rectangle
-from printhammer.kernel.model.modes import BACKSTOP_SURFACE, PACK_SURFACE
+from printhammer.kernel.model.modes import BACKSTOP_SURFACE, LOADING, PACK_SURFACE, UNLOADING
 from printhammer.kernel.readout import codes, contacts, curves, energy, line, section
 from printhammer.printing.dots.judging import PRESETS
 from printhammer.printing.dots.strategy import FIRST_SLOT, slot_times
@@ -134,7 +142,8 @@ def test_the_distances_of_repeats_are_those_of_the_verdict(count: int, period: i
     found = section.write_distances(states, branches, scales, out)
     expected = repeats(states, branches, scales[:3])
     np.testing.assert_array_equal(out, expected)
-    assert (found or None) == period_of(expected)
+    assert (found[0] or None) == period_of(expected)
+    assert found[1] == (int(np.argmin(expected)) + 1 if np.isfinite(expected).any() else 0)
 
 
 @given(
@@ -162,9 +171,39 @@ def test_the_states_decide_the_period_as_in_the_library(
     assert section.settled_period(states, scales, agreed, False) == (by_states or 0)
 
 
+def test_states_of_a_section_are_those_of_the_library() -> None:
+    strobes = np.array([[2.0, 1.0, UNLOADING, 3.0], [1.0, -1.0, UNLOADING, 0.0], [2.0, 0.0, LOADING, 0.0]])
+    states, branches = np.empty((3, 3)), np.empty(3, np.int64)
+    section.write_states(strobes, 1.5, states, branches)
+    np.testing.assert_array_equal(states, strobes[:, [0, 1, 3]])
+    np.testing.assert_array_equal(branches, pack_branches(strobes[:, 0], strobes[:, 2].astype(int), 1.5))
+
+
+@given(
+    st.integers(0, 3),
+    st.booleans(),
+    st.sampled_from([-math.inf, -0.1, 0.01, 0.2]),
+    st.booleans(),
+    st.integers(0, 3),
+)
+def test_a_class_is_that_of_the_verdict(
+    agreed: int, proved: bool, value: float, smooth: bool, rests: int
+) -> None:
+    distances = np.full(LARGEST_PERIOD, 1.0)
+    if agreed:
+        distances[agreed - 1] = 0.0
+    factors = np.array([-math.inf] * rests + [0.1])
+    exponent = Exponent(value, 0.02, value, 1.0, factors, smooth, "ok")
+    reached = settled.Settled(agreed if proved else None, np.zeros((0, 2)))
+    judged = verdict(distances, (1, 100), 1e-9, exponent, settled=reached if agreed else None)
+    code = section.class_of(agreed, agreed * proved, value, 0.02, smooth, rests)
+    names = {section.SUPERSTABLE: "superstable", section.STRANGE: "strange"}
+    assert judged.name == (f"period-{code}" if code > 0 else names.get(code, "undecided"))
+
+
 def test_the_limits_of_settled_states_are_those_of_the_library() -> None:
-    own = (section.AGREES, section.DISTINCT, section.SHRINKS, section.NOISE)
-    assert own == (settled.AGREES, settled.DISTINCT, settled._SHRINKS, settled._NOISE)
+    own = (section.AGREES, section.DISTINCT, section.SHRINKS, section.NOISE, section.SIGNIFICANT)
+    assert own == (settled.AGREES, settled.DISTINCT, settled._SHRINKS, settled._NOISE, SIGNIFICANT)
 
 
 def kept_of(hammer: ph.Hammer, trains: PulseTrains, ends: Any) -> Any:

@@ -7,7 +7,11 @@ from typing import Any
 
 FEWEST = 8
 """Smallest number of growth factors from which a standard error is estimated."""
+SIGNIFICANT = 3.0
+"""Number of standard errors by which the exponent of a strange motion exceeds zero."""
 
+UNPROVED, SUPERSTABLE, RESTS_ONCE, KINKED, STRANGE, UNCERTAIN = -1, -2, -3, -4, -5, -6
+"""Codes of the classes without a period, see :func:`class_of`."""
 
 AGREES, DISTINCT = 1e-8, 1e-3
 """Distances, in units of the scales, below which states agree completely and above which they differ by more
@@ -16,8 +20,59 @@ SHRINKS, NOISE = 1e-5, 1e-9
 """Smallest decreases of a distance that count as shrinking: relative, and absolute in units of the scales."""
 
 
-def write_exponent(growth: Any, work: Any, out: Any) -> None:
-    """Write mean and standard error of the largest growth per firing to `out`, shape (2,).
+def write_states(strobes: Any, front: float, states: Any, branches: Any) -> None:
+    """Write the states of a strobe section and the branch of the pack's law of each, 0 outside the pack.
+
+    Parameters
+    ----------
+    strobes : float64 array, shape (n, 4), with a circuit (n, 7)
+        Strobes, see :mod:`printhammer.kernel.single.stretch`.
+    front : float
+        Front of the pack [m].
+    states : float64 array, shape (n, 3), with a circuit (n, 4)
+        Output: displacement [m], velocity [m/s] and memory [m]; with a circuit also the coil current [A].
+    branches : int64 array, shape (n,)
+        Output.
+    """
+    for i in range(strobes.shape[0]):
+        states[i, 0], states[i, 1], states[i, 2] = strobes[i, 0], strobes[i, 1], strobes[i, 3]
+        if states.shape[1] > 3:
+            states[i, 3] = strobes[i, 4]
+        branches[i] = int(strobes[i, 2]) if strobes[i, 0] > front else 0
+
+
+def class_of(agreed: int, settled: int, value: float, error: float, smooth: bool, rests: int) -> int:
+    """Classify a motion by its states and its exponent; return its period or a code.
+
+    Parameters
+    ----------
+    agreed, settled : int
+        Period in which the states agree, and the period that they prove, 0 for none.
+    value, error : float
+        Largest exponent per firing and its standard error; used only without a period.
+    smooth : bool
+        Whether the motion has a derivative.
+    rests : int
+        Number of firings after which the armature came to rest on the backstop.
+
+    Returns
+    -------
+    int
+        The proved period; `UNPROVED` if the states agree but still move; `SUPERSTABLE` or `RESTS_ONCE` if the
+        motion forgets its past; `KINKED` without a derivative; `STRANGE` with a positive exponent; else
+        `UNCERTAIN`.
+    """
+    if agreed > 0:
+        return settled if settled > 0 else UNPROVED
+    if value == -math.inf:
+        return SUPERSTABLE if rests > 1 else RESTS_ONCE
+    if not smooth:
+        return KINKED
+    return STRANGE if value > SIGNIFICANT * error else UNCERTAIN
+
+
+def write_exponent(growth: Any, work: Any, out: Any) -> int:
+    """Write mean and standard error of the largest growth per firing to `out`; return the number of rests.
 
     The standard error of the mean of the n autocorrelated numbers is that of overlapping batch means, see
     `printhammer.derivatives.states.standard_error`: infinite for fewer than eight numbers or if a number
@@ -31,15 +86,22 @@ def write_exponent(growth: Any, work: Any, out: Any) -> None:
         Working space.
     out : float64 array, shape (2,)
         Output.
+
+    Returns
+    -------
+    int
+        Number of factors that are minus infinity, i.e. of rests on the backstop that erase the past.
     """
-    n = growth.shape[0]
+    n, rests = growth.shape[0], 0
     mean = 0.0
     for i in range(n):
         mean += growth[i, 0]
+        if growth[i, 0] == -math.inf:
+            rests += 1
     mean /= max(n, 1)
     out[0], out[1] = mean, math.inf
     if n < FEWEST or not math.isfinite(mean):
-        return
+        return rests
     b = int(math.sqrt(n))
     b -= 1 if b * b > n else 0
     work[0] = 0.0
@@ -50,10 +112,11 @@ def write_exponent(growth: Any, work: Any, out: Any) -> None:
         batch = (work[i + b] - work[i]) / b
         squares += batch * batch
     out[1] = math.sqrt(b / ((n - b) * (n - b + 1.0)) * squares)
+    return rests
 
 
-def write_distances(states: Any, branches: Any, scales: Any, distances: Any) -> int:
-    """Write the largest distance of states q firings apart; return the smallest q that repeats.
+def write_distances(states: Any, branches: Any, scales: Any, distances: Any) -> tuple[int, int]:
+    """Write the largest distance of states q firings apart; return the q that repeats and the nearest q.
 
     Parameters
     ----------
@@ -69,11 +132,11 @@ def write_distances(states: Any, branches: Any, scales: Any, distances: Any) -> 
 
     Returns
     -------
-    int
-        Smallest q at which all states agree; 0 if there is none.
+    tuple
+        Smallest q at which all states agree, and the q of the smallest distance; 0 if there is none.
     """
     n, parts = states.shape
-    period = 0
+    period, nearest, least = 0, 0, math.inf
     for place in range(distances.shape[0]):
         q = place + 1
         largest = 0.0 if q <= n // 2 else math.inf
@@ -87,7 +150,9 @@ def write_distances(states: Any, branches: Any, scales: Any, distances: Any) -> 
         distances[place] = largest
         if period == 0 and largest <= scales[parts]:
             period = q
-    return period
+        if largest < least:
+            nearest, least = q, largest
+    return period, nearest
 
 
 def mean_apart(states: Any, scales: Any, count: int, period: int, late: bool) -> float:

@@ -46,8 +46,10 @@ _ENTRIES: Final[dict[str, tuple[Any, ...]]] = {
         1,
     ),
     "line_totals": (line.write_totals, ("f2", "i1", "f1")),
-    "exponent": (section.write_exponent, ("f2", "f1", "f1")),
-    "distances": (section.write_distances, ("f2", "i1", "f1", "f1"), 1),
+    "exponent": (section.write_exponent, ("f2", "f1", "f1"), 1),
+    "section": (section.write_states, ("f2", "f", "f2", "i1")),
+    "distances": (section.write_distances, ("f2", "i1", "f1", "f1"), 2),
+    "classify": (section.class_of, ("i", "i", "f", "f", "b", "i"), 1),
     "settled": (section.settled_period, ("f2", "f1", "i", "b"), 1),
 }
 """Functions by name, with the types of their arguments (as in `printhammer.kernel.compile.calls.Signature`),
