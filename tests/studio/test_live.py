@@ -19,7 +19,7 @@ from printhammer.studio.bundle import merged
 from printhammer.studio.live import content_of, live_page
 from printhammer.studio.states.controls import fields_of
 from printhammer.studio.states.shelf import Shelf
-from printhammer.studio.states.state import READERS, ProtocolError, read_state
+from printhammer.studio.states.state import READERS, VIEWS, ProtocolError, read_state
 
 NAME = "hendriks-1983-1"
 
@@ -140,7 +140,7 @@ WHOLE += (
 def live(written: Path, opened_browser: Any) -> Any:
     page = opened_browser()
     page.size(1280, 720)
-    page.open(written.as_uri())
+    page.open(f"{written.as_uri()}#views={'-'.join(VIEWS)}")
     page.wait(WHOLE)
     yield page
     assert page.complaints == []
@@ -182,6 +182,28 @@ def test_a_rate_is_followed_and_a_superseded_state_dropped(live: Page) -> None:
     live.run("window.studio.studio.store.set({ pattern: '1101' }); 1")
     live.wait("window.studio.studio.frames.motion.fired.length === 3")
     live.wait(f"window.studio.studio.frames.map.pattern === '1101' && {WHOLE}")
+
+
+SHOWN = "[...document.querySelectorAll('.panel')].filter((each) => each.checkVisibility())"
+SHOWN += ".map((each) => each.classList[1])"
+
+
+@pytest.mark.slow
+def test_it_opens_with_four_views_and_on_a_phone_with_one(written: Path, opened_browser: Any) -> None:
+    for width, count in ((1440, 4), (390, 1)):
+        page = opened_browser()
+        page.size(width, 900)
+        page.open(written.as_uri())
+        page.wait("window.studio?.studio?.frames.map?.detail === 'full'")
+        assert len(page.run(SHOWN)) == count
+        half = page.box(".view-map")
+        assert half["width"] * half["height"] > 0.3 * width * 900
+        page.run("document.querySelector('[data-tab=forces]').click(); 1")
+        assert "view-forces" in page.run(SHOWN)
+        assert "view-map" not in page.run(SHOWN)
+        assert page.run("document.querySelector('.pinned').checkVisibility()") is (width == 390)
+        assert page.complaints == []
+        page.call("Page.close")
 
 
 @pytest.mark.slow

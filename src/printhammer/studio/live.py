@@ -71,6 +71,9 @@ _SENTENCES: Final = {
 }
 """What the page says of work that only Python does, by name."""
 
+OPENING: Final = ("motion", "sketch", "map", "line")
+"""Views with which a page opens: the map, and beside it the actuator, its curve and what it prints."""
+
 _START: Final[dict[str, Any]] = {
     "text": "",
     "constants": {},
@@ -113,6 +116,7 @@ def content_of(shelf: Shelf, *, hammers: bool = True) -> dict[str, Any]:
     shared = vocabulary()
     del shared["units"]
     table, notes = shelf.start
+    table = {"views": OPENING, **table}
     return {
         "version": __version__,
         "names": shelf.names,

@@ -21,10 +21,14 @@ export function buildControls(holder, studio) {
   };
 
   const drive = group(holder, "Drive", true);
-  add(drive, {
+  const rate = {
     id: "rate", name: "rate", hint: "Firings per second; a time between them is written 1/660us.", unit: "Hz", low: Math.min(50, start.low), high: 5000, log: true,
     get: (state) => state.rate, set: (value) => ({ rate: value }), reset: () => ({ rate: start.rate }),
-  });
+  };
+  add(drive, rate);
+  // On a phone the rate stays below the view.
+  studio.parts.pinned.replaceChildren();
+  add(studio.parts.pinned, { ...rate, id: "pinned rate" });
   add(drive, {
     id: "pulses", name: "pulses", hint: "Number of firings.", unit: "1", low: 1, high: studio.limits.pulses, whole: true,
     get: (state) => state.pulses, set: (value) => ({ pulses: value }), reset: () => ({ pulses: start.pulses }),

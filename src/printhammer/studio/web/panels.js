@@ -11,6 +11,8 @@ import { storyRow } from "./stories.js";
 import { tourOf } from "./tour.js";
 
 const TITLES = { motion: "Motion", sketch: "Actuator", map: "Frequency-time map", forces: "Forces", phase: "Phase plane", strobe: "Strobe", loops: "Loops of force", energy: "Energy per dot", line: "Printed line" };
+const SHORT = { motion: "Motion", sketch: "Actuator", map: "Map", forces: "Forces", phase: "Phase plane", strobe: "Strobe", loops: "Loops", energy: "Energy", line: "Line" };
+const NARROW = 820; // pixels, as in the style sheet
 /** The views of the opening, the large ones. */
 const OPENING = ["sketch", "motion", "line"];
 const PRESETS = {
@@ -72,7 +74,8 @@ export function layout(studio, makers) {
     out, button("open", "Open a hammer file or a measured CSV", () => file.click()), make("span", { class: "space" }), chooser, units,
     button("◐", "Light or dark (T)", () => studio.toggleTheme(), { class: "theme" }), button("?", "Keys (?)", () => studio.help(), { class: "help" }), file);
   const sheet = make("button", { type: "button", class: "sheet", "aria-expanded": "false", onclick: () => sheet.setAttribute("aria-expanded", String(side.classList.toggle("open"))) }, "Controls");
-  const side = make("aside", { class: "side", "aria-label": "controls" }, sheet, honesty, controls, hint);
+  const pinned = make("div", { class: "pinned" });
+  const side = make("aside", { class: "side", "aria-label": "controls" }, pinned, sheet, honesty, controls, hint);
   const stories = storyRow(studio);
   const tour = tourOf(studio, stories);
   const strip = make("nav", { class: "strip", "aria-label": "stories from the paper" }, make("span", { class: "what" }, "From the paper"), ...stories.buttons, make("button", { type: "button", class: "story tour", onclick: tour.begin }, "Tour, two minutes"), make("span", { class: "space" }), findRow(studio));
@@ -99,6 +102,21 @@ export function layout(studio, makers) {
 
   const panels = {};
   const captions = {};
+  // Beside the opening one view is the hero, chosen by a tab; on a phone every view is one.
+  const isNarrow = () => page.clientWidth < NARROW;
+  const tabs = make("div", { class: "tabs", role: "group", "aria-label": "large view" });
+  const tab = (name) => {
+    const { views } = studio.store.state;
+    const next = OPENING.includes(name) ? views : VIEWS.filter((view) => view === name || OPENING.includes(view));
+    if (next.join() !== views.join()) studio.store.set({ views: next });
+    if (isNarrow() && !panels[name].classList.contains("large")) enlarge(name);
+    mark();
+  };
+  const mark = () => {
+    const large = VIEWS.find((name) => panels[name].classList.contains("large"));
+    for (const each of tabs.children) each.setAttribute("aria-pressed", String(large ? each.dataset.tab === large : !panels[each.dataset.tab].hidden && !OPENING.includes(each.dataset.tab)));
+  };
+  grid.append(tabs);
   const opening = grid.appendChild(make("div", { class: "opening" }));
   // From above to below: what moves, its curve, what it prints.
   for (const name of VIEWS) {
@@ -108,6 +126,7 @@ export function layout(studio, makers) {
     const panel = make("section", { class: `panel view-${name}`, "aria-label": TITLES[name], hidden: true },
       make("h2", {}, make("span", {}, TITLES[name]), make("output", { class: "readout" }), leave, button("⤢", `Enlarge ${TITLES[name]}`, () => enlarge(name), { class: "enlarge" })), caption, body);
     (OPENING.includes(name) ? opening : grid).append(panel);
+    tabs.append(make("button", { type: "button", "aria-pressed": "false", "data-tab": name, class: OPENING.includes(name) ? "beside" : "", onclick: () => tab(name) }, SHORT[name]));
     panels[name] = panel;
     studio.views[name] = withReadout(name, makers[name](body, studio), panel, studio);
     leave.addEventListener("change", () => { leaveView(name, leave.value, body); leave.value = ""; });
@@ -132,6 +151,7 @@ export function layout(studio, makers) {
   function enlarge(name) {
     grid.classList.toggle("one", !panels[name].classList.contains("large"));
     for (const [other, panel] of Object.entries(panels)) panel.classList.toggle("large", other === name && grid.classList.contains("one"));
+    mark();
     keepFocus();
   }
   studio.enlarge = enlarge;
@@ -170,13 +190,17 @@ export function layout(studio, makers) {
     for (const each of chooser.children) each.setAttribute("aria-pressed", String(views.includes(each.dataset.view)));
     const others = views.filter((view) => !OPENING.includes(view)).length;
     const whole = others > 0 && views.length - others === OPENING.length;
+    // One view beside what moves, its curve and what it prints is the hero: it takes half.
+    grid.classList.toggle("with-hero", whole && others === 1);
+    if (whole && others === 1 && isNarrow() && !grid.classList.contains("one")) enlarge(views.find((view) => !OPENING.includes(view)));
+    mark();
     grid.classList.toggle("with-opening", whole);
     grid.style.setProperty("--rows", String(Math.ceil(others / 2)));
     grid.style.setProperty("--beside", String(Math.min(others, 2)));
     grid.dataset.count = String(views.length);
     keepFocus();
   };
-  return { page, bar, controls, hint, status, grid, dialog, hammers, honesty, layout: { show, enlarge } };
+  return { page, bar, controls, pinned, hint, status, grid, dialog, hammers, honesty, layout: { show, enlarge } };
 }
 
 /** Return a view that tells beside its title what is there at the time of the cursor. */

@@ -18,6 +18,7 @@ export function engineOf(shelf, script, receive, page) {
   let latest = null; // the newest state, with its number
   let drawn = 0; // the number of the newest state whose map is drawn
   const [shown, whole] = [{}, {}]; // the keys of what views show, and of what is complete
+  const seen = {}; // the numbers of the states that views show
   const keyOf = (state, names) => JSON.stringify(names.map((name) => state[name]));
   const isWanted = (state, view) => state.views.includes(view) && (view !== "line" || state.line.trim());
   const refuse = (serial, reason) => receive({ kind: "refusal", serial, reason: reason.slice(0, shelf.limits.LONGEST_REASON), data: {} });
@@ -53,9 +54,11 @@ export function engineOf(shelf, script, receive, page) {
 
   /** Order a view that is behind: once, or step by step, until the state is replaced. */
   async function follow(serial, state, view, steps) {
-    for (const more of steps) {
+    for (const [number, more] of steps.entries()) {
       const answer = await new Promise((done) => { crew.send("map", WORKS[view], state, more, () => latest === serial, done); });
-      if (!answer || latest !== serial) return;
+      // What was begun is shown while a slider moves on, unless something newer is.
+      if (!answer || serial < (seen[view] ?? 0) || (number && latest !== serial)) return;
+      seen[view] = serial;
       shown[view] = keyOf(state, KEYS[view]);
       receive(answer.reason ? { kind: view, serial, reason: answer.reason, ...NOTHING[view], data: {} } : { ...answer.frames[0], ...(view === "strobe" ? { last: steps.at(-1).points } : {}), serial });
       if (answer.reason) return;
