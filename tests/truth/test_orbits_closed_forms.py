@@ -4,12 +4,14 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from tests.hammers import MASS, interpreted, made_of, preload, rigid
 from tests.truth.impact_orbits import BouncingBall
 
 import printhammer as ph
 from printhammer.chaos import orbit
-from printhammer.chaos.orbits.collection import index_sums
+from printhammer.chaos.orbits.collection import fewest_missing, index_sums
 from printhammer.chaos.orbits.newton import Images, close_orbits
 from printhammer.chaos.orbits.orbit import multipliers_of
 from printhammer.chaos.orbits.search import shortest
@@ -208,6 +210,23 @@ def test_indices_of_all_orbits_add_up_to_one() -> None:
     # A fold adds a saddle and a node; a spiral counts as a node does, whether it winds in or out.
     pair = [(1, np.array([2.0, 0.1], complex)), (1, np.array([1.1 + 0.5j, 1.1 - 0.5j]))]
     assert index_sums([(1, np.array([0.3j, -0.3j])), *pair], 1) == {1: 1}
+
+
+@given(st.lists(st.tuples(st.integers(1, 4), st.floats(-3.0, 3.0)), max_size=8), st.data())
+def test_indices_never_ask_for_more_orbits_than_are_missing(
+    made: list[tuple[int, float]], data: st.DataObject
+) -> None:
+    """Leave out orbits of a complete list: one attractor, and pairs that folds add."""
+    multipliers = [(count, abs(size) + 1.01) for count, size in made]
+    pairs = [(count, np.array([end, 0.0], complex)) for count, size in multipliers for end in (0.5, size)]
+    complete = [(1, np.array([0.2, 0.1], complex)), *pairs]
+    assert set(index_sums(complete, 4).values()) == {1}
+    kept = data.draw(st.lists(st.booleans(), min_size=len(complete), max_size=len(complete)))
+    listed = [orbit for orbit, keep in zip(complete, kept, strict=True) if keep]
+    missing = fewest_missing(index_sums(listed, 4))
+    assert missing <= len(complete) - len(listed)
+    # Orbits of three firings without their partners.
+    assert fewest_missing({1: 1, 2: 1, 3: 10}) == 3
 
 
 @pytest.mark.slow

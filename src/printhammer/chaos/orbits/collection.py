@@ -59,6 +59,15 @@ def index_sums(orbits: Sequence[tuple[int, npt.NDArray[np.complex128]]], longest
     return sums
 
 
+def fewest_missing(sums: Mapping[int, int]) -> int:
+    """Compute the least number of missing orbits from the index sums by number of firings.
+
+    An orbit of d firings adds d or -d to the sums over the multiples of d firings, so that a sum over n
+    firings that differs from 1 by k lacks at least k / n orbits.
+    """
+    return max((math.ceil(abs(total - 1) / count) for count, total in sums.items()), default=0)
+
+
 def indices_add_up(regime: Regime) -> bool:
     """Whether theory makes the fixed-point indices sum to 1: no pack, and damping or a backstop."""
     hammer = regime.hammer
@@ -149,11 +158,11 @@ class Orbits(Result):
         """Estimated lower bound on the number of orbits that the search has missed.
 
         The larger of two bounds: f1 (f1 - 1) / (2 (f2 + 1)), with f1 and f2 the numbers of orbits reached
-        from exactly one and exactly two guesses (A. Chao, Scand. J. Statist. 11 (1984) 265); and the number
-        of periods, in firings, for which the fixed-point indices do not add up to 1.
+        from exactly one and exactly two guesses (A. Chao, Scand. J. Statist. 11 (1984) 265); and the least
+        number of orbits that the fixed-point indices lack, see `fewest_missing`.
         """
         once, twice = self.hits.count(1), self.hits.count(2)
-        return max(0.5 * once * max(once - 1, 0) / (twice + 1), float(len(self.incomplete)))
+        return max(0.5 * once * max(once - 1, 0) / (twice + 1), float(fewest_missing(self.indices)))
 
     @property
     def indices(self) -> dict[int, int]:
@@ -193,8 +202,10 @@ class Orbits(Result):
             )
             sure += "; orbits near no guess are not counted"
         if self.incomplete:
-            periods = ", ".join(map(str, self.incomplete))
-            sure += f"; orbits are missing: the indices over {periods} firings do not add up to 1"
+            sums = ", ".join(f"{self.indices[count]} over {count}" for count in self.incomplete)
+            sure += (
+                f"; orbits are missing: indices of fixed points add up to 1, those listed to {sums} firings"
+            )
         return f"{head}{f' ({what})' if what else ''}; {tried}{': ' if ends else ''}{'; '.join(ends)}{sure}"
 
     def notes(self) -> dict[str, Any]:
