@@ -61,6 +61,13 @@ def check_read_out(motion: Motion, call: Callable[..., Any]) -> None:
     dots = np.empty((firings.size, contacts.DOT_WIDTH))
     found = call("dots", firings, motion.end, rows, works, rests, dots)
     np.testing.assert_array_equal(dots[:found], fields_of(motion.dots).reshape(found, -1))
+    drive = problem.drive_arrays()
+    call("pack_peaks", record.contacts, nodes, drive, problem.constants, peaks)
+    call("contacts", record.contacts, nodes, peaks, increments, firings, rigid, work, rows)
+    call("loading", rows, nodes, increments, work, works, steps, starts, ends)
+    rests, again = problem.quadratures(record, steps, starts, ends), np.empty_like(dots)
+    assert call("dots", firings, motion.end, rows, works, rests, again) == found
+    np.testing.assert_allclose(again[:found], dots[:found], rtol=1e-9)
     sums, terms = np.empty(increments.shape[1] + 1), np.empty(15)
     call("sums", increments, work, sums)
     table = problem.resample(record, nodes[[0, -1], 0])

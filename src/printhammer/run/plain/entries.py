@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.drive import tables
 from printhammer.kernel.model.laws import Laws
-from printhammer.kernel.readout import codes, contacts, curves, energy, line, section
+from printhammer.kernel.readout import codes, contacts, curves, energy, line, peaks, section
 
 if TYPE_CHECKING:
     from printhammer.kernel.compile.modules import Module, WebModule
@@ -28,6 +28,12 @@ _ENTRIES: Final[dict[str, tuple[Any, ...]]] = {
     "curve_times": (curves.write_times, ("f2", "i", "i", "f1"), 1),
     "curves": (curves.write_curves, ("f2", "b", "s2", "f1")),
     "steps": (contacts.write_steps, ("f2", "i1", "f1", "f1")),
+    "pack_peaks": (
+        peaks.write_pack_peaks,
+        ("f2", "f2", ("f1", "i1", "f2", "b", "i1", "f1"), "f1", "f2"),
+        0,
+        True,
+    ),
     "contacts": (contacts.write_contacts, ("f2", "f2", "f2", "f2", "f1", "b", "f1", "f2")),
     "loading": (contacts.write_loading, ("f2", "f2", "f2", "f1", "f1", "i1", "f1", "f1")),
     "dots": (contacts.write_dots, ("f1", "f", "f2", "f1", "f2", "f2"), 1),

@@ -1,0 +1,43 @@
+"""Peaks of the pack contacts of a run, for its dots: much faster than the peaks of all contacts.
+
+Against a pack whose law has memory, the armature turns back at a node, which is the peak of the contact. Only
+other packs need the search of :func:`printhammer.kernel.single.resample.peaks`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from printhammer.kernel.model.layout import FRONT, Train
+from printhammer.kernel.model.modes import LOADING, PACK_SURFACE
+
+if TYPE_CHECKING:
+    from printhammer.kernel.model.forces import pack_force
+    from printhammer.kernel.model.laws import MEMORY
+    from printhammer.kernel.single.resample import peaks_of
+
+
+def write_pack_peaks(contacts: Any, nodes: Any, train: Any, hammer: Any, out: Any) -> None:
+    """Write time of largest depth, largest depth and peak force of m contacts to `out`, shape (m, 3).
+
+    For a contact with the backstop: the time of touch, and twice 0. Arguments as for
+    :func:`printhammer.kernel.single.resample.peaks`.
+    """
+    named = Train(*train)
+    for row in range(contacts.shape[0]):
+        contact = contacts[row]
+        out[row, 0], out[row, 1], out[row, 2] = contact[1], 0.0, 0.0
+        if int(contact[0]) != PACK_SURFACE:
+            continue
+        if MEMORY:
+            first = int(contact[5])
+            highest = first
+            i = first
+            while i + 1 < nodes.shape[0] and not nodes[i, 0] >= contact[3]:
+                i += 1
+                if nodes[i, 1] > nodes[highest, 1]:
+                    highest = i
+            out[row, 0], out[row, 1] = nodes[highest, 0], nodes[highest, 1] - hammer[FRONT]
+            out[row, 2] = -pack_force(nodes[highest, 1], 0.0, LOADING, 0.0, hammer)
+        else:
+            out[row, 0], out[row, 1], out[row, 2] = peaks_of(contact, nodes, named, hammer)
