@@ -253,7 +253,7 @@ def half_rise(waveform: Waveform) -> float:
     return end
 
 
-def _wanted() -> tuple[int, tuple[float, float]]:
+def _requirements() -> tuple[int, tuple[float, float]]:
     """Return the number of dots, and the limits of their relative force, that count as buzz printing."""
     band = claims()["buzz_printing"].band
     limits = (band["least_force_over_single"]["at_least"], band["largest_force_over_single"]["at_most"])
@@ -262,7 +262,7 @@ def _wanted() -> tuple[int, tuple[float, float]]:
 
 def buzz_search(context: Context) -> BuzzSearch:
     """Search for a train that buzz-prints; the result is cached."""
-    fewest, forces = _wanted()
+    fewest, forces = _requirements()
     return context.once("buzz", lambda: find_buzz_train(context.hammer, fewest=fewest, forces=forces))
 
 
@@ -315,7 +315,7 @@ def buzz_is_delicate(context: Context, claim: Claim) -> Measured:
     if train is None:
         return Measured({"cases_broken": None}, "There is no train to be broken.")
     change, shift = claim.settings["interval_change"], claim.settings["pack_front_shift_m"]
-    fewest, _ = _wanted()
+    fewest, _ = _requirements()
     counts = {
         f"interval {sign * change:+.0%}": _count(
             context, context.hammer, train, train.interval * (1.0 + sign * change)
@@ -343,4 +343,4 @@ def _count(context: Context, hammer: Hammer, train: BuzzTrain, interval: float) 
     if not force:
         return 0
     motion = context.attempt(PulseTrain(context.waveform, at=times), times[-1] + TAIL, hammer=hammer)
-    return len(longest_run(motion, force, _wanted()[1]).forces)
+    return len(longest_run(motion, force, _requirements()[1]).forces)

@@ -145,10 +145,14 @@ def _force_time(problem: Problem, record: Record, contact: Contact, t_peak: floa
     )
     t = t_in + float(best_force.x) * scale
     # Without damping the force peaks at the largest indentation, whose time is known more precisely.
-    return t_peak if abs(t - t_peak) < _NEAR * scale else _settled(problem, record, t, 1e-3 * (high - low))
+    return (
+        t_peak
+        if abs(t - t_peak) < _NEAR * scale
+        else _stationary_time(problem, record, t, 1e-3 * (high - low))
+    )
 
 
-def _settled(problem: Problem, record: Record, t: float, step: float) -> float:
+def _stationary_time(problem: Problem, record: Record, t: float, step: float) -> float:
     """Find the time near `t`, s, at which the pack force is stationary, by the secant method.
 
     A comparison of forces would locate the time to only half of the digits.

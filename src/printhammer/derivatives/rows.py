@@ -148,7 +148,9 @@ class _Maps:
         apart = np.stack([apart[:, 0, 0], apart[:, 1, 1]], axis=1) / self.scales[rows]
         states = shifted.reshape(-1, 2)
         images = np.full((len(places), 2), np.nan)
-        able = np.array([_possible(self.hammers[k], state) for k, state in zip(places, states, strict=True)])
+        able = np.array(
+            [_is_possible(self.hammers[k], state) for k, state in zip(places, states, strict=True)]
+        )
         able = np.repeat(able.reshape(-1, count).all(axis=1), count)
         if able.any():
             own = places[able]
@@ -196,7 +198,7 @@ def _travel(hammer: Hammer) -> float:
     return hammer.front - hammer.rest
 
 
-def _possible(hammer: Hammer, state: FloatArray) -> bool:
+def _is_possible(hammer: Hammer, state: FloatArray) -> bool:
     """Whether a displacement, m, and a velocity, m/s, are a valid initial state of a hammer."""
     try:
         initial_state(hammer, state.tolist())

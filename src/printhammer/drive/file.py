@@ -291,7 +291,7 @@ def _waveform(table: dict[str, Any], folder: Path, where: str) -> Waveform:
     if model is Chain:
         return _chain(data, folder, where)
     if model is Switched:
-        return _switched(data, where)
+        return _read_switched(data, where)
     if model is Sampled and "file" not in data:
         return _samples(data, where)
     notes = quantities(model)
@@ -335,7 +335,7 @@ def _chain(data: dict[str, Any], folder: Path, where: str) -> Chain:
         raise fault from None
 
 
-def _switched(data: dict[str, Any], where: str) -> Switched:
+def _read_switched(data: dict[str, Any], where: str) -> Switched:
     """Parse a switched waveform; the unit of its levels determines the driven quantity."""
     _known(data, {"at", "levels", "edge", "initial"}, where)
     _required(data, ("at", "levels", "edge"), where)

@@ -56,7 +56,7 @@ class PulseSequence(Drive):
         overlap: Overlap = "add",
         start: float | str = 0.0,
     ) -> None:
-        fired = _checked(waveforms)
+        fired = _validate(waveforms)
         times = read_times(at) + read_start(start)
         if times.size != len(fired):
             raise InputError(
@@ -202,7 +202,7 @@ class PulseSequence(Drive):
         return f"{len(self._tables)} waveform{'s' if len(self._tables) > 1 else ''} of {self.quantity}"
 
 
-def _checked(waveforms: Any) -> list[Waveform]:
+def _validate(waveforms: Any) -> list[Waveform]:
     """Validate the waveforms of a sequence: one common quantity, all finite in time."""
     try:
         fired = [] if isinstance(waveforms, Waveform) else list(waveforms)

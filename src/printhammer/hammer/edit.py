@@ -146,15 +146,15 @@ def changed(document: Mapping[str, Any], edits: Iterable[Edit]) -> dict[str, Any
             holder = result[section] = dict(result.get(section, {}))
         if isinstance(holder.get(name), Mapping):
             holder[name] = dict(holder[name])
-        _put(result, key, _copied(value), dict)
+        _put(result, key, _copy(value), dict)
     return result
 
 
-def _copied(value: Any) -> Any:
+def _copy(value: Any) -> Any:
     """Copy a parsed TOML value: tables and lists are copied, immutable scalars are not."""
     if isinstance(value, Mapping):
-        return {name: _copied(entry) for name, entry in value.items()}
-    return [_copied(entry) for entry in value] if isinstance(value, list) else value
+        return {name: _copy(entry) for name, entry in value.items()}
+    return [_copy(entry) for entry in value] if isinstance(value, list) else value
 
 
 def changed_text(text: str, edits: Iterable[Edit]) -> str:

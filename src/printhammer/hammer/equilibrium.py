@@ -79,7 +79,7 @@ def rest_state(hammer: HammerLike) -> float:
         position = hammer.backstop.position
         pressing = force.free(position)
         if pressing < 0.0:
-            rest = position if force.rigid else _compressed(force, position)
+            rest = position if force.rigid else _compressed_equilibrium(force, position)
             if rest is None:
                 because = f"at zero current the backstop is crushed down to {force.low:.6g} m"
                 raise InputError(
@@ -142,7 +142,7 @@ def equilibria(
         raise InputError(
             f"current = {current!r} {bounds}, where the law of the magnet holds", key="current", value=current
         )
-    resting = [_described(force, root, current) for root in _same_rest(force, current, within)]
+    resting = [_equilibrium_at(force, root, current) for root in _same_rest(force, current, within)]
     if force.rigid and hammer.backstop is not None:
         position = hammer.backstop.position
         inside = within is None or within[0] <= position <= within[1]
@@ -270,7 +270,7 @@ def equilibrium_picture(hammer: HammerLike, points: int = 241) -> EquilibriumPic
     )
 
 
-def _compressed(force: StaticForce, position: float, current: float = 0.0) -> float | None:
+def _compressed_equilibrium(force: StaticForce, position: float, current: float = 0.0) -> float | None:
     """Find the equilibrium nearest to the surface of an elastic backstop that the armature compresses."""
 
     def total(x: float) -> float:
@@ -287,7 +287,7 @@ def _compressed(force: StaticForce, position: float, current: float = 0.0) -> fl
     return None
 
 
-def _described(force: StaticForce, root: Root, current: float) -> Equilibrium:
+def _equilibrium_at(force: StaticForce, root: Root, current: float) -> Equilibrium:
     """Convert a root of the net force to an `Equilibrium`, with stability, frequency and surface."""
     stable = _is_stable(root, force)
     surface = None
@@ -334,7 +334,7 @@ def _same_rest(force: StaticForce, current: float, within: tuple[float, float] |
     backstop = force.hammer.backstop
     if backstop is None or force.rigid or not force.free(backstop.position, current) < 0.0:
         return crossings
-    rest = _compressed(force, backstop.position, current)
+    rest = _compressed_equilibrium(force, backstop.position, current)
     if rest is None:
         return crossings
     same = 1e-9 * (backstop.position - rest) + 4.0 * math.ulp(rest)

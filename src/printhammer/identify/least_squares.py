@@ -139,7 +139,7 @@ class Solution(Declared, eq=False):
     @property
     def rows(self) -> FloatArray:
         """Weighted Jacobian of the used rows and free parameters, with one extra row per prior."""
-        return _weighted(self.jacobian, self.variance, self.used, self.parameters, self.free)
+        return _weighted_jacobian(self.jacobian, self.variance, self.used, self.parameters, self.free)
 
 
 class NoSolutionError(ArithmeticError):
@@ -171,7 +171,7 @@ def solve(law: Law, data: FloatArray, start: FloatArray | Parameters, *, robust:
             with np.errstate(all="ignore"):
                 distances = np.abs(data - law.value(space.start))
             raise NoSolutionError(int(np.argmax(np.where(np.isnan(distances), np.inf, distances))))
-        weakest = _undetermined(solution, data)
+        weakest = _next_held(solution, data)
         if weakest is None:
             return solution
         free = free.copy()
@@ -203,7 +203,7 @@ def _at_bound(solution: Solution) -> BoolArray:
     return at_bound
 
 
-def _undetermined(solution: Solution, data: FloatArray) -> int | None:
+def _next_held(solution: Solution, data: FloatArray) -> int | None:
     """Return the index of the parameter to hold next; None if the data determine all free parameters."""
     space, free = solution.parameters, np.flatnonzero(solution.free)
     bound = [k for k in free.tolist() if _at_bound(solution)[k]]
@@ -281,7 +281,7 @@ def _solve(
         if robust and not exact:
             jacobian = law.jacobian(p)
             inside = _inside(jacobian[:, free], residuals, variance, used)
-            inside = _with_determining_rows(_weighted(jacobian, variance, None, space, free), inside)
+            inside = _with_determining_rows(_weighted_jacobian(jacobian, variance, None, space, free), inside)
             if inside.tobytes() in tried:
                 # Rows that alternate between in and out stay out.
                 inside &= used
@@ -321,7 +321,7 @@ def _with_determining_rows(rows: FloatArray, inside: BoolArray) -> BoolArray:
     return holding
 
 
-def _weighted(
+def _weighted_jacobian(
     jacobian: FloatArray, variance: FloatArray, used: BoolArray | None, space: Parameters, free: BoolArray
 ) -> FloatArray:
     """Return the weighted Jacobian of the free parameters, with one extra row per prior."""
@@ -346,7 +346,7 @@ def _solution(
     fitted = law.value(p)
     residuals, jacobian = data - fitted, law.jacobian(p)
     freedom = int(used.sum()) - int(free.sum())
-    rows = _weighted(jacobian, variance, used, space, free)
+    rows = _weighted_jacobian(jacobian, variance, used, space, free)
     errors = residuals[used] / np.sqrt(variance[used])
     singular = np.linalg.svd(rows / lengths_of(rows), compute_uv=False)
     condition = 1.0
@@ -457,7 +457,7 @@ def descend(
         return np.concatenate([(law.value(p)[used] - data[used]) / root, prior])
 
     def jacobian(values: FloatArray) -> FloatArray:
-        return _weighted(law.jacobian(full(values)), variance, used, space, free)
+        return _weighted_jacobian(law.jacobian(full(values)), variance, used, space, free)
 
     solution = least_squares(
         residuals,

@@ -96,16 +96,16 @@ def lowpass_waveform(segments: FloatArray, t: npt.ArrayLike, tau: float) -> Floa
         last = number + 1 == len(rows)
         end = math.inf if last else rows[number + 1][0]
         inside = (times >= row[0]) & (times < end)
-        here = _settled(row, np.zeros(1), tau)[0]
+        here = _particular_solution(row, np.zeros(1), tau)[0]
         s = times[inside] - row[0]
-        result[inside] = _settled(row, s, tau) + (left - here) * np.exp(-s / tau)
+        result[inside] = _particular_solution(row, s, tau) + (left - here) * np.exp(-s / tau)
         if not last:
             span = np.array([end - row[0]])
-            left = float(_settled(row, span, tau)[0] + (left - here) * math.exp(-span[0] / tau))
+            left = float(_particular_solution(row, span, tau)[0] + (left - here) * math.exp(-span[0] / tau))
     return result
 
 
-def _settled(row: list[float], s: FloatArray, tau: float) -> FloatArray:
+def _particular_solution(row: list[float], s: FloatArray, tau: float) -> FloatArray:
     """Return the particular solution of the low-pass filter for one segment, without the transient."""
     _start, kind, p0, p1, p2, p3 = row
     if kind == POLYNOMIAL:

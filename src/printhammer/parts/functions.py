@@ -55,7 +55,7 @@ def check_functions(part: Any, *, complete: bool = False) -> None:
             raise InputError(
                 f"{where}: {has}", file=where, key=name, expected=f"the function {name}({', '.join(wanted)})"
             )
-        if any("print" in function.__code__.co_names for function in _called(law)):
+        if any("print" in function.__code__.co_names for function in _callees(law)):
             # Machine code runs without the interpreter's lock, for which a print would wait.
             raise InputError.of(name, "print", "a law that prints nothing", file=where)
     forces = _FORCES[part.role]
@@ -68,7 +68,7 @@ def check_functions(part: Any, *, complete: bool = False) -> None:
         )
 
 
-def _called(law: Callable[..., Any]) -> list[FunctionType]:
+def _callees(law: Callable[..., Any]) -> list[FunctionType]:
     """Return the Python functions of a law: the law and all that it calls, directly or not."""
     waiting: list[object] = [law]
     functions: dict[FunctionType, None] = {}

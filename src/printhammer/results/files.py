@@ -242,12 +242,12 @@ def write_parquet(table: pd.DataFrame, path: str | Path) -> None:
 
 def _text(value: Any) -> str:
     """Encode an attribute as text: verbatim, or as JSON if the text would be read as number or list."""
-    if isinstance(value, str) and _decoded(value) == value == value.strip() and value.isprintable():
+    if isinstance(value, str) and _decode(value) == value == value.strip() and value.isprintable():
         return value
     return json.dumps(_strict(value), ensure_ascii=False)
 
 
-def _decoded(value: str, starts: str = '[{"-0123456789n') -> Any:
+def _decode(value: str, starts: str = '[{"-0123456789n') -> Any:
     """Decode an attribute encoded by `_text`."""
     if value[:1] and value[0] in starts:
         with suppress(ValueError):
@@ -365,7 +365,7 @@ def _read_arrays(source: Path) -> xr.Dataset:
     with xr.open_dataset(source, decode_times=False, **options) as opened:
         dataset = opened.load()
     for key, value in dataset.attrs.items():
-        dataset.attrs[key] = _decoded(value, "[{") if isinstance(value, str) else plain(value)
+        dataset.attrs[key] = _decode(value, "[{") if isinstance(value, str) else plain(value)
     return dataset
 
 
@@ -379,13 +379,15 @@ def _read_csv(source: Path) -> pd.DataFrame:
             f"{source}: expected a heading, and rows with the same number of cells", file=source, key="rows"
         )
     (_line, heads), *rows = sheet.rows
-    table = pd.DataFrame({head: _typed([cells[k] for _line, cells in rows]) for k, head in enumerate(heads)})
-    attributes = {key: _number(_decoded(value)) for key, value in sheet.comments.items()}
+    table = pd.DataFrame(
+        {head: _parse_column([cells[k] for _line, cells in rows]) for k, head in enumerate(heads)}
+    )
+    attributes = {key: _number(_decode(value)) for key, value in sheet.comments.items()}
     table.attrs.update(attributes)
     return table
 
 
-def _typed(cells: list[str]) -> Any:
+def _parse_column(cells: list[str]) -> Any:
     """Convert a column of text cells to exact numbers, Booleans or text."""
     if set(cells) <= {"True", "False"}:
         return np.array([cell == "True" for cell in cells])

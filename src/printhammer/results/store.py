@@ -159,13 +159,13 @@ class Store:
                     key=name,
                     expected=f"{asked}, or another folder for the results",
                 )
-        self._handle = _locked(self.path, self.path)
+        self._handle = _lock(self.path, self.path)
 
     def _create(self, now: str) -> None:
         """Create the arrays in a temporary folder, then rename the folder."""
         draft = self.path.with_name(f".{self.path.name}.part")
         draft.mkdir(exist_ok=True)
-        self._handle = _locked(draft, self.path)
+        self._handle = _lock(draft, self.path)
         for entry in draft.iterdir():
             shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
         files = {key: buffer.to_bytes() for key, buffer in self._encoded.items()}
@@ -287,7 +287,7 @@ def _chunk(name: str, index: Sequence[int]) -> str:
     return "/".join([name, "c", *(str(i) for i in index)])
 
 
-def _locked(folder: Path, named: Path) -> int:
+def _lock(folder: Path, named: Path) -> int:
     """Lock a folder against other processes; return the file handle that holds the lock."""
     try:
         import fcntl

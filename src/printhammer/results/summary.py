@@ -182,12 +182,12 @@ class Summary(tuple[str | Facts | Grid, ...]):
                 lines.append(rendered(each, system))
             elif isinstance(each, Facts):
                 lines += [each.title] * bool(each.title)
-                lines += _aligned([(name, rendered(said, system)) for name, said in each.known], "<<")
+                lines += _align([(name, rendered(said, system)) for name, said in each.known], "<<")
             else:
                 heads = [_plain_head(column, system) for column in each.columns]
                 cells = [[rendered(text) for text in row] for row in each.rows(system)]
                 lines += [each.title] * bool(each.title)
-                lines += _aligned([heads, *cells], "".join("<" if c.left else ">" for c in each.columns))
+                lines += _align([heads, *cells], "".join("<" if c.left else ">" for c in each.columns))
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
@@ -216,7 +216,7 @@ def _plain_head(column: Cells, system: System) -> str:
     return column.heading.replace("\n", " ") + (f" [{unit}]" if unit else "")
 
 
-def _aligned(rows: Sequence[Sequence[str]], sides: str) -> list[str]:
+def _align(rows: Sequence[Sequence[str]], sides: str) -> list[str]:
     """Format rows as lines with aligned columns."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return [

@@ -162,12 +162,12 @@ def computation(function: F) -> F:
         shown.append(rest.replace(annotation="Unpack[Firing]"))
     typed: Any = call
     typed.__signature__ = signature.replace(parameters=shown)
-    typed.__doc__ = _documented(function.__doc__ or "", [*names, "firing"] if fired else names)
+    typed.__doc__ = _with_entries(function.__doc__ or "", [*names, "firing"] if fired else names)
     result: F = typed
     return result
 
 
-def _documented(text: str, names: Sequence[str]) -> str:
+def _with_entries(text: str, names: Sequence[str]) -> str:
     """Return a docstring with missing parameter entries added at the end of its Parameters."""
     text = inspect.cleandoc(text)
     ends = [text.find(head) for head in ("\nprogress : ", "\n**firing\n", "\n\nReturns\n-", "\n\nRaises\n-")]

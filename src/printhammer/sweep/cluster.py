@@ -138,7 +138,7 @@ class _Tasks:
         try:
             future = self._done.get(timeout=_INTERVAL)
         except Empty:
-            self._watch()
+            self._check_workers()
             return None
         self._idle = 0.0
         index = self._futures.pop(future)
@@ -181,7 +181,7 @@ class _Tasks:
                 self._count = 0
         return self._count
 
-    def _watch(self) -> None:
+    def _check_workers(self) -> None:
         """Raise an error if the scheduler is unreachable, or has had no worker for `NO_WORKERS` seconds."""
         if self._client.status not in _ALIVE:
             raise _GoneError

@@ -41,7 +41,7 @@ def table(asked: list[tuple[list[float], Any]]) -> CompensationTable:
         return draft
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tuning, "_tuned", tuned)
+        patch.setattr(tuning, "_tune_rows", tuned)
         return tuning.tune(quick(), rates=RATES, history=1)
 
 

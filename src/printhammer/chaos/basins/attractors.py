@@ -111,7 +111,7 @@ class Attractors:
             points = self._scaled(columns.x[rows], columns.v[rows])
             clear = shown(points, q)
             places[rows[clear]] = self._periodic(points[clear, -q:])
-            places[rows[~clear]] = self._settling(points[~clear], q)
+            places[rows[~clear]] = self._match_settling(points[~clear], q)
         self._strange(columns, np.flatnonzero((cycles == 0) & (columns.status == OK)), places)
         return places
 
@@ -123,7 +123,7 @@ class Attractors:
     def _scaled(self, x: FloatArray, v: FloatArray) -> FloatArray:
         return np.stack([x, v], axis=-1) / self.scales[:2]
 
-    def _settling(self, points: FloatArray, q: int) -> IntArray:
+    def _match_settling(self, points: FloatArray, q: int) -> IntArray:
         """Match unsettled trains to the orbits that they approach; return indices in `found`, -1 if unknown.
 
         The scaled states, shape (n, points, 2), repeat after q firings.
@@ -212,7 +212,9 @@ class Attractors:
             cycles, _ = self._cycles(longer)
             q, points = int(cycles[0]), self._scaled(longer.x, longer.v)
             if q:
-                orbit = self._periodic(points[:, -q:]) if shown(points, q)[0] else self._settling(points, q)
+                orbit = (
+                    self._periodic(points[:, -q:]) if shown(points, q)[0] else self._match_settling(points, q)
+                )
                 return int(orbit[0])
             cloud = Cloud.of(points[0])
             late = points[0, CLOUD // 2 :]

@@ -217,7 +217,12 @@ class Bifurcation(Result, rows="direction column"):
             share = float(widths[hysteresis(self)].sum() / (widths.sum() or 1.0))
             lines.append(f"Up and down lead to different attractors at {100.0 * share:.2f} % of the range.")
         return Summary(
-            [*map(self._windows_grid, self.directions), *lines, *self._undecided(), *self._sensitive()]
+            [
+                *map(self._windows_grid, self.directions),
+                *lines,
+                *self._undecided_reasons(),
+                *self._sensitive(),
+            ]
         )
 
     def _value_text(self) -> tuple[Callable[[float], str], str]:
@@ -248,7 +253,7 @@ class Bifurcation(Result, rows="direction column"):
         ]
         return Grid(columns, direction, most=12)
 
-    def _undecided(self) -> list[str]:
+    def _undecided_reasons(self) -> list[str]:
         """List the reasons why trains that ran to the end are undecided, one sentence per reason."""
         undecided = (self.verdicts == "undecided") & (self.status == "ok")
         known = undecided & ~np.isnan(self.exponents)
@@ -318,7 +323,7 @@ class Bifurcation(Result, rows="direction column"):
 
         The default is the first direction; InputError if the diagram lacks the direction.
         """
-        return self._grouped(self._row(direction), range(len(self.values)))
+        return self._group(self._row(direction), range(len(self.values)))
 
     def routes(self, direction: str | None = None) -> tuple[Route, Route]:
         """Compute the routes to the first chaotic train, for rising and for falling parameter values.
@@ -340,11 +345,11 @@ class Bifurcation(Result, rows="direction column"):
             for place, k in enumerate(order):
                 before = order[:place]
                 if is_strange(k):
-                    return Route(way, tuple(self._grouped(row, before)), float(self.values[k]), True)
+                    return Route(way, tuple(self._group(row, before)), float(self.values[k]), True)
                 undecided += names[k] == "undecided"
                 if undecided > MOST_UNDECIDED:
-                    return Route(way, tuple(self._grouped(row, before)), None, False)
-            return Route(way, tuple(self._grouped(row, order)), None, True)
+                    return Route(way, tuple(self._group(row, before)), None, False)
+            return Route(way, tuple(self._group(row, order)), None, True)
 
         columns = range(len(names))
         return route("rising", columns), route("falling", columns[::-1])
@@ -357,7 +362,7 @@ class Bifurcation(Result, rows="direction column"):
             raise InputError.of("direction", direction, f"what the diagram has: {known}")
         return self.directions.index(direction)
 
-    def _grouped(self, row: int, order: Sequence[int]) -> list[Window]:
+    def _group(self, row: int, order: Sequence[int]) -> list[Window]:
         """Group neighbouring columns, listed in ascending or descending order, into windows."""
         names, cycles = self.verdicts[row].tolist(), self.cycles[row].tolist()
         widths = cells(self.values)

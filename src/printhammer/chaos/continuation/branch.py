@@ -84,7 +84,7 @@ class BranchEvent(Declared, eq=False):
 
 def event_of(point: BranchPoint, phase: float = 0.0) -> BranchEvent:
     """Convert a special point of a curve of fixed points to an event of a branch at a section phase."""
-    surface, change = ("", "") if point.sides is None else _grazing(point)
+    surface, change = ("", "") if point.sides is None else _grazing_of(point)
     return BranchEvent(
         kind="grazing" if point.kind == "change" else point.kind,
         value=point.parameter,
@@ -100,7 +100,7 @@ def event_of(point: BranchPoint, phase: float = 0.0) -> BranchEvent:
     )
 
 
-def _grazing(point: BranchPoint) -> tuple[str, str]:
+def _grazing_of(point: BranchPoint) -> tuple[str, str]:
     """Find the surface of a grazing, and the change of the contacts as the parameter grows."""
     assert point.sides is not None
     ordered = sorted(point.sides, key=lambda node: node.parameter)

@@ -206,13 +206,13 @@ class Search:
                 for period, both in enumerate(lists, 1):
                     tried = [guess for guesses in both for guess in self._batch(guesses, batch, period)]
                     seen.update(guess.states.tobytes() for guess in tried)
-                    tried += self._joined(different, period, (block, batch))
+                    tried += self._concatenate(different, period, (block, batch))
                     self._try(fast, different, tried, (block, batch))
                     self._tell(1)
         self._further(fast, different, records, seen)
         if indices_add_up(regime):
             self._complete(fast, different, records)
-        return self._refined(regime, different)
+        return self._refine(regime, different)
 
     def _further(self, fast: FastMaps, different: list[_Known], records: Records, seen: set[bytes]) -> None:
         """Try additional close returns: from longer motions, and from motions just after a touch.
@@ -229,7 +229,7 @@ class Search:
             begin = int(end)
             for period in range(1, self.longest + 1):
                 many = _share(self.batches[-1], period)
-                ways = [(parts[0], 2 * most) for most in _doubled(period, self.longest)]
+                ways = [(parts[0], 2 * most) for most in _doublings(period, self.longest)]
                 ways += [(part, firings_for(period)) for part in parts]
                 tried = {
                     guess.states.tobytes(): guess
@@ -264,7 +264,7 @@ class Search:
         begin, end = (_share(count, period) // 2 for count in (0, *self.batches)[batch : batch + 2])
         return guesses[begin:end]
 
-    def _joined(self, different: list[_Known], period: int, stage: tuple[int, int]) -> list[Guess]:
+    def _concatenate(self, different: list[_Known], period: int, stage: tuple[int, int]) -> list[Guess]:
         """Concatenate pairs of orbits available to a stage, except pairs that an earlier stage has tried."""
         block, batch = stage
         seen = [orbit for orbit in different if orbit.is_visible(block, batch)]
@@ -282,14 +282,14 @@ class Search:
         options = _FAST if isinstance(maps, FastMaps) else LONE
         for guess in tried:
             self.tried[int(guess.firings.sum()) - 1] += 1
-        for closing in _closed(maps, tried, self.scales, options):
+        for closing in _converge(maps, tried, self.scales, options):
             self._add(different, _Known(closing, [stage]))
 
-    def _refined(self, regime: Regime, different: list[_Known]) -> list[_Known]:
+    def _refine(self, regime: Regime, different: list[_Known]) -> list[_Known]:
         """Converge orbits again, with the requested tolerance."""
         exact = ExactMaps(regime, self.effort)
         refined: list[_Known] = []
-        closings = _closed(exact, [orbit.closing for orbit in different], self.scales, _EXACT)
+        closings = _converge(exact, [orbit.closing for orbit in different], self.scales, _EXACT)
         for orbit, closing in zip(different, closings, strict=True):
             self._add(refined, replace(orbit, closing=closing))
         return refined
@@ -381,7 +381,7 @@ class Search:
                 continue
             exact = ExactMaps(regime, self.effort)
             guess = _guess(replace(orbit, section=image), exact)
-            for closing in _closed(exact, [guess], self.scales, LONE):
+            for closing in _converge(exact, [guess], self.scales, LONE):
                 if closing.closed:
                     self._describe(described, [(regime, _Known(closing, [], hits))])
 
@@ -401,7 +401,7 @@ def _share(guesses: int, period: int) -> int:
     return guesses * max(1, _EVEN // period)
 
 
-def _doubled(first: int, below: int) -> list[int]:
+def _doublings(first: int, below: int) -> list[int]:
     """List a number and its doubles, by factors of 2, below a limit."""
     return [first << k for k in range(below.bit_length()) if first << k < below]
 
@@ -425,7 +425,7 @@ def _guess(orbit: Orbit, maps: ExactMaps) -> Guess:
     return Guess(np.array(states), np.ones(orbit.firings, np.int64))
 
 
-def _closed(
+def _converge(
     maps: ExactMaps | FastMaps,
     tried: Sequence[Guess],
     scales: FloatArray,

@@ -84,7 +84,7 @@ def scan(
         trains = [Train.of(regimes[i], last) for i in left]
         window = (last // 2 + 1, last)
         states, _ = run_trains(trains, np.arange(window[0], last + 1), None, quiet)
-        settled = _settled(trains, states, window, quiet)
+        settled = _classify_early(trains, states, window, quiet)
         verdicts |= {i: judged for i, judged in zip(left, settled, strict=True) if judged is not None}
         effort.report(len(verdicts), len(times))
     left = [i for i in range(len(times)) if i not in verdicts]
@@ -94,7 +94,7 @@ def scan(
     return [verdicts[i] for i in range(len(times))]
 
 
-def _settled(
+def _classify_early(
     trains: Sequence[Train], states: Sequence[States], firings: tuple[int, int], effort: Effort
 ) -> list[Verdict | None]:
     """Classify the trains that have settled early to a stable periodic motion; None for all other trains."""

@@ -92,7 +92,7 @@ def magnet(
     from printhammer.identify.fitting import fit
 
     offset = None if zero == "fit" else read_number(zero, "m", "--zero")
-    return _fitted(
+    return _run_fit(
         job, hammer, strict, lambda known: fit("magnet", files, hammer=known, zero=offset, **passed)
     )
 
@@ -133,7 +133,7 @@ def solenoid(
         raise InputError("--turns is missing", key="--turns", expected="the number of turns of the coil")
     from printhammer.identify.fitting import fit
 
-    return _fitted(
+    return _run_fit(
         job, hammer, strict, lambda _known: fit("solenoid", file, turns=turns, current=current, **passed)
     )
 
@@ -154,7 +154,7 @@ def spring(
     """Fit Bs and As of the spring."""
     from printhammer.identify.fitting import fit
 
-    return _fitted(job, hammer, strict, lambda known: fit("spring", file, hammer=known, **passed))
+    return _run_fit(job, hammer, strict, lambda known: fit("spring", file, hammer=known, **passed))
 
 
 @verb(
@@ -180,7 +180,7 @@ def pack(
     """Fit the stiffness of the pack, and with --exponents the exponents of its law."""
     from printhammer.identify.fitting import fit
 
-    return _fitted(job, hammer, strict, lambda known: fit("pack", file, hammer=known, **passed))
+    return _run_fit(job, hammer, strict, lambda known: fit("pack", file, hammer=known, **passed))
 
 
 @verb(
@@ -228,7 +228,7 @@ def backstop(
             return fit_backstop(stiffness=stiffness, **passed)
         return fit("backstop", file, hammer=known, stiffness=stiffness, **passed)
 
-    return _fitted(job, hammer, strict, made)
+    return _run_fit(job, hammer, strict, made)
 
 
 @verb(
@@ -281,7 +281,7 @@ def motion(
             known = fit.into(known)
         return fit_motion(files, known, free=keys, **passed)
 
-    return _fitted(job, hammer, strict, made)
+    return _run_fit(job, hammer, strict, made)
 
 
 _probe = partial(opt.text, panel="Probe")
@@ -337,7 +337,7 @@ def coil(
         keys = None if free is None else _keys(free)
         return fit_coil(files, known, free=keys, also=_keys(also or ""), **passed)
 
-    return _fitted(job, hammer, strict, made)
+    return _run_fit(job, hammer, strict, made)
 
 
 def _keys(text: str) -> list[str]:
@@ -360,7 +360,7 @@ def _earlier_fits(tables: dict[str, Path], known: Hammer, robust: bool) -> list[
     return [*fits, *(fit(kind, path, **options) for kind, path in rest.items())]
 
 
-def _fitted(job: Job, hammer: str | None, strict: bool, fitted: Callable[[Hammer | None], Fit]) -> Answer:
+def _run_fit(job: Job, hammer: str | None, strict: bool, fitted: Callable[[Hammer | None], Fit]) -> Answer:
     """Run a fit; return its summary and its files."""
     from printhammer.hammer.hammer import load
     from printhammer.support.files import write_file

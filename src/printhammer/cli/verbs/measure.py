@@ -74,7 +74,7 @@ def measure(
     """
     from printhammer.identify.bench.laboratory import measure as measured
 
-    kinds, paths = _places(kind, out, job)
+    kinds, paths = _output_files(kind, out, job)
     bench = {name: passed.pop(name) for name in (*_LISTS, *_TEXTS) if name in passed}
     settings = _settings(kinds, {**passed, **opt.given(exact=exact or None)})
     options = _options(kinds, bench)
@@ -97,7 +97,7 @@ def measure(
     return Answer()
 
 
-def _places(kind: str, out: Path | None, job: Job) -> tuple[list[str], dict[str, Path]]:
+def _output_files(kind: str, out: Path | None, job: Job) -> tuple[list[str], dict[str, Path]]:
     """Check the output; return the requested kinds of measurement, and the file of each kind."""
     from printhammer.identify.bench.laboratory import KINDS
     from printhammer.support.files import check_outputs

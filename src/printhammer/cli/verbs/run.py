@@ -62,7 +62,7 @@ def run(
     from printhammer.run.simulate import simulate
 
     train = {"rate": rate, "period": period, "at": at, "pulses": pulses, "overlap": overlap}
-    fired = _fired(hammer, drive, train)
+    fired = _drive_of(hammer, drive, train)
     if drive is not None:
         job.check(*tables_beside(drive, fired.waveform))
     motion = simulate(hammer, fired, **passed)
@@ -78,7 +78,7 @@ def run(
     )
 
 
-def _fired(hammer: Hammer, file: Path | None, train: dict[str, Any]) -> Drive:
+def _drive_of(hammer: Hammer, file: Path | None, train: dict[str, Any]) -> Drive:
     """Build the drive from the options of the command line."""
     from printhammer.drive.file import load_drive
     from printhammer.drive.trains import PulseTrain

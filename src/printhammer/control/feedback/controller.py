@@ -160,7 +160,7 @@ class Controller:
             np.array([loop.touch for loop in loops]),
             np.array([loop.speed for loop in loops]),
             np.array([loop.learned.scale for loop in loops]),
-            np.array([self._expected(loop) for loop in loops]),
+            np.array([self._prior_covariance(loop) for loop in loops]),
         )
         front = self.plant.front + self.stroke * np.array([loop.learned.front for loop in loops])
         steps = _steps(loops)
@@ -188,7 +188,7 @@ class Controller:
             used = samples.used[k]
             loop.seen.append((samples.times[k][used], samples.shown[k][used]))
 
-    def _expected(self, loop: Loop) -> FloatArray:
+    def _prior_covariance(self, loop: Loop) -> FloatArray:
         """Return the expected covariance of displacement, speed and current scale at a touch."""
         # Later launches begin with the residual motion of a landing.
         if loop.launched and len(loop.pulses) == 1:

@@ -110,7 +110,7 @@ class Adjustable:
         """Add a change to corrections (inputs,) and clip the resulting settings to all bounds."""
         after = before + np.clip(change, -_LARGEST, _LARGEST)
         rows, columns = self.inputs
-        return np.asarray((self._bounded(self._raw(after)) - self.base)[rows, columns] / STEP)
+        return np.asarray((self._clip(self._raw(after)) - self.base)[rows, columns] / STEP)
 
     def started_from(self, base: FloatArray) -> Adjustable:
         """Return a copy whose base settings are `base`, (4, entries), clipped to all bounds."""
@@ -118,7 +118,7 @@ class Adjustable:
         strict, own = base.copy(), base.copy()
         strict[ADVANCE] = -np.inf
         own[ADVANCE] = np.maximum(own[ADVANCE], -self.task.latest(own[WIDTH]))
-        return replace(self, base=replace(self, base=strict)._bounded(own))
+        return replace(self, base=replace(self, base=strict)._clip(own))
 
     def settings(self, corrections: FloatArray) -> FloatArray:
         """Compute the settings with corrections (inputs,), shape (4, entries)."""
@@ -130,7 +130,7 @@ class Adjustable:
         settings[self.inputs[0], self.inputs[1]] += STEP * corrections
         return settings
 
-    def _bounded(self, settings: FloatArray) -> FloatArray:
+    def _clip(self, settings: FloatArray) -> FloatArray:
         """Clip settings to the current limit, and to firing times after the armature has left the pack."""
         task, base = self.task, self.base
         settings[WIDTH] = np.clip(settings[WIDTH], _LEAST * task.width, task.widest)
@@ -248,7 +248,7 @@ class LearningLaw:
         keep = 1.0 - self.forgetting
         (off,), slopes, *others = yield from together(
             [
-                self._expected(unit, [corrections]),
+                self._mean_deviations(unit, [corrections]),
                 *(self._slopes(each, corrections) for each in (unit.hammers[0], *alike[:_OTHERS])),
             ]
         )
@@ -269,7 +269,7 @@ class LearningLaw:
             # Starting over from the first table may converge where the learned corrections do not.
             other = yield from self._smallest_objective(unit, 0.0 * corrections)
             left, found = min((left, found), other, key=lambda end: end[0])
-        verdict = yield from self._compared(alike, found)
+        verdict = yield from self._compare(alike, found)
         return Update(found, contraction, verdict, left)
 
     def started_anew(self, belief: Belief) -> LearningLaw | None:
@@ -308,11 +308,11 @@ class LearningLaw:
         best = np.inf, corrections
         for _ in range(_NEWTON):
             (off,), slopes = yield from together(
-                [self._expected(unit, [corrections]), self._slopes(unit.hammers[0], corrections)]
+                [self._mean_deviations(unit, [corrections]), self._slopes(unit.hammers[0], corrections)]
             )
             change = -_gain(off, slopes) @ off
             tried = [self.entries.limited(corrections, size * change) for size in _SIZES]
-            expected = yield from self._expected(unit, tried)
+            expected = yield from self._mean_deviations(unit, tried)
             left = [_badness(each) for each in expected]
             k = int(np.argmin(left))
             before, corrections = best[0], tried[k]
@@ -338,7 +338,7 @@ class LearningLaw:
         off = judgement.arrival_deviation / limits.arrival, judgement.force_deviation / limits.force
         return np.clip(np.nan_to_num(np.concatenate(off, axis=1), nan=GATE), -GATE, GATE)
 
-    def _expected(self, unit: _Unit, corrections: Sequence[FloatArray]) -> Printing[FloatArray]:
+    def _mean_deviations(self, unit: _Unit, corrections: Sequence[FloatArray]) -> Printing[FloatArray]:
         """Compute the mean deviations over the posterior modes, plus the model error, (M, 2 dots)."""
         hammers = [hammer for _ in corrections for hammer in unit.hammers]
         rows = [row for row in corrections for _ in unit.hammers]
@@ -352,7 +352,7 @@ class LearningLaw:
         off = yield from self._off([hammer] * len(rows), rows)
         return np.asarray((off[1:] - off[0]).T)
 
-    def _compared(self, alike: Sequence[Hammer], corrections: FloatArray) -> Printing[Verdict]:
+    def _compare(self, alike: Sequence[Hammer], corrections: FloatArray) -> Printing[Verdict]:
         """Compare a table with open-loop drive on samples of the posterior; return the outcome.
 
         The table gains if the samples print more dots with the table than in either open loop, and if no

@@ -101,10 +101,10 @@ class Learner:
 
     def see(self, ladder: Readings, line: Readings) -> None:
         """Store the sensor readings of a run: the dots of the ladder, and the dots of the line."""
-        self._ladders.append(self._scaled(ladder))
-        self._line.append(self._scaled(line))
+        self._ladders.append(self._normalise(ladder))
+        self._line.append(self._normalise(line))
 
-    def _scaled(self, readings: Readings) -> FloatArray:
+    def _normalise(self, readings: Readings) -> FloatArray:
         """Normalise readings by the limits, shape (measured, dots)."""
         limits, shown = self.law.entries.task.limits, [readings.time]
         if self.law.production.measured > 1 and readings.force is not None:
@@ -126,7 +126,7 @@ class Learner:
         unexplained = np.zeros((2, len(LINE)))
         if self.stage:
             shown = self.belief.modes[0].predicted.reshape(law.production.measured, -1)[:, -len(LINE) :]
-            unexplained[: len(shown)] = _unexplained(
+            unexplained[: len(shown)] = _model_error(
                 line.value - shown, noise / np.sqrt(np.maximum(line.seen, 1.0))
             )
         update = yield from law.update(self.belief, self.corrections, unexplained)
@@ -191,7 +191,7 @@ def _unknown(law: LearningLaw) -> Verdict:
     return Verdict(False, law.first, *[float("nan")] * 3)
 
 
-def _unexplained(rest: FloatArray, noise: FloatArray) -> FloatArray:
+def _model_error(rest: FloatArray, noise: FloatArray) -> FloatArray:
     """Estimate the model error from residuals (measured, dots), shrunk by the noise; 0 without a reading."""
     known = np.isfinite(rest).any(axis=1, keepdims=True)
     size = 1.4826 * np.nanmedian(np.where(known, np.abs(rest), 0.0), axis=1, keepdims=True)

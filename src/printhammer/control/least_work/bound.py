@@ -57,7 +57,7 @@ def bound(hammer: Hammer, single: Nominal, force: float, largest: float) -> Boun
     The hammer needs magnet, pack and backstop; `largest` is the current limit of either sign, A.
     """
     static = StaticForce(hammer)
-    deepest, loading = _indented(static, single, force)
+    deepest, loading = _indentation(static, single, force)
     x = np.linspace(rest_state(hammer), static.front + deepest, _POINTS)
     thrown = _strongest(static, x, largest)
     # Trapezoidal rule from every point to the last one.
@@ -114,7 +114,7 @@ def _given_back(hammer: Hammer, most: float) -> float:
     return float(energy[rising].max(initial=0.0))
 
 
-def _indented(static: StaticForce, single: Nominal, force: float) -> tuple[float, float]:
+def _indentation(static: StaticForce, single: Nominal, force: float) -> tuple[float, float]:
     """Return indentation, m, and loading work, J, at which the pack force is `force` single-pulse forces."""
     wanted, front = force * single.force, static.front
     deepest = single.indentation

@@ -91,7 +91,7 @@ class PulsePlan:
         arrival = duration - self._past
 
         def measured(rows: FloatArray) -> FloatArray:
-            return self._measured(rows, duration, arrival)
+            return self._evaluate(rows, duration, arrival)
 
         # From rest there is nothing to brake, so one pulse is enough.
         tried = sobol(2 * (_PER_SLOT if self.touches else 1), _TRIED)
@@ -113,7 +113,7 @@ class PulsePlan:
         """Plan the landing of the armature on the backstop."""
 
         def measured(rows: FloatArray) -> FloatArray:
-            return self._measured(rows, self._landing, self._landing)
+            return self._evaluate(rows, self._landing, self._landing)
 
         tried = sobol(2 * _PER_SLOT, _TRIED)
         order = np.argsort(measured(tried)[0], kind="stable")
@@ -150,7 +150,7 @@ class PulsePlan:
         decay = getattr(self._waveform, "decay", getattr(self._waveform, "fall", 0.0))
         return float(decay) * -float(np.log(GONE)) + 1e-9 * width
 
-    def _measured(self, rows: FloatArray, duration: float, arrival: float) -> FloatArray:
+    def _evaluate(self, rows: FloatArray, duration: float, arrival: float) -> FloatArray:
         """Evaluate cost, arrival deviation and excess force for many rows of delays and widths in [0, 1]."""
         task, begin = self._task, self._begin
         end = begin + duration

@@ -185,8 +185,8 @@ A history lists the gaps, in slots,
 #define {upper}_REACH {reach}
 #define {upper}_HISTORIES {entries}
 #define {upper}_FINGERPRINT "{fingerprint}"
-#define {upper}_DRIVER "{_quoted(head["driver"])}"
-#define {upper}_SERIAL "{_quoted(head["serial"])}"
+#define {upper}_DRIVER "{_quote(head["driver"])}"
+#define {upper}_SERIAL "{_quote(head["serial"])}"
 #define {upper}_LARGEST_CURRENT_MA {round(1e3 * head["largest_current"])}
 #define {upper}_TICK_NS {nanoseconds}
 #define {upper}_BYTES {size_of(rates.size, entries, bits, values)}
@@ -225,7 +225,7 @@ static inline unsigned {prefix}_slots_ahead(unsigned rate)
 """
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     """Escape a text for a C string literal."""
     return comment(text).replace('"', "'")
 

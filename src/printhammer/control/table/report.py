@@ -176,7 +176,7 @@ def judge_table(
         [read_positive(rate, "Hz", "rate") for rate in rates] if rates is not None else between(table)
     )
     if perturbations is None:
-        perturbations = [by for by in PERTURBATIONS if _applies(hammer, by)]
+        perturbations = [by for by in PERTURBATIONS if _is_applicable(hammer, by)]
     if not asked.size or not perturbations:
         raise InputError("rates, perturbations: expected at least one of each", key="rates")
     bounds = Limits() if limits is None else limits
@@ -235,7 +235,7 @@ def judge_table(
     )
 
 
-def _applies(hammer: Hammer, by: Perturbation) -> bool:
+def _is_applicable(hammer: Hammer, by: Perturbation) -> bool:
     """Whether a hammer has the laws that a perturbation changes."""
     try:
         perturbed(hammer, by)

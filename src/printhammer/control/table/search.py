@@ -85,7 +85,7 @@ def chosen(task: Task, periods: FloatArray) -> tuple[FloatArray, Ways]:
         place = int(np.searchsorted(nodes, period))
         near = known[max(0, place - 1) : place + (2 if nodes[place] == period else 1)]
         tried.append(_distinct(joined(ways.at(period) for ways in near)))
-    groups = _valued(task, tried)
+    groups = _refine_groups(task, tried)
     task.report()
     if task.brake:
         _look_closely(task, periods, groups)
@@ -116,7 +116,7 @@ def spaced(periods: FloatArray, spacing: float) -> list[float]:
     return nodes
 
 
-def _valued(task: Task, tried: Sequence[Ways]) -> list[Ways]:
+def _refine_groups(task: Task, tried: Sequence[Ways]) -> list[Ways]:
     """Refine the candidates of several groups as one batch; return the groups without infinite costs."""
     every = solved(task, joined(tried))
     every = every._replace(cost=costs(task, every))
@@ -161,7 +161,7 @@ def _look_closely(task: Task, periods: FloatArray, groups: list[Ways]) -> None:
         period = float(periods[row])
         near = [ways for node, ways in zip(nodes, closer, strict=True) if abs(node - period) <= close]
         tried.append(_distinct(joined(ways.at(period) for ways in near)))
-    for row, group in zip(hope, _valued(task, tried), strict=True):
+    for row, group in zip(hope, _refine_groups(task, tried), strict=True):
         groups[row] = joined([groups[row], group])
 
 

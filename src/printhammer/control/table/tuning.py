@@ -238,7 +238,7 @@ def tune(
         report=_counter(effort, steps),
         mean_square=variability is not None,
     )
-    draft = _tuned(task, grid, open_ended=asked is None)
+    draft = _tune_rows(task, grid, open_ended=asked is None)
     if asked is None:
         _bridge(draft)
         return refined(draft.rows(np.arange(_usable(draft)))).table().fired_by(driver, hammer)
@@ -314,17 +314,17 @@ def _tune_again(draft: Draft, poor: IntArray) -> None:
         return
     task = draft.task
     for _ in range(_TRIES):
-        again = _tuned(task, draft.rates[poor], around=_AROUND * task.scale)
+        again = _tune_rows(task, draft.rates[poor], around=_AROUND * task.scale)
         better = again.worst < draft.worst[poor]
         draft.values[:, poor[better]] = again.values[:, better]
         failed = ~np.isfinite(again.worst)
         if not failed.any():
             break
-        barred = task.barred + _failed(again.rows(np.flatnonzero(failed)))
+        barred = task.barred + _failed_brakes(again.rows(np.flatnonzero(failed)))
         poor, task = poor[failed], replace(task, barred=barred, located=True)
 
 
-def _failed(draft: Draft) -> tuple[tuple[float, float, float], ...]:
+def _failed_brakes(draft: Draft) -> tuple[tuple[float, float, float], ...]:
     """Return period, delay and width of the brake pulses, s, of the candidates whose rows failed."""
     task, barred = draft.task, []
     for gap in range(1, task.reach + 1):
@@ -335,7 +335,7 @@ def _failed(draft: Draft) -> tuple[tuple[float, float, float], ...]:
     return tuple(barred)
 
 
-def _tuned(
+def _tune_rows(
     task: Task, rates: FloatArray, *, open_ended: bool = False, around: FloatArray | None = None
 ) -> Draft:
     """Tune rows for the given rates; an entry without a solution has an infinite deviation.

@@ -39,7 +39,7 @@ class Chain(Waveform):
         """Validate the parts one by one; the chain drives the same quantity as its parts."""
         if not isinstance(data, dict) or "parts" not in data:
             return data
-        parts = _checked(data["parts"])
+        parts = _validate(data["parts"])
         driven = parts[0][1].quantity
         if data.get("quantity", driven) != driven:
             raise InputError.of("quantity", data["quantity"], f"that of the parts, {driven!r}")
@@ -76,7 +76,7 @@ class Chain(Waveform):
         return type(self)(parts=tuple((offset, part.scaled(factor)) for offset, part in self.parts))
 
 
-def _checked(parts: object) -> tuple[tuple[float, Waveform], ...]:
+def _validate(parts: object) -> tuple[tuple[float, Waveform], ...]:
     """Return the validated offsets, s, and waveforms; each begins after the previous one is over."""
     try:
         pairs = [tuple(pair) for pair in parts]  # type: ignore[attr-defined]
@@ -101,7 +101,7 @@ def _checked(parts: object) -> tuple[tuple[float, Waveform], ...]:
                 expected="a waveform that ends",
             )
         offset = _offset(begin, number)
-        if not (_over(*checked[-1], offset) if checked else offset >= 0.0):
+        if not (_is_over(*checked[-1], offset) if checked else offset >= 0.0):
             sooner = f"parts[{number - 1}] is over" if checked else "the firing"
             raise InputError(
                 f"parts[{number}] begins at {offset:.9g} s",
@@ -113,7 +113,7 @@ def _checked(parts: object) -> tuple[tuple[float, Waveform], ...]:
     return tuple(checked)
 
 
-def _over(begun: float, waveform: Waveform, time: float) -> bool:
+def _is_over(begun: float, waveform: Waveform, time: float) -> bool:
     """Whether a waveform that began at `begun`, s, has ended or decayed to its tail by `time`, s."""
     segments = waveform.segments()
     # The circuit of the coil remains after the supply of a driver ends.

@@ -170,7 +170,9 @@ def _orbit(ax: Axes, diagram: Bifurcation, orbit: Any, show: str, across: Scale,
                 key="orbits",
                 expected=f"one in {diagram.parameter} at phase {diagram.phase:g}",
             )
-        values, states, size = _crossed(across.shown(orbit.values), states, np.abs(orbit.multipliers[:, 0]))
+        values, states, size = _insert_crossings(
+            across.shown(orbit.values), states, np.abs(orbit.multipliers[:, 0])
+        )
         for kind, look in (("stable", "-"), ("unstable", (0, (1.5, 1.5)))):
             shown = size <= 1.0 if kind == "stable" else size >= 1.0
             line = np.where(shown[:, np.newaxis], states, np.nan)
@@ -188,7 +190,7 @@ def _orbit(ax: Axes, diagram: Bifurcation, orbit: Any, show: str, across: Scale,
     dots(ax, at, states, 3.2, style.GREEN, **rim, zorder=6.0, gid=f"{kind} orbit")
 
 
-def _crossed(
+def _insert_crossings(
     values: FloatArray, states: FloatArray, size: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Insert points on a branch where the interpolated multiplier crosses the unit circle."""

@@ -126,7 +126,7 @@ def panel(
     if judged is not None and judged.period is not None and judged.period <= min(_CYCLE, len(x)):
         cycle = slice(len(x) - judged.period, None)
         ax.plot(x[cycle], v[cycle], **{**RING, "ms": size + 4.0}, gid="cycle", zorder=4.0)
-    _enlarged(ax, strobe, window, way, speed, size)
+    _draw_inset(ax, strobe, window, way, speed, size)
     if named:
         note(ax, shown_period(strobe.period), (0.97, 0.96), ha="right", color=style.INK)
     if named and judged is not None:
@@ -139,7 +139,7 @@ def panel(
         note(ax, f"{outside} outside", (0.97, 0.86), ha="right", fontsize=style.TINY)
 
 
-def _enlarged(ax: Axes, strobe: Strobe, window: Window, way: Scale, speed: Scale, size: float) -> None:
+def _draw_inset(ax: Axes, strobe: Strobe, window: Window, way: Scale, speed: Scale, size: float) -> None:
     """Draw an inset that enlarges the attractor of an aperiodic train if the attractor is small.
 
     The first half of the points is ignored, since it may be a transient.

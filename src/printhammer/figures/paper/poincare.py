@@ -68,7 +68,7 @@ def poincare(
     from matplotlib.lines import Line2D
 
     waveform_of(hammer)
-    shown = _strobed(hammer, periods, points, scheme, reading) if strobes is None else list(strobes)
+    shown = _strobe_points(hammer, periods, points, scheme, reading) if strobes is None else list(strobes)
     if not shown:
         raise InputError("strobes: expected at least one train to draw", key="strobes")
     window = shown[0].window
@@ -106,7 +106,7 @@ def poincare(
     return figure
 
 
-def _strobed(
+def _strobe_points(
     hammer: Hammer,
     periods: Sequence[float | str],
     points: int,

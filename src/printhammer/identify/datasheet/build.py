@@ -149,7 +149,7 @@ def fit_magnet(sheet: Sheet) -> SheetMagnet:
     slopes = np.asarray(best.jac)
     spread = np.sqrt(np.diag(np.linalg.pinv(slopes.T @ slopes)))[free:]
     part = made(best.x)
-    return _described(sheet, part, dict(zip(names, spread.tolist(), strict=True)), forces_of)
+    return _classify(sheet, part, dict(zip(names, spread.tolist(), strict=True)), forces_of)
 
 
 def forces_of(part: ReluctanceMagnet, sheet: Sheet) -> FloatArray:
@@ -165,7 +165,7 @@ def inductance_of(part: ReluctanceMagnet, sheet: Sheet) -> float:
     return law.magnet_inductance(part.packed(0.0), sheet.closed_at - gap, 0.0)
 
 
-def _described(
+def _classify(
     sheet: Sheet,
     part: ReluctanceMagnet,
     spread: dict[str, float],

@@ -179,7 +179,7 @@ class GaussNewton:
         if chains is None:
             raise InputError(_NO_MOTION, key="motion")
         parts = [self.shooting.condensed(shot, chain) for shot, chain in enumerate(chains)]
-        return self._weighted(values, parts, near=False).design
+        return self._linear_problem(values, parts, near=False).design
 
     def solve(
         self,
@@ -206,9 +206,9 @@ class GaussNewton:
             if chains is None:
                 raise InputError(_NO_MOTION, key="motion")
             parts = [self.shooting.condensed(shot, chain) for shot, chain in enumerate(chains)]
-            here = self._weighted(values, parts, near=near, noise=noise)
+            here = self._linear_problem(values, parts, near=near, noise=noise)
             step = np.zeros(len(values))
-            step[free], errors = _solved(here.design[:, free], here.residuals)
+            step[free], errors = _solve_step(here.design[:, free], here.residuals)
             in_errors = np.abs(step[free]) / np.maximum(errors, 1e-300)
             gap = largest_gap(chains, self.shooting.units)
             small = bool((in_errors < _DONE).all()) or bool((np.abs(step) < _EXACT).all())
@@ -243,7 +243,7 @@ class GaussNewton:
             values, states, chains = new, moved, trial
         raise InputError(f"the fit has not converged after {_MOST_STEPS} steps", key="fit")
 
-    def _weighted(
+    def _linear_problem(
         self,
         values: FloatArray,
         parts: Sequence[tuple[FloatArray, ...]],
@@ -360,7 +360,7 @@ class _Weighted:
     memories: FloatArray
 
 
-def _solved(design: FloatArray, residuals: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _solve_step(design: FloatArray, residuals: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Solve for the least-squares step and the standard errors, in units of the parameters' scales."""
     sizes = np.sqrt((design * design).sum(axis=0))
     sizes[sizes == 0.0] = 1.0

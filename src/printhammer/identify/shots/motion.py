@@ -220,14 +220,14 @@ def fit_motion(
     for each in reversed(earlier):
         hammer = each.into(hammer)
     shots = [read_shot(path, hammer, width, columns) for path in paths]
-    records = _unused(paths, hammer)
+    records = _check_unused(paths, hammer)
     touched = any(shot.touching("backstop") for shot in shots)
     keys = _free_keys(hammer, free, shots, touched=touched)
     hammer = _plain(hammer, keys)
     pulses, notes = _pulses(hammer, shots)
     known = _known(hammer, own_waveform=None in pulses)
     keys = tuple(dict.fromkeys([*keys, *known.keys]))
-    start, parameters, priors, own = _assembled(hammer, keys, pulses, known)
+    start, parameters, priors, own = _assemble(hammer, keys, pulses, known)
     shooting = Shooting(hammer, shots, own, parameters)
     where = " and ".join(shot.name for shot in shots)
     with located(where):
@@ -314,7 +314,7 @@ def _known(hammer: Hammer, *, own_waveform: bool) -> Uncertainty:
     return known.without([key for key in known.keys if key.startswith(idle)])
 
 
-def _unused(paths: Sequence[str | Path], hammer: Hammer) -> tuple[str, ...]:
+def _check_unused(paths: Sequence[str | Path], hammer: Hammer) -> tuple[str, ...]:
     """Return the fingerprints of records; raise `InputError` for a record already used for the hammer."""
     prints = tuple(hashlib.sha256(Path(path).read_bytes()).hexdigest()[:16] for path in paths)
     used = hammer.uncertainty.records if hammer.uncertainty is not None else ()
@@ -351,7 +351,7 @@ def _pulses(hammer: Hammer, shots: Sequence[Shot]) -> tuple[list[Pulse | None], 
     return pulses, [pulse.note for pulse in pulses if pulse is not None and pulse.note]
 
 
-def _assembled(
+def _assemble(
     hammer: Hammer, keys: tuple[str, ...], pulses: Sequence[Pulse | None], known: Uncertainty
 ) -> tuple[FloatArray, Parameters, list[Prior], list[Pulse | None]]:
     """Return the initial guess, the parameters, the priors, and the current pulse of each shot."""

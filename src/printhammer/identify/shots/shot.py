@@ -293,19 +293,19 @@ def fit_pulse(where: str, t: FloatArray, current: FloatArray, waveform: Waveform
             expected="the current of the shot",
         )
     if waveform is None or isinstance(waveform, Sampled):
-        return _recorded(t, current, noise, "the current is taken from the record")
-    pulse, rms = _fitted(t, current, waveform, tau, top)
+        return _sampled_pulse(t, current, noise, "the current is taken from the record")
+    pulse, rms = _fit_waveform(t, current, waveform, tau, top)
     if rms > max(_POOR * top, _LARGER * noise):
         share = f"{100.0 * rms / top:.2g} %"
         note = (
             f"{where}: a {waveform.shape} does not describe the current (residuals of {share} of its height);"
             " the current is taken from the record"
         )
-        return _recorded(t, current, noise, note)
+        return _sampled_pulse(t, current, noise, note)
     return pulse
 
 
-def _fitted(
+def _fit_waveform(
     t: FloatArray, current: FloatArray, waveform: Waveform, tau: float, top: float
 ) -> tuple[Pulse, float]:
     """Fit the waveform constants; return the pulse and the RMS residual, A."""
@@ -354,7 +354,7 @@ def _starts(t: FloatArray, current: FloatArray, values: dict[str, float], top: f
     return [np.log(np.array(list(constants.values()))) for constants in (values, recorded)]
 
 
-def _recorded(t: FloatArray, current: FloatArray, noise: float, note: str) -> Pulse:
+def _sampled_pulse(t: FloatArray, current: FloatArray, noise: float, note: str) -> Pulse:
     """Return the recorded current as a waveform, averaged over short bins."""
     after = np.flatnonzero(t >= 0.0)
     each = max(1, -(-len(after) // _INTERVALS))

@@ -197,7 +197,7 @@ def delayed_train(hammer: Hammer, delay: float, pulses: int = _PULSES) -> tuple[
 
     The train has fewer than `pulses` firings if a firing makes no dot, since no departure follows.
     """
-    leaving = _leaving(_run(hammer, [0.0], None))
+    leaving = _departure(_run(hammer, [0.0], None))
     return (0.0,) if leaving is None else delayed_trains([hammer], [delay], [PATIENCE * leaving], pulses)[0]
 
 
@@ -252,7 +252,7 @@ def _run(hammer: Hammer, times: Sequence[float], patience: float | None) -> Moti
     return simulate(hammer, drive, duration=duration, points=2)
 
 
-def _leaving(motion: Motion) -> float | None:
+def _departure(motion: Motion) -> float | None:
     """Return the time, s, at which the dot of the first firing ends; None if the firing makes no dot."""
     dot = motion.dots[0]
     if dot.flight_time is None or dot.contact_time is None or not dot.peak_force:
@@ -280,7 +280,7 @@ class _Search:
         self.tried = 0
         self.best: BuzzTrain | None = None
         single = _run(hammer, [0.0], None)
-        leaving = _leaving(single)
+        leaving = _departure(single)
         self.reference = 0.0
         if leaving is not None:
             dot = single.dots[0]

@@ -88,7 +88,7 @@ class OutlineFont:
         self.name = self.path.stem
         _opened(self.path, 1)
         marks = {*_ASCII, *text} - set(self.missing("".join({*_ASCII, *text})))
-        self._font, self._base = _fitted(self.path, wires, "".join(sorted(marks)))
+        self._font, self._base = _load_fitted(self.path, wires, "".join(sorted(marks)))
 
     def missing(self, text: str) -> list[str]:
         """Return the distinct characters of `text` that the font lacks, in order of occurrence."""
@@ -116,7 +116,7 @@ def _opened(path: Path, size: int) -> FreeTypeFont:
 
 
 @lru_cache(maxsize=16)
-def _fitted(path: Path, wires: int, marks: str) -> tuple[FreeTypeFont, int]:
+def _load_fitted(path: Path, wires: int, marks: str) -> tuple[FreeTypeFont, int]:
     """Load the font at the largest size that fits the wires; return it and the wires above the base line."""
     for size in range(_LARGER * wires, 0, -1):
         font = _opened(path, size)

@@ -56,7 +56,7 @@ class PiecewiseMotion:
             for contact in motion.contacts:
                 before = contacts[-1] if contacts else None
                 if contact.initial and before is not None and before.t_out is None:
-                    contacts[-1] = _joined(before, contact)
+                    contacts[-1] = _merge(before, contact)
                 else:
                     contacts.append(contact)
         return contacts
@@ -140,7 +140,7 @@ def simulate_pieces(
     return PiecewiseMotion(hammers[0], drive, pieces)
 
 
-def _joined(first: Contact, then: Contact) -> Contact:
+def _merge(first: Contact, then: Contact) -> Contact:
     """Merge the two parts of a contact that was split between segments."""
     higher = then if then.depth > first.depth else first
     return replace(

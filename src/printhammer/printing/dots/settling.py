@@ -100,7 +100,7 @@ def settle(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float
     first = next(iter(touches(motion)), None)
     left = None if first is None or first.v_out is None or first.v_in == 0.0 else -first.v_out / first.v_in
     return Settling(
-        settle_out=_settled(motion, rest, limit) if motion.ok and first is not None else None,
+        settle_out=_settle_time(motion, rest, limit) if motion.ok and first is not None else None,
         rebounds=len(heights),
         highest=max(heights, default=0.0),
         restitution=left,
@@ -162,7 +162,7 @@ def settled_from(away: BoolArray) -> int:
     return int(places[-1]) + 1 if places.size else 0
 
 
-def _settled(motion: Motion, rest: float, limit: float) -> float | None:
+def _settle_time(motion: Motion, rest: float, limit: float) -> float | None:
     """Locate by bisection the time, s, of the last departure from within `limit` (m) of the rest position.
 
     The time counts from the firing; None if the armature never leaves the limit, or is outside it at the end.

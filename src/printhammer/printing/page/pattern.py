@@ -92,10 +92,10 @@ def pattern_from_toml(text: str, source: str = "pattern") -> tuple[str, BoolArra
         raise InputError.of(
             "rows", rows, f"a list of rows of '{_DOT}' and '{_EMPTY}'", file=source, written=shown(rows)
         )
-    return name, _marked(rows, wires, source)
+    return name, _parse_rows(rows, wires, source)
 
 
-def _marked(rows: list[str], wires: int, source: str) -> BoolArray:
+def _parse_rows(rows: list[str], wires: int, source: str) -> BoolArray:
     """Parse text rows of '#' and '.' into a mask of dots, shape (lines, wires, slots)."""
     if len(rows) % wires:
         raise InputError(

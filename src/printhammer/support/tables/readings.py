@@ -165,7 +165,7 @@ def readings_of(
     missing = [name for name in required if name not in sources and not (name == "time" and clock)]
     if missing:
         raise InputError(
-            f"{table.where}: {_line(table)}the column {missing[0]!r} is missing among {_listed(table)}",
+            f"{table.where}: {_line(table)}the column {missing[0]!r} is missing among {_list_columns(table)}",
             file=table.where,
             key=missing[0],
             expected=f"{wanted}, or --columns {_example(table, required)}",
@@ -207,7 +207,7 @@ def assigned(
                 file=columns.where,
                 key=name,
                 value=source.place,
-                expected=f"{wanted}, and one of the {len(table.columns)} columns {_listed(table)}",
+                expected=f"{wanted}, and one of the {len(table.columns)} columns {_list_columns(table)}",
             )
     for name in columns.delays:
         if name not in columns.sources:
@@ -325,7 +325,7 @@ def _values(table: Table, name: str, source: Source, si: str, gaps: bool) -> Flo
         if heading.unit and (source.factor, source.unit) == (1.0, ""):
             # The unit is checked separately from the range of the number.
             to_si(1.0, heading.unit, si)
-            array = _converted(numbers, heading.unit, si)
+            array = _to_si(numbers, heading.unit, si)
         else:
             array = np.array(numbers, dtype=np.float64) * source.scale(heading.unit, si)
     # Squares and powers of implausible readings would overflow.
@@ -347,7 +347,7 @@ def _values(table: Table, name: str, source: Source, si: str, gaps: bool) -> Flo
     return array
 
 
-def _converted(numbers: list[float], unit: str, si: str) -> FloatArray:
+def _to_si(numbers: list[float], unit: str, si: str) -> FloatArray:
     """Convert numbers to SI; infinite if a number overflows."""
     try:
         return np.array(all_to_si(numbers, unit, si), dtype=np.float64)
@@ -433,7 +433,7 @@ def _line(table: Table) -> str:
     return f"line {table.head}: " if table.head else ""
 
 
-def _listed(table: Table) -> str:
+def _list_columns(table: Table) -> str:
     """Format the columns of a table for messages, such as "1 'TIME [s]', 2 'CH1 [V]'"."""
     listed = [f"{k} {heading.shown[:40]!r}" for k, heading in enumerate(table.columns[:8], 1)]
     return ", ".join(listed) + (", ..." if len(table.columns) > len(listed) else "")

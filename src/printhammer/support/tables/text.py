@@ -93,7 +93,7 @@ def split_cells(text: str, where: str, *, gaps: bool = False, delimiter: str = "
     """Split the text of a table into cells; a space as separator stands for any white space."""
     comments: dict[str, str] = {}
     notes: list[tuple[int, str]] = []
-    lines = _uncommented(text, comments, notes)
+    lines = _without_comments(text, comments, notes)
     if delimiter == " ":
         lines = (spaced(line) + "\n" for line in lines)
     reader = csv.reader(lines, strict=True, delimiter=delimiter, skipinitialspace=True)
@@ -116,7 +116,7 @@ def spaced(line: str) -> str:
     return " ".join(re.sub(r"\s+(?=[\[(])", "", line).split())
 
 
-def _uncommented(text: str, comments: dict[str, str], notes: list[tuple[int, str]]) -> Iterator[str]:
+def _without_comments(text: str, comments: dict[str, str], notes: list[tuple[int, str]]) -> Iterator[str]:
     """Yield the lines, with empty lines in place of comments; store the comments that have a key."""
     for number, line in enumerate(io.StringIO(text), 1):
         if not _COMMENT.match(line):

@@ -98,9 +98,9 @@ class Flight:
         for _ in range(_ROUNDS):
             along = place[:, np.newaxis] + speed[:, np.newaxis] * (grid - self.reference[:, np.newaxis])
             along = along + twice
-            once, twice = _integrated(grid, accelerations(along, grid, scale[:, np.newaxis]))
+            once, twice = _integrate(grid, accelerations(along, grid, scale[:, np.newaxis]))
             stepped = accelerations(along, grid, scale[:, np.newaxis] + _SCALE_STEP)
-            more_once, more_twice = _integrated(grid, stepped)
+            more_once, more_twice = _integrate(grid, stepped)
         moved = self.state.copy()
         moved[:, 0] += speed * way + twice[:, 0]
         moved[:, 1] += once[:, 0]
@@ -138,7 +138,7 @@ def flight_from_samples(
 
     def bent(straight: FloatArray, curve: FloatArray, scale: FloatArray) -> FloatArray:
         for _ in range(_BENDS):
-            curve = _integrated(grid, accelerations(straight + curve, grid, scale))[1]
+            curve = _integrate(grid, accelerations(straight + curve, grid, scale))[1]
         return curve
 
     for _ in range(_ROUNDS):
@@ -149,12 +149,12 @@ def flight_from_samples(
         others = [bent(straight + step * way, curve, scale) for way, step in zip(ways, steps, strict=True)]
         others.append(bent(straight, curve, scale + scale_step))
         slopes = [
-            _interpolated(grid, (other - curve) / step, times)
+            _interpolate(grid, (other - curve) / step, times)
             for other, step in zip(others, [*steps, scale_step], strict=True)
         ]
         slopes[0] += 1.0
         slopes[1] += tau
-        rest = shown - state[:, :1] - state[:, 1:2] * tau - _interpolated(grid, curve, times)
+        rest = shown - state[:, :1] - state[:, 1:2] * tau - _interpolate(grid, curve, times)
         step, precision = least_squares(slopes, rest, used / error**2, prior, mean - state)
         state = state + step
     place, speed, scale = state.T
@@ -192,7 +192,7 @@ def least_squares(
     return np.asarray(step, np.float64), precision
 
 
-def _integrated(grid: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _integrate(grid: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Integrate once and twice over equal time steps, (M, K), backwards from the last; trapezoidal rule."""
     step = (grid[:, -1:] - grid[:, :1]) / (grid.shape[1] - 1)
 
@@ -205,7 +205,7 @@ def _integrated(grid: FloatArray, values: FloatArray) -> tuple[FloatArray, Float
     return once, backwards(once)
 
 
-def _interpolated(grid: FloatArray, values: FloatArray, times: FloatArray) -> FloatArray:
+def _interpolate(grid: FloatArray, values: FloatArray, times: FloatArray) -> FloatArray:
     """Interpolate rows over evenly spaced times linearly; arguments beyond the ends are clipped."""
     count = grid.shape[1] - 1
     span = np.maximum(grid[:, -1:] - grid[:, :1], 1e-300)
