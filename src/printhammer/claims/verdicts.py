@@ -219,7 +219,7 @@ def _first_strange(context: Context, periods: Sequence[float], names: Sequence[s
 
 
 def _window(stretch: Stretch, step: float) -> dict[str, Any]:
-    """Return an interval of strobe times for the report; its width includes one scan step, s."""
+    """Return an interval of strobe times for the report: classification, ends and width, s."""
     return {
         "verdict": stretch.name,
         "from_s": stretch.longest,

@@ -17,7 +17,7 @@ END: Final = 3.0
 SWITCHED: Final = 4.0
 DECAY: Final = 5.0
 RESERVOIR: Final = 6.0
-"""Kinds of segments."""
+"""Kinds of segments, as described in `printhammer.drive.segments`."""
 
 ROWS: Final = 4
 """Largest number of rows of the table of a shape, including the end."""

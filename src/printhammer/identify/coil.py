@@ -335,7 +335,7 @@ class Averaged:
 
 
 def _within(p: FloatArray, space: Parameters) -> FloatArray:
-    """Return the initial guess of a second fit: the first result, but the mean of each prior."""
+    """Return the initial guess of a second fit: the first result or, where there is a prior, its mean."""
     return np.where(np.isfinite(space.deviation), space.start, np.clip(p, space.low, space.high))
 
 

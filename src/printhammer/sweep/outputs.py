@@ -130,7 +130,7 @@ class Outputs(Declared):
         return any(output in self.arrays for output in outputs)
 
     def length(self, output: Output) -> tuple[int, ...]:
-        """Return the shape of an output array without its member dimensions."""
+        """Return the dimensions of an output array that follow the member dimensions."""
         return {"": (), FIRING: (self.firings,), TIME: (self.times.size,)}[output.dim]
 
     def empty(self, members: int) -> dict[str, Any]:

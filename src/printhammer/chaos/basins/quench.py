@@ -149,7 +149,7 @@ class TwoPulses(Waveform):
     largest: float
 
     def segments(self) -> FloatArray:
-        """Return the segment table: no pulse, the first pulse at `apart`, the second at twice that time."""
+        """Return the segment table: no pulse, the first pulse at `apart`, the second at 2 `apart`."""
         rows = [
             (number * self.apart + row[0], *row[1:])
             for number, pulse in enumerate((self.first, self.second), 1)

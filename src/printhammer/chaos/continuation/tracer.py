@@ -46,7 +46,7 @@ _MOST_SECTIONS: Final = 8  # Maximum number of segments of a branch at different
 _SAME_PHASE: Final = 1e-3
 """Difference of two section phases, as a fraction of the period, below which they are the same."""
 _CLEAR: Final = 1e-3
-"""Scaled distance from a lost end within which orbits are removed, since an impact nears the section."""
+"""Scaled distance from a lost end within which orbits are removed: an impact is close to the section."""
 _LEAST_CHORD: Final = 1e-5
 """Smallest scaled distance of two orbits whose chord defines the direction of the branch."""
 _NO_STOP: Final = Stop("section", math.nan, np.zeros(0), "the section moves")

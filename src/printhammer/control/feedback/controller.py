@@ -189,7 +189,7 @@ class Controller:
             loop.seen.append((samples.times[k][used], samples.shown[k][used]))
 
     def _prior_covariance(self, loop: Loop) -> FloatArray:
-        """Return the expected covariance of displacement, speed and current scale at a touch."""
+        """Return the prior covariance of displacement, speed and current scale at a touch."""
         # Later launches begin with the residual motion of a landing.
         if loop.launched and len(loop.pulses) == 1:
             start = self.start

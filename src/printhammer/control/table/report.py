@@ -236,7 +236,7 @@ def judge_table(
 
 
 def _is_applicable(hammer: Hammer, by: Perturbation) -> bool:
-    """Whether a hammer has the laws that a perturbation changes."""
+    """Whether the hammer has all laws that a perturbation changes."""
     try:
         perturbed(hammer, by)
     except InputError:

@@ -131,7 +131,7 @@ class Task:
 
     @cached_property
     def window(self) -> float:
-        """Simulation time after the last firing of a whole line, s."""
+        """Simulation time after the last firing of a complete pattern or line, s."""
         return wait_of(self.hammers[0], self.pulse)
 
     @property

@@ -351,7 +351,7 @@ def _crossing(values: FloatArray, increase: FloatArray, level: float, never: flo
 
 
 def check_rows(data: Data, needed: int, what: str) -> None:
-    """Raise `InputError` for data with too few rows for a fit, or with no nonzero value."""
+    """Raise `InputError` for data with too few rows for a fit, or without a nonzero value."""
     where = " and ".join(str(path) for path in data.files)
     if len(data.values) < needed:
         raise InputError(

@@ -159,8 +159,8 @@ def find_buzz_train(
 def longest_run(motion: Motion, reference_force: float, forces: tuple[float, float] = FORCES) -> Run:
     """Return the longest run of dots whose peak force, as a fraction of `reference_force`, is in `forces`.
 
-    `reference_force` is in N. The first run wins a tie. Without any dot in the range, every touch is reported
-    as before the run.
+    `reference_force` is in N. The first run wins a tie. If no dot is in the range, all touches count as
+    before the run.
     """
     returns = [contact.t_in for contact in touches(motion)]
     best: list[tuple[int, float, float]] = []

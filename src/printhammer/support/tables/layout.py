@@ -187,7 +187,7 @@ def _width(data: list[Row], above: list[Row]) -> int:
 
 
 def _commented(notes: list[tuple[int, str]], separator: str, width: int, first: int) -> list[Row]:
-    """Return the heading in the last comment above the numbers, as NumPy writes it."""
+    """Return the heading in the last comment above the numbers, where NumPy writes headings."""
     above = [
         (line, spaced(note).split() if separator == " " else note.split(separator))
         for line, note in notes
