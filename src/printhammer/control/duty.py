@@ -12,7 +12,8 @@ R')): for a given limit it decreases linearly with the ambient temperature, what
 
 Source: the lumped thermal network of any text on heat transfer. Validity: pulses that are short compared with
 the warming of the winding, so that their heat is averaged over time. Weakness: the winding has one
-temperature, whereas a real winding is hotter inside.
+temperature, whereas a real winding is hotter inside. The heat of a dot is that of a dot fired from rest; dots
+whose currents overlap heat the coil more, and the summary says from which rate on.
 
 Coil heat per dot: the resistance of copper rises by 0.393 % per kelvin of its value at 20 degC. A pulse on a
 rail that is long compared with L / R draws less current through a warm winding and heats it less; a driver
@@ -65,6 +66,13 @@ class DotHeat:
     """On-time of the driver per dot, s; 0 if unknown."""
     strike: str = "dot"
     """Noun for a dot of the hammer, see `Hammer.strike`."""
+    lasts: float = 0.0
+    """Time from the firing until the current has decayed to 1 % of its largest value, s; 0 if unknown."""
+
+    @property
+    def apart(self) -> float:
+        """Largest dot rate at which the current of a dot decays before the next one, Hz."""
+        return 1.0 / self.lasts if self.lasts > 0.0 else math.inf
 
     @property
     def most(self) -> float:
@@ -198,6 +206,13 @@ class ThermalDuty(Result, rows="ambient burst"):
                 "driver on",
                 f"{1e3 * self.heat.on_time:.4g} ms a dot, at most {self.heat.most:.4g} Hz"
                 if self.heat.on_time
+                else None,
+            ),
+            (
+                "current of a dot",
+                f"lasts {1e3 * self.heat.lasts:.4g} ms: above {self.heat.apart:.4g} Hz dots overlap, and heat"
+                " the coil more than computed"
+                if max(self.rate.max(), self.burst.max(initial=0.0)) > self.heat.apart
                 else None,
             ),
             ("held constant", f"the {self.heat.feed} of the driver"),
@@ -347,6 +362,7 @@ TEMPERATURES: Final = (20.0, 40.0, 60.0, 80.0, 100.0, 120.0, 140.0)
 """Winding temperatures at which a hammer with a driver is simulated, degC."""
 
 _LEFT: Final = 1e-3  # Residual current at which a pulse counts as ended, as a fraction of its largest
+_DECAYED: Final = 0.01  # Residual current that adds at most 2 % to the heat of the next dot, likewise
 _DOUBLINGS: Final = 8  # Iteration limit of the doublings of the simulated time
 
 
@@ -381,20 +397,23 @@ def heat_of(hammer: Hammer) -> DotHeat:
     drive = PulseTrain(waveform, at=[0.0])
     if waveform.quantity == "current":
         heat = hammer.coil_resistance * squared_current(drive, 0.0, waveform.support)
-        return DotHeat((REFERENCE,), (heat,), "current", strike=hammer.strike)
-    heats = [_copper_loss(hammer.replace("coil.temperature", warm), drive) for warm in TEMPERATURES]
-    return DotHeat(TEMPERATURES, tuple(heats), "voltage", waveform.support, hammer.strike)
+        return DotHeat((REFERENCE,), (heat,), "current", strike=hammer.strike, lasts=waveform.support)
+    losses = [_copper_loss(hammer.replace("coil.temperature", warm), drive) for warm in TEMPERATURES]
+    heats, ends = zip(*losses, strict=True)
+    return DotHeat(TEMPERATURES, heats, "voltage", waveform.support, hammer.strike, max(ends))
 
 
-def _copper_loss(hammer: Hammer, drive: PulseTrain) -> float:
-    """Simulate one firing until its current has decayed; return the coil heat, J."""
+def _copper_loss(hammer: Hammer, drive: PulseTrain) -> tuple[float, float]:
+    """Simulate one firing until its current has decayed; return the coil heat, J, and the decay time, s."""
     from printhammer.run.simulate import simulate
 
     span = 4.0 * drive.waveform.support
     for _ in range(_DOUBLINGS):
         motion = simulate(hammer, drive, duration=span, ledger=True)
-        if abs(motion.current[-1]) <= _LEFT * abs(motion.current).max():
-            return motion.energy.copper_loss
+        size = abs(motion.current)
+        if size[-1] <= _LEFT * size.max():
+            flowing = np.flatnonzero(size > _DECAYED * size.max())
+            return motion.energy.copper_loss, float(motion.t[flowing[-1]]) if flowing.size else 0.0
         span *= 2.0
     raise InputError(
         f"{hammer.path}: the current lasts for ever",

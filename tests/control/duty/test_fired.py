@@ -43,3 +43,16 @@ def test_a_driver_is_not_on_longer_than_there_is_time() -> None:
     assert ph.thermal_duty(heat, "1000 K/W", 91.0).rate[0] < heat.most
     with refused("burst", value="188 Hz"):
         ph.thermal_duty(heat, "0.1 K/W", 91.0, burst=["188 Hz"])
+
+
+def test_dots_whose_currents_overlap_are_named() -> None:
+    """A pulse heats the coil more if the current of the pulse before is still there."""
+    relay = ph.load("relay-5v")
+    heat = heat_of(relay)
+    assert relay.waveform.width < heat.lasts
+    for rate, is_more in ((0.9 * heat.apart, False), (heat.most, True)):
+        train = ph.PulseTrain(relay.waveform, rate=rate, pulses=6)
+        motion = ph.simulate(relay, train, duration=1.0, ledger=True)
+        assert (motion.energy.copper_loss > 1.02 * 6.0 * heat.at(20.0)) == is_more
+    for resistance, is_named in (("0.1 K/W", True), ("1000 K/W", False)):
+        assert ("overlap" in str(ph.thermal_duty(heat, resistance, 91.0))) == is_named
