@@ -152,6 +152,7 @@ BAD_TABLES = {
         "velocity [um]",
     ),
     "no rate": (WIDE.replace("1.2 kHz", "left"), "left"),
+    "a record of one shot": ("time [us],current [A]\n0,1\n1,2\n", "rate"),
     "rate in metres": (WIDE.replace("1.2 kHz", "1.2 m"), "1.2 m"),
     "rate twice": (WIDE.replace("1.2 kHz", "0.5 kHz"), "500 Hz"),
     "empty": ("", "heading"),

@@ -142,7 +142,11 @@ def _one_column_a_rate(table: Table, names: list[str], told: Columns | None) -> 
                 key=name,
             )
         rates[name if told else name.lower()] = rate
-    wanted = {"time": "s", **dict.fromkeys(rates or ("500 hz",), "m")}
+    if not rates:
+        raise InputError(
+            f"{table.where}: no column is named by a rate", file=table.where, key="rate", expected=_HEADINGS
+        )
+    wanted = {"time": "s", **dict.fromkeys(rates, "m")}
     found = readings_of(table, wanted, gaps=list(rates), columns=told)
     times = found.values["time"]
     places = [f"line {line}" for line in found.lines]
