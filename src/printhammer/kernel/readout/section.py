@@ -133,7 +133,7 @@ def write_distances(states: Any, branches: Any, scales: Any, distances: Any) -> 
     Returns
     -------
     tuple
-        Smallest q at which all states agree, and the q of the smallest distance; 0 if there is none.
+        Smallest q at which all states agree, and the same q or else that of the smallest distance; or 0.
     """
     n, parts = states.shape
     period, nearest, least = 0, 0, math.inf
@@ -152,7 +152,7 @@ def write_distances(states: Any, branches: Any, scales: Any, distances: Any) -> 
             period = q
         if largest < least:
             nearest, least = q, largest
-    return period, nearest
+    return period, period or nearest
 
 
 def mean_apart(states: Any, scales: Any, count: int, period: int, late: bool) -> float:
