@@ -17,16 +17,36 @@ import numpy as np
 import numpy.typing as npt
 
 from printhammer.errors import InputError
-from printhammer.hammer.static_force import HammerLike, StaticForce
+from printhammer.hammer.static_force import HammerLike, StaticForce, statics_of
+from printhammer.hammer.statics import (
+    CRUSHED,
+    EMPTY,
+    FARTHER,
+    LIFTED,
+    MOST_PLACES,
+    RESTS,
+    UNSTABLE,
+    Work,
+    compressed,
+    fill_grid,
+    is_stable,
+    rest_position,
+)
 from printhammer.support.arrays import FloatArray
-from printhammer.support.roots import Root, bisect, roots
+from printhammer.support.roots import MOST_POINTS, Root, roots
 
-# Smallest distance from an anchor in the search, m: far below any compression; arbitrary
-_NEAREST: Final = 1e-18
 _PLACES: Final = 401  # Number of grid points of the search for sign changes of the pull
 _LARGEST_CURRENT: Final = 1e6  # Range of currents of a law that states none, A; arbitrary
-FARTHER: Final = (10.0, 100.0, 1000.0)
-"""Search radii for equilibria, m, about the origin, tried in turn if the hammer sets no limit; arbitrary."""
+
+NO_REST: Final = {
+    CRUSHED: (
+        "at zero current the backstop is crushed down to {value:.6g} m",
+        "a backstop that holds the armature",
+    ),
+    LIFTED: ("at the backstop the net force at zero current is {value:.6g} N", "a negative force"),
+    UNSTABLE: ("it has no stable equilibrium at zero current", None),
+}
+"""Reason why a hammer has no rest state, and what is expected, by outcome of the search."""
 
 
 @dataclass(frozen=True)
@@ -74,41 +94,16 @@ def rest_state(hammer: HammerLike) -> float:
     with a magnet has no net force at the backstop, the armature rests there. In all other cases the armature
     rests at the stable equilibrium nearest to the origin.
     """
-    force = StaticForce(hammer)
-    if hammer.backstop is not None:
-        position = hammer.backstop.position
-        pressing = force.free(position)
-        if pressing < 0.0:
-            rest = position if force.rigid else _compressed_equilibrium(force, position)
-            if rest is None:
-                because = f"at zero current the backstop is crushed down to {force.low:.6g} m"
-                raise InputError(
-                    f"{_named(hammer)} has no rest state: {because}",
-                    key="rest",
-                    expected="a backstop that holds the armature",
-                )
-            return rest
-        if pressing == 0.0 and hammer.magnet is not None:
-            # Without any force, such as a plunger without a spring, the armature stays at the backstop.
-            return position
-        if hammer.magnet is not None:
-            because = f"at the backstop the net force at zero current is {pressing:.6g} N"
-            raise InputError(
-                f"{_named(hammer)} has no rest state: {because}",
-                key="rest",
-                expected="a negative force",
-            )
-    stable = [
-        root.x
-        for root in _roots(force, 0.0)
-        if _is_stable(root, force) and (root.x <= force.front or not force.memory)
-    ]
-    if not stable:
-        raise InputError(
-            f"{_named(hammer)} has no rest state: it has no stable equilibrium at zero current",
-            key="rest",
-        )
-    return min(stable, key=lambda x: abs(x - hammer.origin))
+    out = [math.nan, math.nan]
+    code = rest_position(statics_of(hammer), _work(), out)
+    if code == RESTS:
+        return float(out[0])
+    if code == EMPTY:
+        raise _empty(*out)
+    because, expected = NO_REST[code]
+    raise InputError(
+        f"{_named(hammer)} has no rest state: {because.format(value=out[1])}", key="rest", expected=expected
+    )
 
 
 def equilibria(
@@ -270,21 +265,23 @@ def equilibrium_picture(hammer: HammerLike, points: int = 241) -> EquilibriumPic
     )
 
 
-def _compressed_equilibrium(force: StaticForce, position: float, current: float = 0.0) -> float | None:
-    """Find the equilibrium nearest to the surface of an elastic backstop that the armature compresses."""
+def _work() -> Work:
+    """Return working space for a search; lists are faster than arrays where Python runs the search."""
+    room = MOST_POINTS * MOST_PLACES
+    return Work([0.0] * MOST_PLACES, [0.0] * room, [0.0] * room, np.empty((room, 3)), _ascending)
 
-    def total(x: float) -> float:
-        return force.total(x, current)
 
-    depth = max(_NEAREST, math.ulp(position))
-    above = position
-    while position - depth > force.low:
-        below = position - depth
-        if total(below) >= 0.0:
-            return bisect(total, below, above)
-        above = below
-        depth *= 1.25
-    return None
+def _ascending(numbers: list[float], count: int) -> int:
+    """Sort the first numbers of a list; return the number of different ones, at the front."""
+    different = sorted(set(numbers[:count]))
+    numbers[: len(different)] = different
+    return len(different)
+
+
+def _empty(low: float, high: float) -> InputError:
+    return InputError(
+        f"the range {low:g} to {high:g} m is empty", key="range", expected="the lower end first"
+    )
 
 
 def _equilibrium_at(force: StaticForce, root: Root, current: float) -> Equilibrium:
@@ -304,22 +301,19 @@ def _equilibrium_at(force: StaticForce, root: Root, current: float) -> Equilibri
 
 def _is_stable(root: Root, force: StaticForce) -> bool:
     """Whether the force points to the root from both sides, or a rigid backstop supports the lower side."""
-    held = root.before > 0 or (force.rigid and root.x == force.limits[0])
-    return held and root.after < 0
+    return is_stable(root.x, root.before, root.after, force.statics)
 
 
 def _roots(force: StaticForce, current: float, within: tuple[float, float] | None = None) -> list[Root]:
     low, high = within if within is not None else (force.low, force.high)
     low, high = max(low, force.limits[0]), min(high, force.limits[1])
     if not low < high:
-        raise InputError(
-            f"the range {low:g} to {high:g} m is empty", key="range", expected="the lower end first"
-        )
+        raise _empty(low, high)
     crossings = roots(lambda x: force.total(x, current), _grid(force, low, high))
     if within is not None:
         return crossings
     # Dimensionless oscillators may have their equilibria some metres away.
-    for far in FARTHER:
+    for far in FARTHER[1:]:
         if any(_is_stable(root, force) for root in crossings) or force.reach(far) == (low, high):
             break
         low, high = force.reach(far)
@@ -334,8 +328,8 @@ def _same_rest(force: StaticForce, current: float, within: tuple[float, float] |
     backstop = force.hammer.backstop
     if backstop is None or force.rigid or not force.free(backstop.position, current) < 0.0:
         return crossings
-    rest = _compressed_equilibrium(force, backstop.position, current)
-    if rest is None:
+    rest = compressed(current, force.low, force.statics)
+    if math.isnan(rest):
         return crossings
     same = 1e-9 * (backstop.position - rest) + 4.0 * math.ulp(rest)
     return [replace(root, x=rest) if abs(root.x - rest) <= same else root for root in crossings]
@@ -343,13 +337,8 @@ def _same_rest(force: StaticForce, current: float, within: tuple[float, float] |
 
 def _grid(force: StaticForce, low: float, high: float) -> list[float]:
     """Return a search grid between two limits: evenly spaced points, with clusters around the anchors."""
-    places = set(np.linspace(low, high, 1025).tolist())
-    for anchor in (*force.anchors(), low, high):
-        for sign in (1.0, -1.0):
-            limit = high - anchor if sign > 0.0 else anchor - low
-            if limit > 0.0:
-                places.update(anchor + sign * step for step in _away_from_zero(_NEAREST, limit))
-    return sorted(place for place in places if low <= place <= high)
+    places = [0.0] * MOST_PLACES
+    return sorted(set(places[: fill_grid(low, high, force.statics, places)]))
 
 
 def _away_from_zero(first: float, limit: float) -> list[float]:

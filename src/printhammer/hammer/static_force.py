@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from importlib import import_module
-from typing import Any, Final, Protocol
+from typing import Any, Protocol
 
 from printhammer.errors import InputError
+from printhammer.hammer.statics import FARTHER, Statics, free_force, limits_of, reach_of, total_force
 from printhammer.parts import BackstopPart, MagnetPart, PackPart, Part, SpringPart, absent
-
-FAR: Final = 1.0
-"""Search radius about the origin for equilibria if the hammer sets no limit, m; arbitrary."""
 
 
 class HammerLike(Protocol):
@@ -64,17 +62,9 @@ class StaticForce:
         if not hasattr(hammer, "backstop"):
             raise InputError.of("hammer", hammer, "a hammer, such as load('hendriks-1983')")
         self.hammer = hammer
-        self._magnet, self._magnet_constants = law_of(hammer, hammer.magnet, "magnet_force")
-        self._spring, self._spring_constants = law_of(hammer, hammer.spring, "spring_force")
-        self._pack, self._pack_constants = law_of(hammer, hammer.pack, "pack_loading")
-        self._backstop, self._backstop_constants = law_of(hammer, hammer.backstop, "backstop_elastic")
-        self._position = hammer.backstop.position if hammer.backstop is not None else -math.inf
-        self.front = hammer.pack.front if hammer.pack is not None else math.inf
-        self.rigid = hammer.backstop is not None and bool(_flag(hammer.backstop, "RIGID"))
-        self.memory = hammer.pack is not None and bool(_flag(hammer.pack, "MEMORY"))
-        low, high = hammer.magnet.domain if hammer.magnet is not None else (-math.inf, math.inf)
-        self._domain = low, high
-        self.limits = (max(low, self._position) if self.rigid else low), high
+        self.statics = statics_of(hammer)
+        self.front, self.rigid, self.memory = self.statics.front, self.statics.rigid, self.statics.memory
+        self.limits = limits_of(self.statics)
         self.low, self.high = self.reach()
         self.end = self.high
         if hammer.platen is None and hammer.pack is not None:
@@ -82,37 +72,29 @@ class StaticForce:
 
     def free(self, x: float, current: float = 0.0) -> float:
         """Compute the net force of magnet and spring, N, without contacts; NaN outside the magnet's range."""
-        return self.magnet(x, current) + self.spring(x)
+        return free_force(x, current, self.statics)
 
     def total(self, x: float, current: float = 0.0) -> float:
         """Compute the net force including the contacts, N."""
-        # Inlined from `free`, `elastic` and `pack`: function calls dominate the time of an equilibrium
-        # search.
-        force = float(self._magnet(self._magnet_constants, x, current)) + float(
-            self._spring(self._spring_constants, x)
-        )
-        depth = self._position - x
-        if depth > 0.0 and not self.rigid:
-            force += float(self._backstop(self._backstop_constants, math.sqrt(depth)))
-        return force + self.pack(x) if x > self.front else force
+        return total_force(x, current, self.statics)
 
     def magnet(self, x: float, current: float = 0.0) -> float:
         """Compute the force of the magnet, N."""
-        return float(self._magnet(self._magnet_constants, x, current))
+        return float(self.statics.magnet_force(self.statics.magnet, x, current))
 
     def spring(self, x: float) -> float:
         """Compute the force of the spring, N."""
-        return float(self._spring(self._spring_constants, x))
+        return float(self.statics.spring_force(self.statics.spring, x))
 
     def elastic(self, depth: float) -> float:
         """Compute the elastic force of the backstop at a compression depth, m; in N."""
         if depth <= 0.0 or self.rigid:
             return 0.0
-        return float(self._backstop(self._backstop_constants, math.sqrt(depth)))
+        return float(self.statics.backstop_elastic(self.statics.backstop, math.sqrt(depth)))
 
     def pack(self, x: float) -> float:
         """Compute the force of a slowly pressed pack, N."""
-        return float(self._pack(self._pack_constants, x, 0.0)) if x > self.front else 0.0
+        return float(self.statics.pack_loading(self.statics.pack, x, 0.0)) if x > self.front else 0.0
 
     def slope(self, x: float, current: float = 0.0) -> float:
         """Compute the derivative of the total force, contacts included, with respect to x, N/m.
@@ -120,12 +102,12 @@ class StaticForce:
         Each part is differentiated separately, within its contact or range; the backstop with respect to
         sqrt(depth), in which its laws are smooth.
         """
-        room = min(x - self._domain[0], self._domain[1] - x)
+        room = min(x - self.statics.low, self.statics.high - x)
         step = 0.05 * room if math.isfinite(room) else 1e-3
         total = derivative(self.spring, x, 1e-3)
         if self.hammer.magnet is not None:
             total += derivative(lambda place: self.magnet(place, current), x, step)
-        depth = self._position - x
+        depth = self.statics.position - x
         if depth > 0.0 and not self.rigid:
             w = math.sqrt(depth)
             total -= derivative(lambda root: self.elastic(root * root), w, 0.2 * w) / (2.0 * w)
@@ -135,19 +117,40 @@ class StaticForce:
 
     def anchors(self) -> list[float]:
         """Return the positions, m, near which forces vary on short length scales."""
-        places = [self.low, self.high, self._position, self.front, self.hammer.origin, 0.0]
+        places = [self.low, self.high, self.statics.position, self.front, self.hammer.origin, 0.0]
         return sorted({place for place in places if self.low <= place <= self.high})
 
-    def reach(self, far: float = FAR) -> tuple[float, float]:
+    def reach(self, far: float = FARTHER[0]) -> tuple[float, float]:
         """Return the search interval for equilibria, m, within `far` of the origin."""
-        hammer = self.hammer
-        low, high = self.limits
-        if hammer.platen is not None:
-            high = min(high, hammer.platen)
-        elif hammer.pack is not None:
-            # Search a pack without thickness to a depth equal to the distance of its front from the origin.
-            high = min(high, self.front + getattr(hammer.pack, "thickness", abs(self.front - hammer.origin)))
-        return max(low, hammer.origin - far), min(high, hammer.origin + far)
+        return reach_of(far, self.statics)
+
+
+def statics_of(hammer: HammerLike) -> Statics:
+    """Return the law functions and constants on which the static force of a hammer depends."""
+    magnet_force, magnet = law_of(hammer, hammer.magnet, "magnet_force")
+    spring_force, spring = law_of(hammer, hammer.spring, "spring_force")
+    pack_loading, pack = law_of(hammer, hammer.pack, "pack_loading")
+    backstop_elastic, backstop = law_of(hammer, hammer.backstop, "backstop_elastic")
+    low, high = hammer.magnet.domain if hammer.magnet is not None else (-math.inf, math.inf)
+    return Statics(
+        magnet_force,
+        spring_force,
+        pack_loading,
+        backstop_elastic,
+        magnet,
+        spring,
+        pack,
+        backstop,
+        position=hammer.backstop.position if hammer.backstop is not None else -math.inf,
+        front=hammer.pack.front if hammer.pack is not None else math.inf,
+        rigid=hammer.backstop is not None and bool(_flag(hammer.backstop, "RIGID")),
+        memory=hammer.pack is not None and bool(_flag(hammer.pack, "MEMORY")),
+        has_magnet=hammer.magnet is not None,
+        low=low,
+        high=high,
+        platen=math.nan if hammer.platen is None else hammer.platen,
+        thickness=getattr(hammer.pack, "thickness", math.nan),
+    )
 
 
 def derivative(function: Callable[[float], float], x: float, step: float) -> float:

@@ -5,6 +5,7 @@ These functions also stand in for functions that the module of a part omits.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 MEMORY = False
@@ -99,3 +100,27 @@ def backstop_switch(c: Any, w: float, v: float) -> float:
 def backstop_rebound(c: Any, v_in: float) -> float:
     """Return the rebound velocity of a perfectly elastic surface, -v_in, m/s."""
     return -v_in
+
+
+def magnet_packed(q: Any, origin: float, c: Any) -> int:
+    """Write the packed constants of a law without a function of its own: the numbers before the domain."""
+    for k in range(len(q) - 2):
+        c[k] = q[k]
+    return max(len(q) - 2, 0)
+
+
+def magnet_domain(q: Any, ends: Any) -> None:
+    """Write the range of displacements of a law without a function of its own, m: its last two numbers."""
+    ends[0], ends[1] = -math.inf, math.inf
+    if len(q) > 1:
+        ends[0], ends[1] = q[len(q) - 2], q[len(q) - 1]
+
+
+def _copy(q: Any, origin: float, c: Any) -> int:
+    """Write the packed constants of a law without a function of its own: its numbers."""
+    for k in range(len(q)):
+        c[k] = q[k]
+    return len(q)
+
+
+spring_packed = pack_packed = backstop_packed = damping_packed = _copy

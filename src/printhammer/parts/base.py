@@ -10,14 +10,17 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from printhammer.parts.functions import check_functions
-from printhammer.support.constants import invalid
+from printhammer.support.constants import invalid, options, quantities
 
 ROLES: tuple[str, ...] = ("magnet", "coil", "spring", "pack", "backstop", "damping")
+
+_ROOM: Final = 16
+"""Largest number of packed constants of a law that has a function to pack them."""
 
 
 class Part(BaseModel):
@@ -36,6 +39,8 @@ class Part(BaseModel):
 
     role: ClassVar[str]
     law: ClassVar[str]
+    variant: ClassVar[int] = 0
+    """Index of the law among those of its module, which share their functions."""
 
     if not TYPE_CHECKING:
 
@@ -52,9 +57,35 @@ class Part(BaseModel):
     def packed(self, origin: float) -> tuple[float, ...]:
         """Return the constants, SI, that the law functions read from `c`, in the order stated by the module.
 
-        `origin` is the position of the backstop, b of equation (4), or 0 without a backstop, m.
+        `origin` is the position of the backstop, b of equation (4), or 0 without a backstop, m. By default
+        the function ``<role>_packed(q, origin, c)`` of the module writes the constants from the `numbers`.
         """
-        raise NotImplementedError
+        pack = self.function(f"{self.role}_packed")
+        if pack is None:
+            raise NotImplementedError
+        constants = [0.0] * _ROOM
+        return tuple(constants[: pack(self.numbers(), origin, constants)])
+
+    @classmethod
+    def function(cls, name: str) -> Any:
+        """Return a function of the module of the part or of a base class; None if there is none."""
+        modules = (vars(sys.modules[base.__module__]) for base in cls.__mro__ if issubclass(base, Part))
+        return next((module[name] for module in modules if name in module), None)
+
+    @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """Names of the fields in `numbers`: physical constants, then options, in order of declaration."""
+        further = (name for name, kind in options(cls).items() if kind is bool or get_origin(kind) is Literal)
+        return (*quantities(cls), *further)
+
+    def numbers(self) -> tuple[float, ...]:
+        """Return the fields as numbers, and the index of the law among those of the module.
+
+        A missing constant is NaN, an option 0 or 1 or the index of its choice.
+        """
+        kinds = options(type(self))
+        values = ((getattr(self, name), kinds.get(name)) for name in self.names())
+        return (*(_number(value, kind) for value, kind in values), float(self.variant))
 
     def content(self) -> Mapping[str, Any]:
         """Return the numbers read from a further file, such as a table, that identify the part."""
@@ -73,8 +104,15 @@ class MagnetPart(Part):
 
     @property
     def domain(self) -> tuple[float, float]:
-        """Range of displacements in which the law is valid, `(x_min, x_max)`, m."""
-        return (-math.inf, math.inf)
+        """Range of displacements in which the law is valid, `(x_min, x_max)`, m.
+
+        By default the function ``magnet_domain(q, ends)`` of the module writes it to `ends`.
+        """
+        ends = [-math.inf, math.inf]
+        bounds = self.function("magnet_domain")
+        if bounds is not None:
+            bounds(self.numbers(), ends)
+        return (ends[0], ends[1])
 
     @property
     def has_linkage(self) -> bool:
@@ -159,3 +197,10 @@ def register(part: _P) -> _P:
 def laws(role: str) -> tuple[str, ...]:
     """List the names of the registered laws of a role, sorted."""
     return tuple(sorted(law for known, law in PARTS if known == role))
+
+
+def _number(value: Any, kind: Any) -> float:
+    """Return a field as a number; `kind` is the annotation of an option."""
+    if get_origin(kind) is Literal:
+        return float(get_args(kind).index(value))
+    return math.nan if value is None else float(value)

@@ -18,7 +18,8 @@ Packed constants: c = [resistance, inductance, turn_resistance, leakage, back_em
 
 from __future__ import annotations
 
-from typing import ClassVar, Final, Self
+import math
+from typing import Any, ClassVar, Final, Self
 
 from pydantic import Field, model_validator
 
@@ -30,6 +31,21 @@ COPPER: Final = 3.93e-3
 
 REFERENCE: Final = 20.0
 """Temperature at which the resistance of the winding is stated, degC."""
+
+
+def warm_resistance(resistance: float, temperature: float) -> float:
+    """Return the resistance of a copper winding, ohm, at a temperature, degC."""
+    return resistance * (1.0 + COPPER * (temperature - REFERENCE))
+
+
+def coil_packed(q: Any, origin: float, c: Any) -> int:
+    """Write the packed constants from the numbers of the part; return their number."""
+    c[0] = 0.0 if math.isnan(q[0]) else warm_resistance(q[0], q[2])
+    c[1] = q[1]
+    c[2] = 0.0 if math.isnan(q[3]) else q[3]
+    c[3] = 0.0 if math.isnan(q[4]) else q[4]
+    c[4] = q[5]
+    return 5
 
 
 @register
@@ -63,9 +79,4 @@ class Winding(CoilPart):
     @property
     def warm_resistance(self) -> float:
         """Resistance at the winding temperature, ohm; 0 if no resistance is stated."""
-        return (self.resistance or 0.0) * (1.0 + COPPER * (self.temperature - REFERENCE))
-
-    def packed(self, origin: float) -> tuple[float, ...]:
-        """Return the packed constants, with the resistance at the winding temperature."""
-        turn, leakage = self.turn_resistance or 0.0, self.leakage or 0.0
-        return (self.warm_resistance, self.inductance, turn, leakage, float(self.back_emf))
+        return warm_resistance(self.resistance or 0.0, self.temperature)

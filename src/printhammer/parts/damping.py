@@ -23,6 +23,12 @@ def damping_force(c: Any, v: float) -> float:
     return float(-c[0] * v)
 
 
+def damping_packed(q: Any, origin: float, c: Any) -> int:
+    """Write the packed constants (coefficient,) from the numbers of the part; return their number."""
+    c[0] = q[0]
+    return 1
+
+
 @register
 class ViscousDamping(DampingPart):
     """Coefficient of the viscous damping."""
@@ -30,7 +36,3 @@ class ViscousDamping(DampingPart):
     law: ClassVar[str] = "viscous"
 
     coefficient: float = quantity("N s/m", "c", "viscous damping of the armature", ge=0)
-
-    def packed(self, origin: float) -> tuple[float, ...]:
-        """Return the packed constants (coefficient,)."""
-        return (self.coefficient,)

@@ -2,14 +2,19 @@
 
 The function is smooth between the points of a grid. The search looks for sign changes, and for pairs of roots
 between grid points, and bisects each bracket down to neighbouring floating-point numbers.
+
+`bisected` and `find_roots` are plain functions, which can be compiled: they call ``function(x, about)`` and
+write to arrays. `bisect` and `roots` are their counterparts for functions of one number.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
+
+import numpy as np
 
 _PIECES: Final = 16  # Number of subintervals per round of refinement; arbitrary
 _ROUNDS: Final = 16  # Number of rounds: 16 rounds of 16 subintervals exhaust the bits of a float
@@ -17,6 +22,10 @@ _PROBE: Final = 1e-6  # Distance of a probe from a root at a grid point, as a fr
 _SLOPE: Final = 1e-3  # Step of the slope at the ends of a cell, as a fraction of the cell; arbitrary
 # Rounding turns a root into a short stretch of zeros.
 _FLAT: Final = 1e-12
+
+
+MOST_POINTS: Final = 3
+"""Largest number of points at which a function is evaluated per grid point."""
 
 
 @dataclass(frozen=True)
@@ -35,18 +44,7 @@ def bisect(function: Callable[[float], float], low: float, high: float) -> float
     -------
     The float next to the sign change at which the absolute value of the function is smaller.
     """
-    at_low, at_high = function(low), function(high)
-    while True:
-        middle = 0.5 * (low + high)
-        if not low < middle < high:
-            return low if abs(at_low) <= abs(at_high) else high
-        value = function(middle)
-        if value == 0.0:
-            return middle
-        if (value > 0.0) == (at_low > 0.0):
-            low, at_low = middle, value
-        else:
-            high, at_high = middle, value
+    return bisected(_call, function, low, high)
 
 
 def roots(function: Callable[[float], float], grid: Sequence[float]) -> list[Root]:
@@ -56,93 +54,161 @@ def roots(function: Callable[[float], float], grid: Sequence[float]) -> list[Roo
     zero, which contain no isolated root. Two roots between neighbouring grid points are found, unless they
     lie closer together than about 1e-8 of the grid spacing; of three roots only one is found.
     """
-    isolated: list[Root] = []
-    points = _with_probes(function, grid)
-    for first, last in _stretches([value for _, value in points]):
-        isolated += _in_stretch(function, points[first : last + 1])
+    room = MOST_POINTS * len(grid)
+    found = np.empty((room, 3))
+    count = find_roots(_call, function, grid, len(grid), [0.0] * room, [0.0] * room, found)
+    isolated = [Root(x, int(before), int(after)) for x, before, after in found[:count].tolist()]
     return sorted(isolated, key=lambda root: root.x)
 
 
-def _with_probes(function: Callable[[float], float], grid: Sequence[float]) -> list[tuple[float, float]]:
-    """Evaluate a function on the grid, and beside grid points that are roots, for the signs on both sides."""
-    points: list[tuple[float, float]] = []
-    for k, x in enumerate(grid):
-        value = function(x)
+def _call(x: float, function: Callable[[float], float]) -> float:
+    return function(x)
+
+
+def bisected(function: Any, about: Any, low: float, high: float) -> float:
+    """Find a root of ``function(x, about)`` by bisection, see `bisect`."""
+    at_low, at_high = function(low, about), function(high, about)
+    while True:
+        middle = 0.5 * (low + high)
+        if not low < middle < high:
+            return low if abs(at_low) <= abs(at_high) else high
+        value = function(middle, about)
+        if value == 0.0:
+            return middle
+        if (value > 0.0) == (at_low > 0.0):
+            low, at_low = middle, value
+        else:
+            high, at_high = middle, value
+
+
+def find_roots(function: Any, about: Any, grid: Any, count: int, places: Any, values: Any, found: Any) -> int:
+    """Find the roots of ``function(x, about)`` on the first `count` points of an ascending grid, see `roots`.
+
+    Parameters
+    ----------
+    function, about
+        Function and its second argument.
+    grid : float64 array
+        Points of the grid.
+    count : int
+        Number of points.
+    places, values : float64 array, shape (3 count,)
+        Working space.
+    found : float64 array, shape (3 count, 3)
+        Root, and sign of the function before and after the root; 0 at an end of the grid.
+
+    Returns
+    -------
+    int
+        Number of roots.
+    """
+    points = with_probes(function, about, grid, count, places, values)
+    roots_found, first = 0, 0
+    for k in range(points + 1):
+        if k == points or math.isnan(values[k]):
+            if first < k:
+                roots_found = in_stretch(function, about, places, values, first, k - 1, found, roots_found)
+            first = k + 1
+    return roots_found
+
+
+def with_probes(function: Any, about: Any, grid: Any, count: int, places: Any, values: Any) -> int:
+    """Evaluate a function on the grid, and beside grid points that are roots, for the signs on both sides.
+
+    Returns
+    -------
+    int
+        Number of points written to `places` and `values`.
+    """
+    n = 0
+    for k in range(count):
+        x = grid[k]
+        value = function(x, about)
         if value == 0.0 and k > 0:
-            before = x - _PROBE * (x - grid[k - 1])
-            points.append((before, function(before)))
-        points.append((x, value))
-        if value == 0.0 and k + 1 < len(grid):
-            after = x + _PROBE * (grid[k + 1] - x)
-            points.append((after, function(after)))
-    return points
+            places[n] = x - _PROBE * (x - grid[k - 1])
+            values[n] = function(places[n], about)
+            n += 1
+        places[n], values[n] = x, value
+        n += 1
+        if value == 0.0 and k + 1 < count:
+            places[n] = x + _PROBE * (grid[k + 1] - x)
+            values[n] = function(places[n], about)
+            n += 1
+    return n
 
 
-def _stretches(values: Sequence[float]) -> Iterator[tuple[int, int]]:
-    """Split the grid into runs of points without NaN; yield the first and last index of each run."""
-    start = None
-    for k, value in enumerate([*values, math.nan]):
-        if math.isnan(value):
-            if start is not None:
-                yield start, k - 1
-            start = None
-        elif start is None:
-            start = k
-
-
-def _in_stretch(function: Callable[[float], float], points: Sequence[tuple[float, float]]) -> list[Root]:
-    isolated = []
-    last = len(points) - 1
-    k = 0
+def in_stretch(
+    function: Any, about: Any, places: Any, values: Any, begin: int, last: int, found: Any, count: int
+) -> int:
+    """Append the roots between two points without NaN in between; return the new number of roots."""
+    k = begin
     while k <= last:
-        x, value = points[k]
+        x, value = places[k], values[k]
         if value == 0.0:
             first = k
-            while k < last and points[k + 1][1] == 0.0:
+            while k < last and values[k + 1] == 0.0:
                 k += 1
-            alone = points[k][0] - points[first][0] <= _FLAT and not (first == 0 and k == last)
+            alone = places[k] - places[first] <= _FLAT and not (first == begin and k == last)
             if alone:
-                before = points[first - 1][1] if first > 0 else 0.0
-                after = points[k + 1][1] if k < last else 0.0
-                isolated.append(Root(points[(first + k) // 2][0], _sign(before), _sign(after)))
+                before = sign_of(values[first - 1]) if first > begin else 0.0
+                after = sign_of(values[k + 1]) if k < last else 0.0
+                count = put_root(found, count, places[begin + (first + k - 2 * begin) // 2], before, after)
         elif k < last:
-            end, after = points[k + 1]
+            end, after = places[k + 1], values[k + 1]
+            sign = sign_of(value)
             if value * after < 0.0:
-                isolated.append(Root(bisect(function, x, end), _sign(value), _sign(after)))
+                count = put_root(found, count, bisected(function, about, x, end), sign, sign_of(after))
             elif after != 0.0:
-                isolated += _pair(function, points[k], points[k + 1])
+                best, height = dip_of(function, about, x, value, end, after)
+                if height < 0.0:
+                    count = put_root(found, count, bisected(function, about, x, best), sign, -sign)
+                    count = put_root(found, count, bisected(function, about, best, end), -sign, sign)
+                elif height == 0.0:
+                    count = put_root(found, count, best, sign, sign)
         k += 1
-    return isolated
+    return count
 
 
-def _pair(
-    function: Callable[[float], float], start: tuple[float, float], end: tuple[float, float]
-) -> list[Root]:
-    """Search for a pair of roots between two points at which the function has the same sign."""
-    (low, at_low), (high, at_high) = start, end
-    sign = _sign(at_low)
+def dip_of(
+    function: Any, about: Any, low: float, at_low: float, high: float, at_high: float
+) -> tuple[float, float]:
+    """Search for a dip to zero between two points at which the function has the same sign.
+
+    Returns
+    -------
+    tuple of float
+        Point with the smallest height, and the height, i.e. the value with the sign of the ends; a positive
+        height if the function does not reach zero.
+    """
+    sign = sign_of(at_low)
     step = _SLOPE * (high - low)
-    if sign * (function(low + step) - at_low) >= 0.0 or sign * (function(high - step) - at_high) >= 0.0:
-        return []
+    if sign * (function(low + step, about) - at_low) >= 0.0:
+        return low, 1.0
+    if sign * (function(high - step, about) - at_high) >= 0.0:
+        return low, 1.0
     left, right = low, high
     for _ in range(_ROUNDS):
-        grid = [left + (right - left) * k / _PIECES for k in range(_PIECES + 1)]
-        values = [sign * function(x) for x in grid]
-        k = min(range(_PIECES + 1), key=values.__getitem__)
-        best, height = grid[k], values[k]
-        if height < 0.0:
-            return [
-                Root(bisect(function, low, best), sign, -sign),
-                Root(bisect(function, best, high), -sign, sign),
-            ]
-        if height == 0.0:
-            return [Root(best, sign, sign)]
+        lowest, highest, k = math.inf, -math.inf, 0
+        for piece in range(_PIECES + 1):
+            height = sign * function(left + (right - left) * piece / _PIECES, about)
+            highest = max(highest, height)
+            if height < lowest:
+                lowest, k = height, piece
+        best = left + (right - left) * k / _PIECES
         # Sample a dip that reaches zero far below its rims.
-        if height > max(values) - height:
-            return []
-        left, right = grid[max(k - 1, 0)], grid[min(k + 1, _PIECES)]
-    return []
+        if lowest <= 0.0 or lowest > highest - lowest:
+            return best, lowest
+        width = right - left
+        left, right = left + width * max(k - 1, 0) / _PIECES, left + width * min(k + 1, _PIECES) / _PIECES
+    return left, 1.0
 
 
-def _sign(value: float) -> int:
-    return (value > 0.0) - (value < 0.0)
+def put_root(found: Any, count: int, x: float, before: float, after: float) -> int:
+    """Append a root with the signs on both sides; return the new number of roots."""
+    found[count, 0], found[count, 1], found[count, 2] = x, before, after
+    return count + 1
+
+
+def sign_of(value: float) -> float:
+    """Return the sign of a number: -1, 0 or 1."""
+    return float(value > 0.0) - float(value < 0.0)

@@ -11,7 +11,7 @@ from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from printhammer.kernel.compile.cache import File
-from printhammer.kernel.model.laws import LAW_FUNCTIONS
+from printhammer.kernel.model.laws import LAW_FUNCTIONS, PACKING
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -20,11 +20,15 @@ if TYPE_CHECKING:
 
 
 class Bindings(NamedTuple):
-    """Law functions by name, choices by name, and for each part a digest of the sources of its laws."""
+    """Law functions by name, choices by name, and for each part a digest of the sources of its laws.
+
+    `packing` holds the functions, by name, that pack the constants of each part.
+    """
 
     names: dict[str, Any]
     choices: dict[str, bool]
     digests: dict[str, str]
+    packing: dict[str, Any]
 
 
 def bindings_of(laws: Laws) -> Bindings:
@@ -35,6 +39,7 @@ def bindings_of(laws: Laws) -> Bindings:
     absent = importlib.import_module(laws.absent)
     names: dict[str, Any] = {}
     digests: dict[str, str] = {}
+    packing: dict[str, Any] = {}
     choices = {
         "FORCE_DRIVE": laws.force_drive,
         "HAS_CIRCUIT": laws.circuit,
@@ -47,6 +52,8 @@ def bindings_of(laws: Laws) -> Bindings:
         module = importlib.import_module(name) if name else absent
         for function in functions:
             names[function] = getattr(module, function, None) or getattr(absent, function)
+        for function in PACKING[role]:
+            packing[function] = getattr(module, function, None) or getattr(absent, function)
         used = {name for function in functions for name in _modules_of(names[function])}
         others = sorted(used - {module.__name__, absent.__name__})
         sources = (absent, module, *(sys.modules[other] for other in others))
@@ -55,7 +62,7 @@ def bindings_of(laws: Laws) -> Bindings:
         for role_of_choice, choice in (("pack", "MEMORY"), ("backstop", "RIGID")):
             if role == role_of_choice:
                 choices[choice] = bool(getattr(module, choice, False))
-    return Bindings(names, choices, digests)
+    return Bindings(names, choices, digests, packing)
 
 
 def code_digest(sources: Iterable[str]) -> str:

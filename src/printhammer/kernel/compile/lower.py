@@ -58,13 +58,13 @@ def template(entry: str, variant: Mapping[str, bool]) -> bytes:
     return _entry(namespace[entry], entry, signature_of(entry, variant), RESULTS[entry])
 
 
-def plain(name: str, entry: Plain, circuit: bool | None) -> bytes:
+def plain(name: str, entry: Plain, circuit: bool | None, packing: Mapping[str, Any]) -> bytes:
     """Lower a plain function as an entry point; return LLVM bitcode.
 
     `circuit` states whether the hammer has a coil circuit; None for a function that uses no names of the
-    kernel.
+    kernel. `packing` holds further functions by name.
     """
-    namespace = {} if circuit is None else _plain(circuit)
+    namespace = {**packing, **({} if circuit is None else _plain(circuit))}
     return _entry(bind(entry.function, namespace, compiled), name, entry.arguments, entry.results)
 
 

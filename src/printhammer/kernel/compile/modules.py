@@ -13,6 +13,7 @@ from contextlib import suppress
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.kernel.compile import calls, link
@@ -50,6 +51,8 @@ _SOURCES: Final = {
     "members": (*_PLAIN, "lanes"),
     "flow": (*_PLAIN, "variational"),
 }
+
+_NONE: Final[Mapping[str, Any]] = MappingProxyType({})
 
 one_at_a_time: Final = threading.RLock()
 
@@ -134,17 +137,21 @@ def template_of(entry: str, variant: Mapping[str, bool]) -> Module:
     return Module(entry, f"{entry} {sorted(variant.items())} {sources}", make)
 
 
-def plain_template(name: str, plain: Plain, circuit: bool) -> Module:
-    """Return the template of a plain function, in a variant if it uses names of the kernel."""
+def plain_template(name: str, plain: Plain, circuit: bool, packing: Mapping[str, Any] = _NONE) -> Module:
+    """Return the template of a plain function, in a variant if it uses names of the kernel.
+
+    `packing` holds the functions that pack constants, for a function that uses them.
+    """
+    packing = packing if plain.packing else {}
 
     def make() -> bytes:
         from printhammer.kernel.compile import lower
 
-        return lower.plain(name, plain, circuit if plain.laws else None)
+        return lower.plain(name, plain, circuit if plain.laws else None, packing)
 
     sources = _digest_of(_SOURCES["members"] if plain.laws else _LOWERING)
     kind = circuit if plain.laws else None
-    own = plain_digest(plain.function)
+    own = [plain_digest(function) for function in (plain.function, *packing.values())]
     return Module(name, f"{name} {plain.arguments} {plain.results} {kind} {sources} {own}", make)
 
 
@@ -214,7 +221,7 @@ class Entry:
             self._template = template_of(name, variant)
             self._signature, self._results = signature_of(name, variant), RESULTS[name]
         else:
-            self._template = plain_template(name, plain, variant["HAS_CIRCUIT"])
+            self._template = plain_template(name, plain, variant["HAS_CIRCUIT"], bindings.packing)
             self._signature, self._results = plain.arguments, plain.results
             if not plain.laws:
                 flavours, self._choices = (), {}

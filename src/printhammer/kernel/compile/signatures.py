@@ -86,3 +86,5 @@ class Plain(NamedTuple):
     """Number of integers that the function returns."""
     laws: bool = False
     """Whether the function uses names of the kernel."""
+    packing: bool = False
+    """Whether the function uses functions that pack the constants of parts."""

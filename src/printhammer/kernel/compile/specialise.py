@@ -90,7 +90,8 @@ class Kernel:
     def plain(self, name: str, function: Plain) -> Callable[..., Any]:
         """Return a plain function, with the laws of the kernel, as machine code that Python calls."""
         if is_interpreted():
-            return cast("Callable[..., Any]", bind(function.function, self.namespace, _as_is))
+            names = {**bindings_of(self.laws).packing, **self.namespace}
+            return cast("Callable[..., Any]", bind(function.function, names, _as_is))
         return _plain_entry(name, function, self.laws).function()
 
     @functools.cached_property

@@ -93,8 +93,9 @@ def bind(function: Any, namespace: Mapping[str, Any], compiled: Callable[..., An
         scope = dict(function.__globals__)
         missing = {name for name in function.__code__.co_names if name in namespace and name not in scope}
         scope.update({name: namespace[name] for name in missing})
-        for name, helper in helpers_of(function).items():
-            scope[name] = bind(helper, namespace, compiled, known)
+        for name in function.__code__.co_names:
+            if isinstance(scope.get(name), FunctionType):
+                scope[name] = bind(scope[name], namespace, compiled, known)
         copy = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
         known[function] = compiled(copy)
     return known[function]

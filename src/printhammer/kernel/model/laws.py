@@ -80,6 +80,12 @@ LAW_FUNCTIONS = {
 }
 """Names of the law functions that each part may define."""
 
+PACKING = {role: (f"{role}_packed",) for role in LAW_FUNCTIONS} | {
+    "magnet": ("magnet_packed", "magnet_domain")
+}
+"""Names of the functions of each part that pack its constants, and write the range of displacements of a
+magnet's law."""
+
 
 def floats_of(law: str) -> int:
     """Return the number of float arguments of a law function, not counting the array of constants."""

@@ -16,8 +16,16 @@ def stiffness_from_bodies(
     Equation: k = (4/3) E* sqrt(R), 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2, 1/R = 1/R1 + 1/R2; K. L. Johnson,
     Contact Mechanics (1985), section 4.2. Radii are in m, the second None for a flat, Young's moduli in Pa.
     """
-    compliance = sum((1.0 - nu * nu) / e for e, nu in zip(youngs_moduli, poisson_ratios, strict=True))
-    curvature = 1.0 / radius1 + (0.0 if radius2 is None else 1.0 / radius2)
+    flat = math.nan if radius2 is None else radius2
+    return hertz_stiffness(radius1, flat, *youngs_moduli, *poisson_ratios)
+
+
+def hertz_stiffness(
+    radius1: float, radius2: float, modulus1: float, modulus2: float, ratio1: float, ratio2: float
+) -> float:
+    """Return the stiffness of `stiffness_from_bodies`; the second radius is NaN for a flat."""
+    compliance = (1.0 - ratio1 * ratio1) / modulus1 + (1.0 - ratio2 * ratio2) / modulus2
+    curvature = 1.0 / radius1 + (0.0 if math.isnan(radius2) else 1.0 / radius2)
     return 4.0 / (3.0 * compliance * math.sqrt(curvature))
 
 

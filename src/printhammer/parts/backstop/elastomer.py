@@ -49,6 +49,12 @@ def backstop_switch(c: Any, w: float, v: float) -> float:
     return float(c[0] * w * w - c[1] * v)
 
 
+def backstop_packed(q: Any, origin: float, c: Any) -> int:
+    """Write the packed constants (k, 1.5 k A, pull) from the numbers of the part; return their number."""
+    c[0], c[1], c[2] = q[1], 1.5 * q[1] * q[2], q[3]
+    return 3
+
+
 @register
 class ElastomerBackstop(BackstopPart):
     """Constants of the viscoelastic Hertz contact: stiffness k and relaxation time A."""
@@ -59,7 +65,3 @@ class ElastomerBackstop(BackstopPart):
     stiffness: float = quantity("N/m^1.5", "k", "stiffness of the elastomer", gt=0)
     relaxation_time: float = quantity("s", "A", "relaxation time of the elastomer", ge=0)
     pull: bool = False
-
-    def packed(self, origin: float) -> tuple[float, ...]:
-        """Return the packed constants (k, 1.5 k A, pull)."""
-        return (self.stiffness, 1.5 * self.stiffness * self.relaxation_time, 1.0 if self.pull else 0.0)

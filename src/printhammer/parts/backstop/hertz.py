@@ -13,11 +13,12 @@ Packed constants: c = [k, l, 1 if it may pull else 0].
 
 from __future__ import annotations
 
+import math
 from typing import Any, ClassVar
 
 from pydantic import model_validator
 
-from printhammer.parts.backstop._hertz import damping_from_restitution, stiffness_from_bodies
+from printhammer.parts.backstop._hertz import damping_from_restitution, hertz_stiffness
 from printhammer.parts.base import BackstopPart, register
 from printhammer.support.constants import quantity
 
@@ -49,6 +50,22 @@ def backstop_switch(c: Any, w: float, v: float) -> float:
     if c[2] != 0.0:
         return 1.0
     return float(c[0] - c[1] * v)
+
+
+_STIFFNESS, _DAMPING, _RESTITUTION, _SPEED, _PULL = 1, 8, 9, 10, 11
+"""Indices of the numbers of the part; those of the two bodies are between stiffness and damping."""
+
+
+def backstop_packed(q: Any, origin: float, c: Any) -> int:
+    """Write the packed constants (k, l, pull) from the numbers of the part; return their number."""
+    c[0] = q[_STIFFNESS]
+    if math.isnan(c[0]):
+        c[0] = hertz_stiffness(q[2], q[3], q[4], q[5], q[6], q[7])
+    c[1] = q[_DAMPING]
+    if math.isnan(c[1]):
+        c[1] = damping_from_restitution(c[0], q[_RESTITUTION], q[_SPEED])
+    c[2] = q[_PULL]
+    return 3
 
 
 _BODIES = (
@@ -111,23 +128,9 @@ class HertzBackstop(BackstopPart):
     @property
     def k(self) -> float:
         """Hertz stiffness of equation (6), N/m^1.5, stated or computed from the two bodies."""
-        if self.stiffness is not None:
-            return self.stiffness
-        r1, e1, e2 = self.radius1, self.youngs_modulus1, self.youngs_modulus2
-        nu1, nu2 = self.poisson_ratio1, self.poisson_ratio2
-        if r1 is None or e1 is None or e2 is None or nu1 is None or nu2 is None:
-            raise ValueError(_BODIES)
-        return stiffness_from_bodies(r1, self.radius2, (e1, e2), (nu1, nu2))
+        return self.packed(0.0)[0]
 
     @property
     def l(self) -> float:  # noqa: E743
         """Damping of equation (7), N s/m^2.5, stated or computed from the restitution."""
-        if self.damping is not None:
-            return self.damping
-        if self.restitution is None or self.restitution_speed is None:
-            raise ValueError(_REBOUND)
-        return damping_from_restitution(self.k, self.restitution, self.restitution_speed)
-
-    def packed(self, origin: float) -> tuple[float, ...]:
-        """Return the packed constants (k, l, pull)."""
-        return (self.k, self.l, 1.0 if self.pull else 0.0)
+        return self.packed(0.0)[1]

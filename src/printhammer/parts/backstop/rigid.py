@@ -24,6 +24,12 @@ def backstop_rebound(c: Any, v_in: float) -> float:
     return float(-c[0] * v_in)
 
 
+def backstop_packed(q: Any, origin: float, c: Any) -> int:
+    """Write the packed constants (e,) from the numbers of the part; return their number."""
+    c[0] = q[1]
+    return 1
+
+
 @register
 class RigidBackstop(BackstopPart):
     """Position and coefficient of restitution of a rigid backstop."""
@@ -32,7 +38,3 @@ class RigidBackstop(BackstopPart):
 
     position: float = quantity("m", "b", "position of the backstop")
     restitution: float = quantity("1", "e", "coefficient of restitution", ge=0, le=1)
-
-    def packed(self, origin: float) -> tuple[float, ...]:
-        """Return the packed constants (e,)."""
-        return (self.restitution,)

@@ -81,6 +81,18 @@ def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float
     return float((linkage - depth * c[1]) / slope)
 
 
+def magnet_packed(q: Any, origin: float, c: Any) -> int:
+    """Write the packed constants (F0, Am, Bm) from the numbers of the part; return their number."""
+    c[0], c[1], c[2] = q[0], q[1], q[2]
+    return 3
+
+
+def magnet_domain(q: Any, ends: Any) -> None:
+    """Write the range of displacements in which the law is valid, m; open at 0."""
+    ends[0] = 0.0 if math.isnan(q[3]) else q[3]
+    ends[1] = math.inf if math.isnan(q[4]) else q[4]
+
+
 @register
 class InverseRootMagnet(MagnetPart):
     """Constants of equation (3): F0, Am and Bm."""
@@ -98,15 +110,3 @@ class InverseRootMagnet(MagnetPart):
         if self.range_min is not None and self.range_max is not None and self.range_min >= self.range_max:
             raise ValueError("range_min is not below range_max")
         return self
-
-    @property
-    def domain(self) -> tuple[float, float]:
-        """Range of displacements in which the law is valid, `(x_min, x_max)`, m; open at 0."""
-        return (
-            0.0 if self.range_min is None else self.range_min,
-            math.inf if self.range_max is None else self.range_max,
-        )
-
-    def packed(self, origin: float) -> tuple[float, ...]:
-        """Return the packed constants (F0, Am, Bm)."""
-        return (self.F0, self.Am, self.Bm)

@@ -56,6 +56,12 @@ def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float
     return float((linkage - c[0] * x) / inductance) if inductance > 0.0 else math.nan
 
 
+def magnet_packed(q: Any, origin: float, c: Any) -> int:
+    """Write the packed constants (k,) from the numbers of the part; return their number."""
+    c[0] = q[0]
+    return 1
+
+
 @register
 class MovingCoilMagnet(MagnetPart):
     """Force constant k of a moving coil."""
@@ -63,7 +69,3 @@ class MovingCoilMagnet(MagnetPart):
     law: ClassVar[str] = "moving-coil"
 
     constant: float = quantity("N/A", "k", "force per current, and back-EMF per speed")
-
-    def packed(self, origin: float) -> tuple[float, ...]:
-        """Return the packed constants (k,)."""
-        return (self.constant,)

@@ -134,6 +134,37 @@ def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float
     return float(linkage * turned / (1.0 + stray * turned))
 
 
+_TURNS, _AREA, _CLOSED_AT, _RESIDUAL_GAP, _PERIMETER, _HEIGHT = range(6)
+_CORE, _SATURATION, _LEAKAGE, _REACH, _PULL = range(6, 11)
+"""Indices of the numbers of the part; the pull is 0 toward the paper and 1 toward the backstop."""
+
+
+def magnet_packed(q: Any, origin: float, c: Any) -> int:
+    """Write the packed constants in the order stated by the module; return their number."""
+    square = q[_TURNS] ** 2
+    scale = MU0 * square
+    c[0] = -1.0 if q[_PULL] == 0.0 else 1.0
+    c[1] = q[_CLOSED_AT]
+    c[2] = scale * q[_AREA]
+    c[3] = q[_RESIDUAL_GAP]
+    c[4] = scale * q[_PERIMETER] / math.pi
+    c[5] = 2.0 * q[_HEIGHT]
+    c[6] = q[_LEAKAGE]
+    c[7] = 0.0 if math.isnan(q[_REACH]) else q[_LEAKAGE] / q[_REACH]
+    c[8] = q[_CORE] / square
+    c[9] = 0.0 if math.isnan(q[_SATURATION]) else 1.0 / (q[_TURNS] * q[_SATURATION])
+    return 10
+
+
+def magnet_domain(q: Any, ends: Any) -> None:
+    """Write the range of displacements in which the law is valid, m; open where the gap is -g0."""
+    reach = math.inf if math.isnan(q[_REACH]) else q[_REACH]
+    if q[_PULL] == 0.0:
+        ends[0], ends[1] = q[_CLOSED_AT] - reach, q[_CLOSED_AT] + q[_RESIDUAL_GAP]
+    else:
+        ends[0], ends[1] = q[_CLOSED_AT] - q[_RESIDUAL_GAP], q[_CLOSED_AT] + reach
+
+
 @register
 class ReluctanceMagnet(MagnetPart):
     """Constants of a magnetic circuit with one gap."""
@@ -161,27 +192,3 @@ class ReluctanceMagnet(MagnetPart):
         if self.leakage_reach is not None and self.leakage == 0.0:
             raise ValueError("leakage_reach is given without a leakage: expected both or the leakage alone")
         return self
-
-    @property
-    def domain(self) -> tuple[float, float]:
-        """Range of displacements in which the law is valid, m; open where the gap is -g0."""
-        reach = math.inf if self.leakage_reach is None else self.leakage_reach
-        if self.pull == "paper":
-            return (self.closed_at - reach, self.closed_at + self.residual_gap)
-        return (self.closed_at - self.residual_gap, self.closed_at + reach)
-
-    def packed(self, origin: float) -> tuple[float, ...]:
-        """Return the packed constants in the order stated by the module."""
-        scale = MU0 * self.turns**2
-        return (
-            -1.0 if self.pull == "paper" else 1.0,
-            self.closed_at,
-            scale * self.pole_area,
-            self.residual_gap,
-            scale * self.fringe_perimeter / math.pi,
-            2.0 * self.fringe_height,
-            self.leakage,
-            0.0 if self.leakage_reach is None else self.leakage / self.leakage_reach,
-            self.core_reluctance / self.turns**2,
-            0.0 if self.saturation_flux is None else 1.0 / (self.turns * self.saturation_flux),
-        )

@@ -49,6 +49,12 @@ def pack_switch(c: Any, x: float, v: float) -> float:
     return float(c[0] * (x - c[2]) + c[1] * v)
 
 
+def pack_packed(q: Any, origin: float, c: Any) -> int:
+    """Write the packed constants (K, C, xp, pull) from the numbers xp, K, C, pull; return their number."""
+    c[0], c[1], c[2], c[3] = q[1], q[2], q[0], q[3]
+    return 4
+
+
 @register
 class DashpotPack(PackPart):
     """Stiffness and damping of a Kelvin-Voigt pack."""
@@ -59,7 +65,3 @@ class DashpotPack(PackPart):
     damping: float = quantity("N s/m", "C", "damping of the pack", ge=0)
     front: float = quantity("m", "xp", "front of the pack")
     pull: bool = False
-
-    def packed(self, origin: float) -> tuple[float, ...]:
-        """Return the packed constants (K, C, xp, pull)."""
-        return (self.stiffness, self.damping, self.front, 1.0 if self.pull else 0.0)

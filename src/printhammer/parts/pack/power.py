@@ -54,6 +54,12 @@ def pack_unloading(c: Any, x: float, v: float, q: float) -> float:
     return float(-q * (r4 * r4) * (r2 * r))
 
 
+def pack_packed(q: Any, origin: float, c: Any) -> int:
+    """Write the packed constants (S, xp, 1/d) from the numbers xp, S, d; return their number."""
+    c[0], c[1], c[2] = q[1], q[0], 1.0 / q[2]
+    return 3
+
+
 @register
 class PowerPack(PackPart):
     """Constants of equation (5): stiffness S, front xp and thickness d."""
@@ -64,7 +70,3 @@ class PowerPack(PackPart):
     front: float = quantity("m", "xp", "front of the ribbon and paper pack")
     thickness: float = quantity("m", "d", "thickness of the ribbon and paper pack", gt=0)
     reloading: Literal["loading-branch", "unloading-curve"] = "loading-branch"
-
-    def packed(self, origin: float) -> tuple[float, ...]:
-        """Return the packed constants (S, xp, 1/d)."""
-        return (self.stiffness, self.front, 1.0 / self.thickness)

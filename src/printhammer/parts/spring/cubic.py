@@ -30,6 +30,12 @@ def spring_energy(c: Any, x: float) -> float:
     return float((0.5 * c[0] + 0.25 * c[1] * square) * square)
 
 
+def spring_packed(q: Any, origin: float, c: Any) -> int:
+    """Write the packed constants (K, D, x0) from the numbers of the part; return their number."""
+    c[0], c[1], c[2] = q[0], q[1], q[2]
+    return 3
+
+
 @register
 class CubicSpring(SpringPart):
     """Stiffness, coefficient of the cubic term, and relaxed position of the spring."""
@@ -39,7 +45,3 @@ class CubicSpring(SpringPart):
     stiffness: float = quantity("N/m", "K", "stiffness at the relaxed position, negative between two wells")
     cubic: float = quantity("N/m^3", "D", "coefficient of the cubic term")
     center: float = quantity("m", "x0", "position at which the spring is relaxed")
-
-    def packed(self, origin: float) -> tuple[float, ...]:
-        """Return the packed constants (K, D, x0)."""
-        return (self.stiffness, self.cubic, self.center)

@@ -31,6 +31,15 @@ def spring_energy(c: Any, x: float) -> float:
     return float((0.5 * c[1] * travel - c[0]) * travel)
 
 
+def spring_packed(q: Any, origin: float, c: Any) -> int:
+    """Write the packed constants (preload, stiffness, b) from the numbers of the part; return their number.
+
+    The numbers are Bs and As, or preload and stiffness; then 0 or 1 for the former or the latter.
+    """
+    c[0], c[1], c[2] = q[0], q[1] if q[2] == 1.0 else q[0] / q[1], origin
+    return 3
+
+
 @register
 class LinearSpring(SpringPart):
     """Constants of equation (4): Bs and As."""
@@ -40,20 +49,13 @@ class LinearSpring(SpringPart):
     Bs: float = quantity("N", "Bs", "spring force at the backstop", gt=0)
     As: float = quantity("m", "As", "travel from the backstop to zero spring force", gt=0)
 
-    def packed(self, origin: float) -> tuple[float, ...]:
-        """Return the packed constants (Bs, Bs / As, b)."""
-        return (self.Bs, self.Bs / self.As, origin)
-
 
 @register
 class PreloadSpring(SpringPart):
     """Preload and stiffness of a linear spring."""
 
     law: ClassVar[str] = "preload"
+    variant: ClassVar[int] = 1
 
     preload: float = quantity("N", "P", "spring force at the backstop")
     stiffness: float = quantity("N/m", "K", "spring stiffness, negative for an unstable spring")
-
-    def packed(self, origin: float) -> tuple[float, ...]:
-        """Return the packed constants (preload, stiffness, b)."""
-        return (self.preload, self.stiffness, origin)

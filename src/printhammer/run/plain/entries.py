@@ -70,11 +70,15 @@ def entries() -> dict[str, Plain]:
 
 
 def templates() -> Iterator[Module]:
-    """Yield the templates of all plain functions, with and without a coil circuit if they call laws."""
+    """Yield the templates of plain functions, with and without a coil circuit if they call laws.
+
+    A function that packs the constants of parts has a template for each combination of laws instead.
+    """
     from printhammer.kernel.compile.modules import plain_template
 
     for name, plain in entries().items():
-        yield from (plain_template(name, plain, circuit) for circuit in {False, plain.laws})
+        if not plain.packing:
+            yield from (plain_template(name, plain, circuit) for circuit in {False, plain.laws})
 
 
 def compiled(name: str, laws: Laws = _NO_LAWS) -> Callable[..., Any]:

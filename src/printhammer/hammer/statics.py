@@ -1,0 +1,277 @@
+"""Static force on the armature as plain functions, which can be compiled as entry points.
+
+The law functions of the parts are fields of `Statics`, beside the constants that they take: Python passes the
+functions of the modules of the parts, compiled code those of the kernel.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final, NamedTuple
+
+from printhammer.support.roots import bisected, find_roots
+
+NEAREST: Final = 1e-18
+"""Smallest distance from an anchor in the search for equilibria, m: far below any compression; arbitrary."""
+
+FARTHER: Final = (1.0, 10.0, 100.0, 1000.0)
+"""Search radii for equilibria about the origin, m, tried in turn if the hammer sets no limit; arbitrary."""
+
+EVEN: Final = 1025
+"""Number of evenly spaced points of a search grid."""
+
+DECADE: Final = 12.0
+"""Number of points per decade of a cluster of a search grid."""
+
+RESTS, CRUSHED, LIFTED, UNSTABLE, EMPTY = range(5)
+"""Outcomes of the search for a rest position: found; the backstop is crushed down to the end of the law of
+the magnet; the force at the backstop is not negative; no stable equilibrium; an empty range."""
+
+MOST_PLACES: Final = 8192
+"""Largest number of points of a search grid."""
+
+
+class Statics(NamedTuple):
+    """Law functions and constants of a hammer, as far as its static force depends on them."""
+
+    magnet_force: Any
+    spring_force: Any
+    pack_loading: Any
+    backstop_elastic: Any
+    """Law functions of the parts, of absent parts those of `printhammer.parts.absent`."""
+    magnet: Any
+    spring: Any
+    pack: Any
+    backstop: Any
+    """Packed constants of the parts."""
+    position: float
+    """Position of the backstop, m; minus infinity without a backstop."""
+    front: float
+    """Front of the pack, m; infinity without a pack."""
+    rigid: bool
+    """Whether the backstop is rigid."""
+    memory: bool
+    """Whether the force of the pack depends on the past."""
+    has_magnet: bool
+    """Whether the hammer has a magnet."""
+    low: float
+    high: float
+    """Range of displacements in which the law of the magnet is valid, m."""
+    platen: float
+    """Position of the platen, m; NaN without a platen."""
+    thickness: float
+    """Thickness of the pack, m; NaN without one."""
+
+
+def free_force(x: float, current: float, s: Statics) -> float:
+    """Return the net force of magnet and spring, N, without contacts."""
+    return float(s.magnet_force(s.magnet, x, current)) + float(s.spring_force(s.spring, x))
+
+
+def total_force(x: float, current: float, s: Statics) -> float:
+    """Return the net force including the contacts, N; the pack on its loading branch."""
+    force = float(s.magnet_force(s.magnet, x, current)) + float(s.spring_force(s.spring, x))
+    depth = s.position - x
+    if depth > 0.0 and not s.rigid:
+        force += float(s.backstop_elastic(s.backstop, math.sqrt(depth)))
+    if x > s.front:
+        force += float(s.pack_loading(s.pack, x, 0.0))
+    return force
+
+
+def force_at(x: float, about: tuple[float, Statics]) -> float:
+    """Return the net force at a current, N; `about` is the current, A, and the statics."""
+    return total_force(x, about[0], about[1])
+
+
+def origin_of(s: Statics) -> float:
+    """Return the position of the backstop, m, or 0 without a backstop."""
+    return 0.0 if s.position == -math.inf else s.position
+
+
+def limits_of(s: Statics) -> tuple[float, float]:
+    """Return the displacements, m, that the law of the magnet and a rigid backstop admit."""
+    return max(s.low, s.position) if s.rigid else s.low, s.high
+
+
+def reach_of(far: float, s: Statics) -> tuple[float, float]:
+    """Return the search interval for equilibria, m, within `far` of the origin."""
+    low, high = limits_of(s)
+    origin = origin_of(s)
+    if not math.isnan(s.platen):
+        high = min(high, s.platen)
+    elif s.front < math.inf:
+        # Search a pack without thickness to a depth equal to the distance of its front from the origin.
+        depth = abs(s.front - origin) if math.isnan(s.thickness) else s.thickness
+        high = min(high, s.front + depth)
+    return max(low, origin - far), min(high, origin + far)
+
+
+def compressed(current: float, low: float, s: Statics) -> float:
+    """Return the equilibrium nearest to the surface of an elastic backstop that the armature compresses, m.
+
+    The result is NaN if there is none down to `low`, m.
+    """
+    depth = max(NEAREST, spacing(s.position))
+    above = s.position
+    while s.position - depth > low:
+        below = s.position - depth
+        if total_force(below, current, s) >= 0.0:
+            return bisected(force_at, (current, s), below, above)
+        above = below
+        depth *= 1.25
+    return math.nan
+
+
+def spacing(x: float) -> float:
+    """Return the distance from a number to the next larger one in magnitude, as `math.ulp`."""
+    x = abs(x)
+    power = 1.0
+    while power > x:
+        power *= 0.5
+    while 2.0 * power <= x:
+        power *= 2.0
+    return power * 2.0**-52
+
+
+def is_stable(x: float, before: float, after: float, s: Statics) -> bool:
+    """Whether the force points to a root from both sides; a rigid backstop supports it from below."""
+    held = before > 0.0 or (s.rigid and x == limits_of(s)[0])
+    return held and after < 0.0
+
+
+def put_cluster(anchor: float, sign: float, limit: float, grid: Any, count: int) -> int:
+    """Append an anchor and points at distances in a geometric sequence; return the new number of points."""
+    grid[count] = anchor
+    if limit <= NEAREST:
+        grid[count + 1] = anchor + sign * limit
+        return count + 2
+    steps = max(2, math.ceil(DECADE * math.log10(limit / NEAREST)) + 1)
+    first = math.log10(NEAREST)
+    step = (math.log10(limit) - first) / (steps - 1)
+    for k in range(steps):
+        size = 10.0 ** (k * step + first)
+        if k == 0 or k == steps - 1:
+            size = NEAREST if k == 0 else limit
+        grid[count + 1 + k] = anchor + sign * size
+    return count + 1 + steps
+
+
+def fill_grid(low: float, high: float, s: Statics, grid: Any) -> int:
+    """Write a search grid between two limits, not sorted: even points, and clusters around the anchors.
+
+    Returns
+    -------
+    int
+        Number of points, at most `MOST_PLACES`.
+    """
+    count = 0
+    for k in range(EVEN):
+        grid[count] = high if k == EVEN - 1 else low + k * ((high - low) / (EVEN - 1))
+        count += 1
+    first, last = reach_of(FARTHER[0], s)
+    for place in (first, last, s.position, s.front, origin_of(s), 0.0, low, high):
+        if first <= place <= last or place in (low, high):
+            if high - place > 0.0:
+                count = put_cluster(place, 1.0, high - place, grid, count)
+            if place - low > 0.0:
+                count = put_cluster(place, -1.0, place - low, grid, count)
+    kept = 0
+    for k in range(count):
+        if low <= grid[k] <= high:
+            grid[kept] = grid[k]
+            kept += 1
+    return kept
+
+
+class Work(NamedTuple):
+    """Working space of a search for equilibria."""
+
+    grid: Any
+    """Array, shape (`MOST_PLACES`,)."""
+    places: Any
+    values: Any
+    """Arrays, shape (3 `MOST_PLACES`,)."""
+    found: Any
+    """Array, shape (3 `MOST_PLACES`, 3): roots with the signs of the force on both sides."""
+    ascending: Any
+    """Function that sorts the first numbers of the grid and returns the number of different ones."""
+
+
+def equilibria_between(low: float, high: float, current: float, s: Statics, work: Work) -> int:
+    """Find the roots of the net force between two limits, m; return their number."""
+    count = work.ascending(work.grid, fill_grid(low, high, s, work.grid))
+    return int(find_roots(force_at, (current, s), work.grid, count, work.places, work.values, work.found))
+
+
+def has_stable(count: int, s: Statics, work: Work) -> bool:
+    """Whether any of the roots found is stable."""
+    found = False
+    for k in range(count):
+        found = found or is_stable(work.found[k, 0], work.found[k, 1], work.found[k, 2], s)
+    return found
+
+
+def rest_position(s: Statics, work: Work, out: Any) -> int:
+    """Find the position at which the armature rests at zero current, see `hammer.equilibrium.rest_state`.
+
+    Returns
+    -------
+    int
+        Outcome, such as `RESTS`; ``out[0]`` is then the position, m, otherwise ``out[1]`` the number that the
+        message needs: end of the range, m, or force at the backstop, N.
+    """
+    first, last = reach_of(FARTHER[0], s)
+    if s.position > -math.inf:
+        pressing = free_force(s.position, 0.0, s)
+        if pressing < 0.0:
+            out[0], out[1] = s.position if s.rigid else compressed(0.0, first, s), first
+            return CRUSHED if math.isnan(out[0]) else RESTS
+        if s.has_magnet:
+            # Without any force, such as a plunger without a spring, the armature stays at the backstop.
+            out[0], out[1] = s.position, pressing
+            return RESTS if pressing == 0.0 else LIFTED
+    if not first < last:
+        out[0], out[1] = first, last
+        return EMPTY
+    count = equilibria_between(first, last, 0.0, s, work)
+    # Dimensionless oscillators may have their equilibria some metres away.
+    for far in FARTHER[1:]:
+        low, high = reach_of(far, s)
+        if has_stable(count, s, work) or (low == first and high == last):
+            break
+        first, last = low, high
+        count = equilibria_between(first, last, 0.0, s, work)
+    nearest = math.inf
+    for k in range(count):
+        x = work.found[k, 0]
+        if not is_stable(x, work.found[k, 1], work.found[k, 2], s) or (x > s.front and s.memory):
+            continue
+        if abs(x - origin_of(s)) < nearest:
+            nearest = abs(x - origin_of(s))
+            out[0] = x
+    return RESTS if nearest < math.inf else UNSTABLE
+
+
+def sorted_in_place(numbers: Any, count: int) -> int:
+    """Sort the first numbers of an array by heapsort; return the number of different ones, at the front."""
+    for step in range(count // 2 + count - 1, 0, -1):
+        if step >= count:
+            root, end = step - count, count
+        else:
+            root, end = 0, step
+            numbers[0], numbers[end] = numbers[end], numbers[0]
+        while 2 * root + 1 < end:
+            child = 2 * root + 1
+            if child + 1 < end and numbers[child] < numbers[child + 1]:
+                child += 1
+            if numbers[root] >= numbers[child]:
+                break
+            numbers[root], numbers[child] = numbers[child], numbers[root]
+            root = child
+    different = 0
+    for k in range(count):
+        if k == 0 or numbers[k] != numbers[different - 1]:
+            numbers[different] = numbers[k]
+            different += 1
+    return different
