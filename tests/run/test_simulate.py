@@ -9,7 +9,7 @@ from tests.errors import refused
 from tests.hammers import STOP
 
 import printhammer as ph
-from printhammer.run.window import CYCLE
+from printhammer.run.plain.posing import CYCLE
 
 
 @pytest.mark.parametrize(

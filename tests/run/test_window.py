@@ -20,8 +20,9 @@ from printhammer.printing.dots.nominal import nominal, single_pulses
 from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.page.pattern import Pattern
 from printhammer.run.effort import Effort
+from printhammer.run.plain.posing import CYCLE
 from printhammer.run.waits import waits_of
-from printhammer.run.window import CYCLE, Single, is_enough, least_wait, wait_of
+from printhammer.run.window import Single, is_enough, least_wait, wait_of
 from printhammer.sweep.members import Base, Maker
 
 

@@ -40,10 +40,10 @@ _LARGEST_CURRENT: Final = 1e6  # Range of currents of a law that states none, A;
 
 NO_REST: Final = {
     CRUSHED: (
-        "at zero current the backstop is crushed down to {value:.6g} m",
+        "at zero current the backstop is crushed down to {1:.6g} m",
         "a backstop that holds the armature",
     ),
-    LIFTED: ("at the backstop the net force at zero current is {value:.6g} N", "a negative force"),
+    LIFTED: ("at the backstop the net force at zero current is {1:.6g} N", "a negative force"),
     UNSTABLE: ("it has no stable equilibrium at zero current", None),
 }
 """Reason why a hammer has no rest state, and what is expected, by outcome of the search."""
@@ -102,7 +102,7 @@ def rest_state(hammer: HammerLike) -> float:
         raise _empty(*out)
     because, expected = NO_REST[code]
     raise InputError(
-        f"{_named(hammer)} has no rest state: {because.format(value=out[1])}", key="rest", expected=expected
+        f"{_named(hammer)} has no rest state: {because.format(*out)}", key="rest", expected=expected
     )
 
 

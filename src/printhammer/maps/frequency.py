@@ -22,8 +22,9 @@ from printhammer.maps.layout import hammer_attributes, map_dataset, matching, on
 from printhammer.results import Facts, Summary
 from printhammer.results.provenance import provenance
 from printhammer.run.effort import DEFAULT, Effort, Keywords, computation
+from printhammer.run.plain.posing import CYCLE
 from printhammer.run.regime import waveform_of
-from printhammer.run.window import CYCLE, scaled_rate, wait_of
+from printhammer.run.window import scaled_rate, wait_of
 from printhammer.support.arrays import FloatArray
 
 if TYPE_CHECKING:

@@ -23,6 +23,7 @@ from printhammer.kernel.model.layout import CIRCUIT_NODE_WIDTH, NODE_WIDTH
 from printhammer.kernel.model.modes import OK, PAUSED, STATUS_NAMES, STEP_LIMIT
 from printhammer.kernel.single import carry
 from printhammer.results import Declared, part, scalar
+from printhammer.run.plain.posing import FAR, allowances, typical_scales
 from printhammer.run.start import AT_REST, Beyond
 from printhammer.run.supply import take_supply, typical_current
 from printhammer.support.arrays import FloatArray
@@ -40,9 +41,6 @@ LARGEST_TOLERANCE: Final = 1e-5
 """Largest accepted tolerance; above it, the curves between the ends of steps would be inaccurate."""
 
 MAX_STEPS: Final = 50_000_000  # Default largest number of steps of a run
-FAR: Final = 1e4
-"""Distance from the origin, in strokes, beyond which the motion counts as a runaway; arbitrary."""
-
 _NODES: Final = 2048  # Rows of nodes in the smallest working space
 _CONTACTS: Final = 256  # Rows of contacts in the smallest working space
 _NODES_A_FLIGHT: Final = 40  # Rows of nodes per flight in the initial guess of the memory
@@ -173,36 +171,16 @@ def scales_of(
     """
     if static is None:
         static = StaticForce(hammer)
-    origin = hammer.origin
-    largest_value = drive.largest_pulse
-    current, push = (0.0, largest_value) if drive.quantity == "force" else (largest_value, 0.0)
+    largest = drive.largest_pulse
+    current, push = (0.0, largest) if drive.quantity == "force" else (largest, 0.0)
     if drive.quantity == "voltage":
         current = typical_current(hammer, drive)
-
-    def force(x: float) -> float:
-        sizes = [abs(static.free(x, i)) for i in (0.0, current)]
-        return push + max((f for f in sizes if math.isfinite(f)), default=0.0)
-
-    if hammer.position is not None and hammer.front is not None:
-        way = hammer.front - hammer.position
-    else:
-        near = force(origin)
-        step = 1e-6 * max(abs(origin), abs(state[0]), 1e-3)
-        stiffness = abs(static.free(origin + step, 0.0) - static.free(origin, 0.0)) / step
-        own = math.sqrt(hammer.mass / stiffness) if stiffness > 0.0 else 0.0
-        forced = drive.period / (2.0 * math.pi) if drive.period else 0.0
-        time = min((t for t in (own, forced) if t > 0.0), default=1e-3)
-        way = max(near * time * time / hammer.mass, abs(state[0] - origin), abs(state[1]) * time)
-        way = way or 1e-4
-    largest = max(force(origin), force(origin + way))
-    speed = max(math.sqrt(largest * way / hammer.mass), abs(state[1]))
-    return way, speed or way
+    return typical_scales(hammer.mass, current, push, drive.period or math.nan, state, static.statics)
 
 
 def control_of(scales: tuple[float, float], tolerance: float) -> tuple[float, float, float, float]:
     """Return the step-size control of the kernel: scales, and tolerances of the two error estimates."""
-    # The eighth order is controlled through the estimates of orders six and seven.
-    return (*scales, (10.0 * tolerance) ** (7.0 / 9.0), 10.0 * tolerance)
+    return (*scales, *allowances(tolerance))
 
 
 def bounds_of(hammer: Hammer, scales: tuple[float, float]) -> tuple[float, float, float, float]:

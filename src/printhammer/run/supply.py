@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from importlib import import_module
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -15,13 +15,15 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.kernel.model import layout
 from printhammer.parts import absent
 from printhammer.parts.coil import Winding
+from printhammer.run.plain.posing import (
+    Coil,
+    falling_place,
+    linkage_scale,
+    main_inductance,
+    main_linkage,
+    sustained_current,
+)
 from printhammer.support.arrays import FloatArray
-
-_PLACES: Final = 33
-"""Positions along the travel of the armature at which the inductance is checked; arbitrary."""
-
-_SHORT: Final = 1e-3
-"""Time, s, in which a coil without resistance is assumed to reach its typical current; arbitrary."""
 
 
 def waveforms_of(drive: Drive) -> tuple[Waveform, ...]:
@@ -66,24 +68,28 @@ def winding_of(hammer: Hammer) -> Winding:
     return coil
 
 
+def coil_of(hammer: Hammer) -> Coil:
+    """Return the functions and constants of the coil of a hammer that a voltage drives."""
+    winding = winding_of(hammer)
+    return Coil(
+        _law(hammer, "magnet_linkage"),
+        _law(hammer, "magnet_inductance"),
+        np.array(() if hammer.magnet is None else hammer.magnet.packed(hammer.origin)),
+        hammer.magnet is not None and winding.back_emf,
+        winding.inductance,
+        winding.leakage or 0.0,
+        winding.warm_resistance,
+    )
+
+
 def linkage(hammer: Hammer, x: float, current: float) -> float:
     """Return the flux linkage of the main path of a coil, Wb, at a displacement, m, and a current, A."""
-    coil = winding_of(hammer)
-    own = coil.inductance * current
-    if hammer.magnet is None or not coil.back_emf:
-        return own
-    law = _law(hammer, "magnet_linkage")
-    return own + float(law(np.array(hammer.magnet.packed(hammer.origin)), x, current))
+    return main_linkage(x, current, coil_of(hammer))
 
 
 def inductance(hammer: Hammer, x: float, current: float) -> float:
     """Return the slope of the flux linkage of the main path with the current, H."""
-    coil = winding_of(hammer)
-    if hammer.magnet is None or not coil.back_emf:
-        return coil.inductance
-    law = _law(hammer, "magnet_inductance")
-    own = float(law(np.array(hammer.magnet.packed(hammer.origin)), x, current))
-    return coil.inductance + own
+    return main_inductance(x, current, coil_of(hammer))
 
 
 def emf(hammer: Hammer, x: float, current: float) -> float:
@@ -112,16 +118,13 @@ def _law(hammer: Hammer, name: str) -> Any:
 
 def typical_current(hammer: Hammer, drive: Drive) -> float:
     """Return the largest current that a voltage drive can sustain in the coil, A."""
-    coil = winding_of(hammer)
+    coil = coil_of(hammer)
     largest = 0.0
     for waveform in waveforms_of(drive):
-        resistance = coil.warm_resistance + getattr(waveform, "series", 0.0)
-        voltage = waveform.peak
-        if resistance > 0.0:
-            current = voltage / resistance
-        else:
-            slope = inductance(hammer, hammer.origin, 0.0) + (coil.leakage or 0.0)
-            current = voltage * min(_SHORT, waveform.support) / slope if slope > 0.0 else voltage
+        series, voltage = getattr(waveform, "series", 0.0), waveform.peak
+        resistance = coil.resistance + series
+        upper = getattr(waveform, "upper", math.nan)
+        limited, current = sustained_current(voltage, series, waveform.support, upper, hammer.origin, coil)
         hold = getattr(waveform, "hold_upper", None)
         if hold is not None and hold > current:
             raise InputError.of(
@@ -134,8 +137,7 @@ def typical_current(hammer: Hammer, drive: Drive) -> float:
                 written=f"{hold:g}",
                 unit="A",
             )
-        upper = getattr(waveform, "upper", None)
-        largest = max(largest, current if upper is None else min(upper, current))
+        largest = max(largest, limited)
     return largest or 1.0
 
 
@@ -153,36 +155,26 @@ def take_supply(constants: FloatArray, hammer: Hammer, drive: Drive) -> None:
         The hammer has no coil circuit that a voltage could drive, or its flux linkage does not increase with
         the current.
     """
-    coil, supply = winding_of(hammer), supply_of(drive)
+    supply = supply_of(drive)
     current = typical_current(hammer, drive)
     check_linkage(hammer, current)
     constants[layout.DIODE : layout.DIODE + 6] = supply
     constants[layout.CURRENT_SCALE] = current
-    span = abs(linkage(hammer, hammer.origin, current) - linkage(hammer, hammer.origin, 0.0))
-    if not (math.isfinite(span) and span > 0.0):
-        span = coil.inductance * current
-    constants[layout.LINKAGE_SCALE] = span + (coil.leakage or 0.0) * current
+    constants[layout.LINKAGE_SCALE] = linkage_scale(hammer.origin, current, coil_of(hammer))
 
 
 def check_linkage(hammer: Hammer, current: float) -> None:
     """Check that the flux linkage of a coil increases with the current along the travel of the armature."""
-    coil = winding_of(hammer)
-    low = hammer.origin
+    coil = coil_of(hammer)
     ends = [place for place in (hammer.front, hammer.platen) if place is not None]
-    high = max([*ends, low])
-    for x in np.linspace(low, high, _PLACES if high > low else 1).tolist():
-        for share in (0.0, 0.5, 1.0):
-            slope = inductance(hammer, x, share * current)
-            if slope <= 0.0:
-                least = coil.inductance - slope
-                raise InputError.of(
-                    "coil.inductance",
-                    coil.inductance,
-                    (
-                        f"more than {least:.4g} H, so that the flux linkage rises with the current at"
-                        f" x = {x:.4g} m"
-                    ),
-                    file=hammer.path,
-                    written=f"{coil.inductance:g}",
-                    unit="H",
-                )
+    x, slope = falling_place(hammer.origin, max([*ends, hammer.origin]), current, coil)
+    if math.isfinite(x):
+        least = coil.inductance - slope
+        raise InputError.of(
+            "coil.inductance",
+            coil.inductance,
+            f"more than {least:.4g} H, so that the flux linkage rises with the current at x = {x:.4g} m",
+            file=hammer.path,
+            written=f"{coil.inductance:g}",
+            unit="H",
+        )

@@ -18,20 +18,11 @@ from printhammer.drive.trains import Drive, PulseTrain
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
-from printhammer.kernel.model.modes import OK, PACK_SURFACE
+from printhammer.kernel.model.modes import OK
+from printhammer.run.plain.posing import CYCLE, flight_of, is_window, last_window, least_window
 from printhammer.run.problem import Problem, scales_of
 from printhammer.run.supply import waveforms_of
 
-CYCLE: Final = 4e-3
-"""Smallest default time from switch-off of the supply to the end of a run, s."""
-
-FLIGHTS: Final = 3.0
-"""Smallest length of a window, in flight times of the single pulse; a later dot may fly longer."""
-
-_SETTLED: Final = 0.05  # Distance from rest at the end of a window, as a fraction of the way to the pack
-_PATIENCE: Final = 16.0  # Largest window of a device that does not settle, in flight times
-_LONGEST: Final = 64.0  # Largest window of a device that makes no dot, in time scales
-_LAST: Final = 1.0  # Upper limit of a window, s
 TOLERANCE: Final = 5e-7  # Tolerance of the single pulse, whose outcome is only compared with thresholds
 MOST_STEPS: Final = 500_000  # Largest number of steps of a single pulse
 _MOST_KEPT: Final = 512  # Number of cached windows at which the cache is emptied
@@ -65,8 +56,7 @@ def least_wait(waveform: Waveform) -> float:
     With a driver the run ends 4 ms after switch-off, with a current or a force 4 ms after the firing, or
     after its end.
     """
-    lasts = waveform.support if math.isfinite(waveform.support) else 0.0
-    return CYCLE + lasts if waveform.replaces else max(CYCLE, lasts)
+    return least_window(waveform.support, waveform.replaces)
 
 
 def wait_of(hammer: Hammer, waveform: Waveform | None = None) -> float:
@@ -144,27 +134,21 @@ def _single(hammer: Hammer, drive: Drive, end: float) -> Single:
     problem = Problem(hammer, drive, (hammer.rest, 0.0), 0.0, TOLERANCE)
     problem.max_steps = MOST_STEPS
     record = problem.run(end)
-    touches = [row[1] for row in record.contacts if int(row[0]) == PACK_SURFACE and not row[6]]
-    flight = float(touches[0]) if touches else math.nan
-    return Single(record.status == OK, flight, float(record.nodes[-1, 1]), float(record.nodes[-1, 2]))
+    return Single(
+        record.status == OK,
+        flight_of(record.contacts),
+        float(record.nodes[-1, 1]),
+        float(record.nodes[-1, 2]),
+    )
 
 
 def is_enough(hammer: Hammer, seen: Single, wait: float) -> bool:
     """Whether a window is long enough: it holds `FLIGHTS` flight times and ends with the armature at rest."""
-    if not seen.ok:
-        return True
-    struck = math.isfinite(seen.flight)
-    if struck and wait < FLIGHTS * seen.flight:
-        return False
-    if struck and wait >= _PATIENCE * seen.flight:
-        return True
     assert hammer.front is not None
-    near = _SETTLED * (hammer.front - hammer.rest)
-    time = seen.flight if struck else wait / FLIGHTS
-    return abs(seen.x - hammer.rest) <= near and abs(seen.v) * time <= near
+    return is_window(seen.ok, seen.flight, seen.x, seen.v, hammer.rest, hammer.front, wait)
 
 
 def last_wait(hammer: Hammer, waveform: Waveform) -> float:
     """Return the largest window, s, beyond which a window is not doubled."""
     way, speed = scales_of(hammer, PulseTrain(waveform), (hammer.rest, 0.0))
-    return least_wait(waveform) + min(_LONGEST * way / speed, _LAST)
+    return last_window(least_wait(waveform), way, speed)

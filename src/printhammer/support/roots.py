@@ -211,4 +211,6 @@ def put_root(found: Any, count: int, x: float, before: float, after: float) -> i
 
 def sign_of(value: float) -> float:
     """Return the sign of a number: -1, 0 or 1."""
-    return float(value > 0.0) - float(value < 0.0)
+    if value > 0.0:
+        return 1.0
+    return -1.0 if value < 0.0 else 0.0

@@ -21,8 +21,9 @@ from printhammer.printing.dots.nominal import Nominal, nominal
 from printhammer.printing.dots.settling import settled_from, touches
 from printhammer.run.effort import Effort
 from printhammer.run.ensemble import Ensemble
+from printhammer.run.plain.posing import FLIGHTS
 from printhammer.run.simulate import simulate
-from printhammer.run.window import FLIGHTS, time_scale, wait_of
+from printhammer.run.window import time_scale, wait_of
 from printhammer.support.arrays import BoolArray, FloatArray
 
 # Distance from rest below which the hammer counts as settled, as a fraction of the distance to the pack

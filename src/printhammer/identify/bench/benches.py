@@ -32,9 +32,10 @@ from printhammer.identify.lowpass import lowpass_motion, lowpass_waveform, time_
 from printhammer.parts.backstop._hertz import damping_from_restitution
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.results import Declared, part
+from printhammer.run.plain.posing import CYCLE
 from printhammer.run.simulate import simulate
 from printhammer.run.supply import typical_current
-from printhammer.run.window import CYCLE, wait_of
+from printhammer.run.window import wait_of
 from printhammer.support.arrays import FloatArray
 
 DISPLACEMENTS: Final = 31

@@ -92,6 +92,7 @@ def floats_of(law: str) -> int:
     return int(__annotations__[law].removeprefix("Law"))
 
 
+HAS_MAGNET: bool
 HAS_PACK: bool
 HAS_BACKSTOP: bool
 HAS_DAMPING: bool

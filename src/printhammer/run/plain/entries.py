@@ -8,12 +8,17 @@ that its module leaves undefined is bound to the law, choice or function of the 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.drive import tables
+from printhammer.hammer.hammer import Hammer
 from printhammer.kernel.model.laws import Laws
 from printhammer.kernel.readout import codes, contacts, curves, energy, line, peaks, section
+from printhammer.parts import MagnetPart, Part
+from printhammer.parts.coil import Winding
+from printhammer.run.plain import page
 
 if TYPE_CHECKING:
     from printhammer.kernel.compile.modules import Module, WebModule
@@ -21,7 +26,15 @@ if TYPE_CHECKING:
 
 _NO_LAWS: Final = Laws("", "", "", "", absent="printhammer.parts.absent")
 
+_PARTS: Final = ("f1",) * 7
+
 _ENTRIES: Final[dict[str, tuple[Any, ...]]] = {
+    "constants": (page.fill_constants, (*_PARTS, "f1", "f1"), 1, False, True),
+    "rest": (page.find_rest, ("f1", "f1", "f1", "f2", "f2", "f1"), 1, True),
+    "supply": (page.fill_supply, ("f1", "f1", "f1", "f1"), 1, True),
+    "scales": (page.fill_scales, ("f1", "f1", "f", "f", "f", "f1", "f", "f1"), 0, True),
+    "window": (page.begin_window, ("f1", "f", "f", "f1"), 1),
+    "is_window": (page.judge_window, ("i", "f2", "f2", "f1", "f", "f1"), 1),
     "firings": (tables.fill_firings, ("f", "i1", "b", "f1"), 1),
     "pulse": (tables.pulse, ("i", "f1", "f2", "f1"), 1),
     "pulse_values": (tables.fill_values, ("f2", "f1", "f1")),
@@ -59,7 +72,41 @@ _ENTRIES: Final[dict[str, tuple[Any, ...]]] = {
     "settled": (section.settled_period, ("f2", "f1", "i", "b"), 1),
 }
 """Functions by name, with the types of their arguments (as in `printhammer.kernel.compile.calls.Signature`),
-the number of integers that they return, and whether they use names of the kernel."""
+the number of integers that they return, whether they use names of the kernel, and whether they use functions
+that pack the constants of parts."""
+
+
+Numbers = dict[str, tuple[tuple[str | None, ...], tuple[float, ...]]]
+"""Arrays of numbers by name: the dotted key of the constant that sets each number, None for others; and the
+numbers, SI, NaN for a missing one."""
+
+
+def numbers_of(hammer: Hammer) -> Numbers:
+    """Return the arrays from which the entry points `constants` and `rest` compute what depends on a hammer.
+
+    The arrays are `body`, those of the parts by role, and `limits`, whose first two numbers `constants`
+    writes. Numbers whose key changes are replaced; positions of backstop and front occur twice.
+    """
+    place, front = hammer.position, hammer.front
+    missing = math.nan
+    body = (hammer.mass, missing if place is None else place, missing if front is None else front)
+    numbers: Numbers = {"body": (("mass", "backstop.position", "pack.front"), body)}
+    parts: dict[str, Part] = {"coil": Winding(), **hammer.parts}
+    for role in ("damping", "spring", "pack", "backstop", "coil", "magnet"):
+        part = parts.get(role)
+        numbers[role] = ((), ()) if part is None else _numbers_of(part, hammer.origin)
+    platen = missing if hammer.platen is None else hammer.platen
+    thickness = getattr(hammer.pack, "thickness", missing)
+    limits = (-math.inf, math.inf, platen, thickness, hammer.mass)
+    return {**numbers, "limits": ((None, None, "platen", "pack.thickness", "mass"), limits)}
+
+
+def _numbers_of(part: Part, origin: float) -> tuple[tuple[str | None, ...], tuple[float, ...]]:
+    if part.function(f"{part.role}_packed") is not None:
+        return (*(f"{part.role}.{name}" for name in part.names()), None), part.numbers()
+    # Fixed numbers: a table, or a law of the user's own.
+    numbers = (*part.packed(origin), *(part.domain if isinstance(part, MagnetPart) else ()))
+    return (None,) * len(numbers), numbers
 
 
 def entries() -> dict[str, Plain]:

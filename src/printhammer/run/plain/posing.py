@@ -1,0 +1,199 @@
+"""Scales of a run, coil of a hammer, and window of a device, as plain functions of numbers.
+
+`printhammer.run.problem`, `printhammer.run.supply` and `printhammer.run.window` call these functions, and so
+do the entry points of a page in `printhammer.run.plain.page`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final, NamedTuple
+
+from printhammer.hammer.statics import Statics, free_force, origin_of
+from printhammer.kernel.model.modes import PACK_SURFACE
+
+FAR: Final = 1e4
+"""Distance from the origin, in strokes, beyond which the motion counts as a runaway; arbitrary."""
+
+PLACES: Final = 33
+"""Positions along the travel of the armature at which the inductance is checked; arbitrary."""
+
+SHORT: Final = 1e-3
+"""Time, s, in which a coil without resistance is assumed to reach its typical current; arbitrary."""
+
+CYCLE: Final = 4e-3
+"""Smallest default time from switch-off of the supply to the end of a run, s."""
+
+FLIGHTS: Final = 3.0
+"""Smallest length of a window, in flight times of the single pulse; a later dot may fly longer."""
+
+SETTLED: Final = 0.05
+"""Distance from rest at the end of a window, as a fraction of the way to the pack."""
+
+PATIENCE: Final = 16.0
+"""Largest window of a device that does not settle, in flight times."""
+
+LONGEST: Final = 64.0
+"""Largest window of a device that makes no dot, in time scales."""
+
+LAST: Final = 1.0
+"""Upper limit of a window, s."""
+
+
+class Coil(NamedTuple):
+    """Functions and constants of a coil that a voltage drives."""
+
+    magnet_linkage: Any
+    magnet_inductance: Any
+    """Law functions of the magnet."""
+    magnet: Any
+    """Packed constants of the magnet."""
+    coupled: bool
+    """Whether the flux of the magnet is linked with the coil."""
+    inductance: float
+    """Constant inductance, H."""
+    leakage: float
+    """Leakage inductance, H."""
+    resistance: float
+    """Resistance at the temperature of the winding, ohm."""
+
+
+def main_linkage(x: float, current: float, coil: Coil) -> float:
+    """Return the flux linkage of the main path of a coil, Wb, at a displacement, m, and a current, A."""
+    own = coil.inductance * current
+    if not coil.coupled:
+        return own
+    return own + float(coil.magnet_linkage(coil.magnet, x, current))
+
+
+def main_inductance(x: float, current: float, coil: Coil) -> float:
+    """Return the slope of the flux linkage of the main path with the current, H."""
+    if not coil.coupled:
+        return coil.inductance
+    return coil.inductance + float(coil.magnet_inductance(coil.magnet, x, current))
+
+
+def sustained_current(
+    voltage: float, series: float, support: float, upper: float, origin: float, coil: Coil
+) -> tuple[float, float]:
+    """Return the current that a voltage can sustain in a coil, A, with and without the limit of a chopper.
+
+    `upper` is the current at which the chopper switches off, A, NaN without one.
+    """
+    resistance = coil.resistance + series
+    if resistance > 0.0:
+        current = voltage / resistance
+    else:
+        slope = main_inductance(origin, 0.0, coil) + coil.leakage
+        current = voltage * min(SHORT, support) / slope if slope > 0.0 else voltage
+    return current if math.isnan(upper) else min(upper, current), current
+
+
+def linkage_scale(origin: float, current: float, coil: Coil) -> float:
+    """Return a typical flux linkage of a coil, Wb, at its typical current, A."""
+    span = abs(main_linkage(origin, current, coil) - main_linkage(origin, 0.0, coil))
+    if not (math.isfinite(span) and span > 0.0):
+        span = coil.inductance * current
+    return span + coil.leakage * current
+
+
+def falling_place(low: float, high: float, current: float, coil: Coil) -> tuple[float, float]:
+    """Find a place along the travel at which the flux linkage does not increase with the current.
+
+    Returns
+    -------
+    tuple of float
+        Place, m, and slope of the flux linkage, H; NaN and 0 if the linkage increases everywhere.
+    """
+    count = PLACES if high > low else 1
+    for k in range(count):
+        x = low
+        if k > 0:
+            x = high if k == count - 1 else low + k * ((high - low) / (count - 1))
+        for part in (0.0, 0.5, 1.0):
+            slope = main_inductance(x, part * current, coil)
+            if slope <= 0.0:
+                return x, slope
+    return math.nan, 0.0
+
+
+def largest_force(x: float, current: float, push: float, s: Statics) -> float:
+    """Return the larger force without and with a current, N, and the force of the drive `push`, N."""
+    largest = 0.0
+    for i in (0.0, current):
+        size = abs(free_force(x, i, s))
+        if math.isfinite(size):
+            largest = max(largest, size)
+    return push + largest
+
+
+def typical_scales(
+    mass: float, current: float, push: float, period: float, state: tuple[float, float], s: Statics
+) -> tuple[float, float]:
+    """Return a typical displacement, m, and speed, m/s, see `printhammer.run.problem.scales_of`.
+
+    `current` and `push` are the largest current, A, and force of the drive, N; `period` is that of the drive,
+    s, NaN without one.
+    """
+    origin = origin_of(s)
+    if s.position > -math.inf and s.front < math.inf:
+        way = s.front - s.position
+    else:
+        near = largest_force(origin, current, push, s)
+        step = 1e-6 * max(abs(origin), abs(state[0]), 1e-3)
+        stiffness = abs(free_force(origin + step, 0.0, s) - free_force(origin, 0.0, s)) / step
+        time = math.inf
+        if stiffness > 0.0 and math.sqrt(mass / stiffness) > 0.0:
+            time = math.sqrt(mass / stiffness)
+        if period / (2.0 * math.pi) > 0.0:
+            time = min(time, period / (2.0 * math.pi))
+        if math.isinf(time):
+            time = 1e-3
+        way = max(near * time * time / mass, abs(state[0] - origin), abs(state[1]) * time)
+        if way == 0.0:
+            way = 1e-4
+    largest = max(largest_force(origin, current, push, s), largest_force(origin + way, current, push, s))
+    speed = max(math.sqrt(largest * way / mass), abs(state[1]))
+    return way, speed if speed != 0.0 else way
+
+
+def allowances(tolerance: float) -> tuple[float, float]:
+    """Return the allowances of the error estimates of orders six and seven, which control order eight."""
+    return (10.0 * tolerance) ** (7.0 / 9.0), 10.0 * tolerance
+
+
+def least_window(support: float, replaces: bool) -> float:
+    """Return the smallest time from the last firing to the end of a run, s, for any device."""
+    lasts = support if math.isfinite(support) else 0.0
+    return CYCLE + lasts if replaces else max(CYCLE, lasts)
+
+
+def last_window(least: float, way: float, speed: float) -> float:
+    """Return the largest window, s, from the smallest one and the scales of the single pulse, m and m/s."""
+    return least + min(LONGEST * way / speed, LAST)
+
+
+def is_window(ok: bool, flight: float, x: float, v: float, rest: float, front: float, wait: float) -> bool:
+    """Whether a window is long enough: it holds `FLIGHTS` flight times and ends with the armature at rest.
+
+    `ok` is whether the single pulse was completed, `flight` its flight time, s, NaN without a dot; `x` and
+    `v`, m and m/s, are the state at the end of the window `wait`, s.
+    """
+    if not ok:
+        return True
+    struck = math.isfinite(flight)
+    if struck and wait < FLIGHTS * flight:
+        return False
+    if struck and wait >= PATIENCE * flight:
+        return True
+    near = SETTLED * (front - rest)
+    time = flight if struck else wait / FLIGHTS
+    return abs(x - rest) <= near and abs(v) * time <= near
+
+
+def flight_of(contacts: Any) -> float:
+    """Return the time of the first touch of the pack after the start, s; NaN without one."""
+    for k in range(len(contacts)):
+        if contacts[k, 0] == PACK_SURFACE and contacts[k, 6] == 0.0:
+            return float(contacts[k, 1])
+    return math.nan
