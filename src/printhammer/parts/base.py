@@ -68,7 +68,7 @@ class Part(BaseModel):
 
     @classmethod
     def function(cls, name: str) -> Any:
-        """Return a function of the module of the part or of a base class; None if there is none."""
+        """Return a function that the module of the class or of a base class defines, or None."""
         modules = (vars(sys.modules[base.__module__]) for base in cls.__mro__ if issubclass(base, Part))
         return next((module[name] for module in modules if name in module), None)
 
