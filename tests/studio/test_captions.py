@@ -101,6 +101,24 @@ def test_a_flight_too_short_and_a_dot_pushed_again_are_told_apart(modules: Path)
     assert "pushed again" in texts[2]
 
 
+WORDS = """
+const { worded, burstText } = await import("./captions.js");
+const dots = [{ struck: true }, { struck: false }];
+const burst = burstText({ dots });
+const said = [worded(burst, "closing"), worded("Dot to paper", "hit"), burstText({ dots }, true)];
+console.log(JSON.stringify(said));
+"""
+
+
+def test_a_device_has_its_own_word_and_an_oscillator_loses_no_dot(modules: Path) -> None:
+    command = ["node", "--input-type=module", "--eval", WORDS]
+    answer = subprocess.run(command, cwd=modules, capture_output=True, text=True, check=True)
+    closing, hit, firings = json.loads(answer.stdout)
+    assert closing == "Two closings, the second lost"
+    assert hit == "Hit to pack"
+    assert firings == "Two firings"
+
+
 MOVE = """
 const { moving } = await import("./controls.js");
 const constants = [

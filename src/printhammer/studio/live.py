@@ -12,20 +12,22 @@ import json
 import math
 from base64 import b64encode
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, get_args
 
 from printhammer import __version__
+from printhammer.drive.waveforms.drivers import Rail
 from printhammer.drive.waveforms.shapes import SHAPES
 from printhammer.run.energy import Ledger
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
-from printhammer.run.problem import TOLERANCE, Problem, control_of, fresh_carry
-from printhammer.run.simulate import end_of_run
+from printhammer.run.plain.entries import numbers_of
+from printhammer.run.plain.page import REFUSALS
+from printhammer.run.problem import TOLERANCE, Problem, fresh_carry
 from printhammer.run.start import initial_state
 from printhammer.studio import bounds
 from printhammer.studio.bundle import PLACE, merged, sources, style
 from printhammer.studio.frames import plain
 from printhammer.studio.pictures.chart import FULL, GAP, PREVIEW, PREVIEW_BY_VOLTAGE
-from printhammer.studio.pictures.engine import MOST_ENDS, POINTS, pulse_of
+from printhammer.studio.pictures.engine import MOST_ENDS, POINTS
 from printhammer.studio.pictures.section import AT_ONCE, LATER
 from printhammer.studio.states.controls import describe, vocabulary
 from printhammer.studio.states.links import FORMAT, KIND
@@ -67,7 +69,8 @@ _SENTENCES: Final = {
     "tables": "a measured table is opened by `printhammer studio`, not by this page",
     "strobe": "exponents are computed by `printhammer strobe` on a computer with Python",
     "drive": "the file of a drive is written by `printhammer studio` on a computer with Python",
-    "changes": "changed constants and pulses are computed by `printhammer` on a computer with Python",
+    "sampled": "a measured pulse is computed by `printhammer run` on a computer with Python",
+    "kinds": "another kind of drive is computed by `printhammer run` on a computer with Python",
 }
 """What the page says of work that only Python does, by name."""
 
@@ -142,6 +145,7 @@ def _limits() -> dict[str, Any]:
     named["WAVEFORMS"] = {
         name: {
             "known": ["shape", "quantity", *shape.model_fields],
+            "fields": list(quantities(shape)),
             "voltages": [field for field, note in quantities(shape).items() if note.also],
             "decays": "decay" in shape.model_fields and "decay" not in quantities(shape),
         }
@@ -150,6 +154,8 @@ def _limits() -> dict[str, Any]:
     named["POINTS_OF_SECTION"] = (*AT_ONCE, *LATER)
     named["ENERGIES"] = [field.name for field in fields(Ledger)]
     named["LINE"] = _line()
+    named |= {"DISPLAY_TOLERANCE": DISPLAY_TOLERANCE, "TOLERANCE": TOLERANCE, "REFUSALS": REFUSALS}
+    named["DECAYS"] = get_args(Rail.model_fields["decay"].annotation)
     return named | {"PREVIEW": {"true": PREVIEW_BY_VOLTAGE, "false": PREVIEW}}
 
 
@@ -203,22 +209,11 @@ def _numbers(state: State, modules: dict[str, str]) -> dict[str, Any]:
         "module": list(modules).index(module.name),
         "circuit": problem.laws.circuit,
         "quantity": drive.quantity,
-        "constants": _numbers_of(problem.constants),
-        "control": problem.control,
-        "exact": control_of(problem.scales, TOLERANCE),
-        "mass": hammer.mass,
-        "bounds": _numbers_of(problem.bounds),
-        "carry": _numbers_of(fresh_carry(0.0, problem.state)),
-        "replaces": drive.overlap == "replace",
-        "opening": None if state.waveform is None else dict(state.waveform),
-        "scales": problem.scales,
-        "rest": problem.state[0],
-        "wait": end_of_run(hammer, drive, None) - float(drive.times[-1]),
-        "pieces": problem.pieces,
-        "pulse": pulse_of(state.fired),
-        "peak": float(state.fired.peak),
+        "numbers": {name: (keys, _numbers_of(own)) for name, (keys, own) in numbers_of(hammer).items()},
+        "size": len(problem.constants),
+        "carry": _numbers_of(fresh_carry(0.0, (math.pi, 0.0))),
+        "placeOfRest": fresh_carry(0.0, (math.pi, 0.0)).tolist().index(math.pi),
         "damped": hammer.damping is not None,
-        "thickness": getattr(hammer.pack, "thickness", None),
     }
 
 

@@ -97,7 +97,7 @@ def describe(hammer: Hammer) -> dict[str, Any]:
         `name`, `title`, `note`, `constants` (a list), `open` (coil constants that the file leaves open),
         `rail` (default rail driver, or None), `combined` (controls that move several constants),
         `waveform` (shape and constants, or None), `start` (entries of the opening state that differ from the
-        default), `places`, `rigid` (whether the backstop acts in no time).
+        default), `places`, `strike`, `rigid` (whether the backstop acts in no time).
     """
     constants = []
     for key, constant in hammer.constants.items():
@@ -114,6 +114,7 @@ def describe(hammer: Hammer) -> dict[str, Any]:
         "waveform": None if hammer.waveform is None else fields_of(hammer.waveform),
         "start": opening_of(hammer),
         "places": {"backstop": hammer.position, "front": hammer.front, "platen": hammer.platen},
+        "strike": hammer.strike,
         "rigid": hammer.backstop is not None and hammer.backstop.law == "rigid",
     }
 

@@ -12,9 +12,10 @@ const large = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 const range = (low, high, si) => (digits(low, 3) === digits(high, 3) ? shown(low, si, 3) : `${shown(low, si, 3).replace(/ \S+$/, "")} to ${shown(high, si, 3)}`);
 
 /** Return what the firings of a burst did: "Nine dots, the second lost". */
-export function burstText(frame) {
+export function burstText(frame, hasNoPack = false) {
   const lost = frame.dots.map((dot, k) => (dot.struck ? 0 : k + 1)).filter(Boolean);
   const fired = frame.dots.length;
+  if (hasNoPack) return large(count(fired, "firing"));
   if (!lost.length) return large(`${count(fired, "dot")}, ${fired === 1 ? "struck" : "none lost"}`);
   if (lost.length === fired) return large(`${count(fired, "firing")}, no dot`);
   const which = lost.length <= 4 ? `the ${listed(lost.map(ordinal))} lost` : `${NUMBERS[lost.length] ?? lost.length} of them lost`;
@@ -84,7 +85,7 @@ const TEXTS = {
     if (!dots) return `The face of the armature against time${gap}.${coil}`;
     const { quality } = dots;
     const flight = quality.struck ? ` ${flightText(dots.dots)}` : "";
-    return `${burstText(dots)}${gap}.${flight}${coil}`;
+    return `${burstText(dots, motion.places.front === null)}${gap}.${flight}${coil}`;
   },
   line: ({ dots, line }, studio) => {
     if (!dots) return "";
@@ -134,9 +135,15 @@ export function pictureText(name, studio) {
   return `${captionOf(name, studio)}${name === "strobe" && strobe && !strobe.reason ? ` ${large(strobeText(strobe))}.` : ""}`;
 }
 
+/** Say a sentence of a device with its own noun for what a pulse does, see decision 0027. */
+export function worded(text, strike = "dot") {
+  if (strike === "dot") return text;
+  return text.replace(/\b(d|D)ot(s?)\b/g, (_all, first, plural) => `${first === "D" ? large(strike) : strike}${plural}`).replace(/\bpaper\b/g, "pack").replace("prints nothing", "is not at the pack");
+}
+
 /** Return what a view tells of the frames that are there; nothing before there are any. */
 export function captionOf(name, studio) {
-  const { frames } = studio;
+  const { frames, described } = studio;
   // A number and its unit stay on one line.
-  return frames.motion ? TEXTS[name](frames, studio).replace(/(\d) (?=[%µA-Za-z]{1,3}\b|%)/g, "$1\u00a0") : "";
+  return frames.motion ? worded(TEXTS[name](frames, studio), described?.strike).replace(/(\d) (?=[%µA-Za-z]{1,3}\b|%)/g, "$1\u00a0") : "";
 }

@@ -7,6 +7,7 @@ import { digits, shown, timeUnit, unitOf } from "./units.js";
 const FORCES = ["total", "magnet", "spring", "damping", "backstop", "pack"];
 const DRAG = "drag"; // of a hammer that is damped in flight
 const SPACE = { 1: 14, 2: 60, 3: 30 }; // pixels between ticks, by side
+const LEAST = 1e-6; // N
 const KEY = 0.2; // of the height, for the key of forces
 const DASHES = { damping: [2, 2], drag: [6, 2] };
 
@@ -34,8 +35,9 @@ export function forcesView(body, studio) {
     series: () => forcesOf(studio.frames.motion).map((name) => ({ name, si: "N", scale: "x", colour: colours()[name], values: (f) => f.data[`F ${name}`], dash: DASHES[name] })),
     scales: (frame) => {
       const [low, high] = widened(...forcesOf(frame).reduce((ends, name) => extent(frame.data[`F ${name}`], ...ends), [0, 0]));
-      // The key lies above the peaks.
-      return { x: [low, high + KEY * (high - low)] };
+      // The key lies above the peaks; forces of rounding only are none.
+      const span = Math.max(high - low, LEAST);
+      return { x: [low, low + (1 + KEY) * span] };
     },
     under: () => {},
   });

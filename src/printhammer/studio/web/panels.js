@@ -12,6 +12,7 @@ import { tourOf } from "./tour.js";
 
 const TITLES = { motion: "Motion", sketch: "Actuator", map: "Frequency-time map", forces: "Forces", phase: "Phase plane", strobe: "Strobe", loops: "Loops of force", energy: "Energy per dot", line: "Printed line" };
 const SHORT = { motion: "Motion", sketch: "Actuator", map: "Map", forces: "Forces", phase: "Phase plane", strobe: "Strobe", loops: "Loops", energy: "Energy", line: "Line" };
+const OF_PACK = ["line", "energy"]; // views of what is struck
 const NARROW = 820; // pixels, as in the style sheet
 /** The views of the opening, the large ones. */
 const OPENING = ["sketch", "motion", "line"];
@@ -183,13 +184,16 @@ export function layout(studio, makers) {
   };
   studio.element.addEventListener("painted", tell);
   let shown = "";
-  const show = (views) => {
+  const show = (all) => {
+    // Without a pack nothing is printed, and no dot takes energy.
+    const views = studio.described?.places.front === null && all.some((view) => !OF_PACK.includes(view)) ? all.filter((view) => !OF_PACK.includes(view)) : all;
+    const beside = OPENING.filter((view) => views.includes(view) || !all.includes(view)).length;
     if (views.join() === shown) return;
     shown = views.join();
     for (const [name, panel] of Object.entries(panels)) panel.hidden = !views.includes(name);
     for (const each of chooser.children) each.setAttribute("aria-pressed", String(views.includes(each.dataset.view)));
     const others = views.filter((view) => !OPENING.includes(view)).length;
-    const whole = others > 0 && views.length - others === OPENING.length;
+    const whole = others > 0 && views.length - others === beside;
     // One view beside what moves, its curve and what it prints is the hero: it takes half.
     grid.classList.toggle("with-hero", whole && others === 1);
     if (whole && others === 1 && isNarrow() && !grid.classList.contains("one")) enlarge(views.find((view) => !OPENING.includes(view)));

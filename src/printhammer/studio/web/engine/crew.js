@@ -8,7 +8,7 @@ export function crewOf(script, shelf) {
   const start = () => {
     const worker = new Worker(place);
     const own = { worker, known: new Set(), order: null };
-    worker.postMessage({ limits: { ...shelf.limits, changes: shelf.sentences.changes } });
+    worker.postMessage({ limits: { ...shelf.limits, ...shelf.sentences } });
     worker.onmessage = ({ data }) => {
       const { order } = own;
       own.order = null;

@@ -20,7 +20,8 @@ export function engineOf(shelf, script, receive, page) {
   const [shown, whole] = [{}, {}]; // the keys of what views show, and of what is complete
   const seen = {}; // the numbers of the states that views show
   const keyOf = (state, names) => JSON.stringify(names.map((name) => state[name]));
-  const isWanted = (state, view) => state.views.includes(view) && (view !== "line" || state.line.trim());
+  const hasPack = ({ hammer }) => shelf.hammers[hammer].described.places.front !== null;
+  const isWanted = (state, view) => state.views.includes(view) && (view !== "line" || (state.line.trim() && hasPack(state)));
   const refuse = (serial, reason) => receive({ kind: "refusal", serial, reason: reason.slice(0, shelf.limits.LONGEST_REASON), data: {} });
 
   /** Read a state and check what can be checked without its run. */

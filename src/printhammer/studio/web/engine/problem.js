@@ -3,6 +3,13 @@ import { Refusal } from "./read.js";
 
 const FLIGHTS = { nodes: 2048, contacts: 256, each: 40, most: 1e6 }; // sizes of the first working space
 export const STATUS = ["ok", "range left", "runaway", "step limit", "step underflow"];
+const ARRAYS = ["body", "damping", "spring", "pack", "backstop", "coil", "magnet"];
+const KINDS = ["current", "force", "voltage"];
+const ABOUT = { count: 14, largest: 2, replaces: 3, shown: 13 }; // numbers about a pulse
+const [PIECES, PIECE] = [8, 6]; // rows and columns of the table of a pulse
+const [GRID, POINTS] = [8192, 24576]; // working space of the search for the rest position
+const SHOWN = 160; // points of the picture of a pulse
+const SINGLE = 500000; // steps of the single pulse that decides on the window of a run
 
 /** Return the firing times of a state, s. */
 export function firingsOf(kernel, { rate, pattern, pulses }) {
@@ -14,24 +21,102 @@ export function firingsOf(kernel, { rate, pattern, pulses }) {
   });
 }
 
-/** Whether a pulse is the one that the hammer opens with. */
-function isOpening(waveform, { opening }) {
-  const sorted = (table) => table && JSON.stringify(Object.entries(table).sort());
-  return !waveform || sorted(waveform) === sorted(opening);
+/** Refuse with the sentence of an outcome other than 0, and the numbers that belong to it. */
+function check(code, entry, out, limits) {
+  if (!code) return;
+  const [what, expected] = limits.REFUSALS[entry][code] ?? [`${entry}: ${code}`, null];
+  const filled = (text) => text.replace(/\{(\d)(?::[^}]*)?\}/g, (_all, k) => String(Number(out.values[k].toPrecision(6))));
+  throw new Refusal(expected ? `${filled(what)}: expected ${filled(expected)}` : filled(what));
+}
+
+/** The arrays of numbers of a hammer by name, with the constants of a state. */
+function numbersOf({ numbers, described, circuit }, { constants }) {
+  // Of a coil that no voltage drives, what its file leaves open is not set.
+  const left = new Set(circuit ? [] : described.open.map(({ key }) => key));
+  const set = ([keys, own]) => own.map((number, k) => (keys[k] && !left.has(keys[k]) ? constants[keys[k]] : undefined) ?? Number(number));
+  return Object.fromEntries(Object.entries(numbers).map(([name, pair]) => [name, set(pair)]));
+}
+
+/** The places of a hammer, m; null where there is none. */
+function placesOf({ body: [, position, front], limits: [, , platen, thickness] }) {
+  const places = [position, front, platen].filter((place) => !Number.isNaN(place));
+  if (places.some((place, k) => k && place <= places[k - 1])) throw new Refusal("the places are not in order: expected the backstop before the pack, and the pack before the platen");
+  const known = (place) => (Number.isNaN(place) ? null : place);
+  return { backstop: known(position), front: known(front), platen: known(platen), thickness: known(thickness) };
+}
+
+/** The segment table of the pulse of a state, and the numbers about it. */
+function pulseOf(kernel, hammer, state, limits) {
+  const wave = state.waveform ?? hammer.described.waveform;
+  if (wave.quantity !== hammer.quantity) throw new Refusal(limits.kinds);
+  const { fields, decays } = limits.WAVEFORMS[wave.shape];
+  const numbers = fields.map((name) => wave[name] ?? NaN);
+  if (decays) numbers.push(limits.DECAYS.indexOf(wave.decay));
+  const [pieces, about] = [kernel.array("f", PIECES, PIECE), kernel.array("f", ABOUT.count)];
+  const [rows] = kernel.call("pulse", Object.keys(limits.WAVEFORMS).indexOf(wave.shape), kernel.copy("f", numbers), pieces, about);
+  if (rows < 1) throw new Refusal(wave.shape === "sampled" ? limits.sampled : `the constants of the ${wave.shape} pulse do not make one`);
+  return { pieces: { letter: "f", at: pieces.at, shape: [rows, PIECE] }, about };
 }
 
 /** Return what the kernel needs for a state: constants, control, bounds, the tables of the pulse, rest and window. */
 export function pose(kernel, hammer, state, limits) {
-  const numbers = (list) => list.map(Number);
-  if (Object.keys(state.constants).length || !isOpening(state.waveform, hammer)) throw new Refusal(limits.changes);
-  const constants = kernel.copy("f", numbers(hammer.constants));
-  const pieces = kernel.copy("f", hammer.pieces.flat().map(Number), hammer.pieces.length, hammer.pieces[0].length);
-  return {
-    constants, pieces, control: numbers(hammer.control), bounds: numbers(hammer.bounds), scales: hammer.scales, rest: hammer.rest, wait: hammer.wait,
-    replace: state.overlap === "replace" || hammer.replaces, carry: numbers(hammer.carry),
-    exact: numbers(hammer.exact), mass: hammer.mass, places: { ...hammer.described.places, thickness: hammer.thickness },
-    circuit: hammer.circuit, width: hammer.circuit ? 9 : 5, columns: hammer.circuit ? 15 : 10, pulse: hammer.pulse, peak: hammer.peak,
+  const numbers = numbersOf(hammer, state);
+  const places = placesOf(numbers);
+  const [mass] = numbers.body;
+  const [constants, domain] = [kernel.array("f", hammer.size), kernel.array("f", 2)];
+  kernel.call("constants", ...ARRAYS.map((name) => kernel.copy("f", numbers[name])), constants, domain);
+  const { pieces, about } = pulseOf(kernel, hammer, state, limits);
+  const ends = kernel.copy("f", [...domain.values, ...numbers.limits.slice(2)]);
+  const out = kernel.array("f", 8);
+  const scalars = (length) => ({ letter: "f", at: out.at, shape: [length], values: out.values });
+  if (hammer.circuit) check(...kernel.call("supply", constants, ends, about, scalars(4)), "supply", out, limits);
+  const posed = {
+    constants, pieces, mass, places, replace: state.overlap === "replace" || about.values[ABOUT.replaces] !== 0, peak: about.values[ABOUT.largest],
+    circuit: hammer.circuit, width: hammer.circuit ? 9 : 5, columns: hammer.circuit ? 15 : 10,
   };
+  posed.rest = restOf(kernel, hammer, constants, ends, limits);
+  posed.carry = hammer.carry.map(Number).with(hammer.placeOfRest, posed.rest);
+  const scaled = (period, tolerance) => {
+    kernel.call("scales", constants, ends, KINDS.indexOf(hammer.quantity), posed.peak, period, kernel.copy("f", [posed.rest, 0]), tolerance, out);
+    const list = [...out.values];
+    return { control: list.slice(0, 4), bounds: list.slice(4), scales: list.slice(0, 2) };
+  };
+  Object.assign(posed, scaled(state.pattern ? NaN : 1 / state.rate, limits.DISPLAY_TOLERANCE));
+  posed.exact = [...posed.scales, ...scaled(NaN, limits.TOLERANCE).control.slice(2)];
+  posed.wait = waitOf(kernel, { ...posed, ...scaled(NaN, limits.DISPLAY_TOLERANCE) }, about);
+  const times = kernel.array("f", SHOWN);
+  kernel.call("map_rates", 0, about.values[ABOUT.shown], times);
+  const values = kernel.array("f", SHOWN);
+  kernel.call("pulse_values", pieces, times, values);
+  posed.pulse = { t: [...times.values], value: [...values.values] };
+  return posed;
+}
+
+/** The rest position, m. */
+function restOf(kernel, hammer, constants, ends, limits) {
+  const out = kernel.array("f", 2);
+  kernel.temporarily(() => {
+    const work = [kernel.array("f", GRID), kernel.array("f", 2, POINTS), kernel.array("f", POINTS, 3)];
+    check(...kernel.call("rest", constants, ends, ...work, out), "rest", out, limits);
+  });
+  return out.values[0];
+}
+
+/** The time from the last firing to the end of a run, s: long enough for a single pulse to come to rest. */
+function waitOf(kernel, posed, about) {
+  return kernel.temporarily(() => {
+    const out = kernel.array("f", 1);
+    const [asked] = kernel.call("window", about, posed.rest, posed.places.front ?? NaN, out);
+    let [wait] = out.values;
+    if (!asked) return wait;
+    const places = kernel.copy("f", [posed.rest, posed.places.front, ...posed.scales, wait]);
+    for (;;) {
+      const { code, contacts, nodes } = run(kernel, posed, [0], wait, SINGLE);
+      const [enough] = kernel.call("is_window", code, contacts, nodes, places, wait, out);
+      if (enough) return wait;
+      wait *= 2;
+    }
+  });
 }
 
 /** Lay out a train as the kernel takes it, with its working space. */
@@ -50,7 +135,7 @@ export function run(kernel, posed, firings, end, most) {
     const [nodes, contacts] = [kernel.array("f", rows, posed.width), kernel.array("f", touches, 7)];
     const carry = kernel.copy("f", posed.carry);
     const [status, used, touched, steps] = kernel.call("run", [train, posed.constants, posed.control, posed.bounds, most], end, nodes, contacts, carry);
-    if (used <= rows && touched <= touches) return { status: STATUS[status], nodes: cut(nodes, used), contacts: cut(contacts, touched), steps, train };
+    if (used <= rows && touched <= touches) return { status: STATUS[status], code: status, nodes: cut(nodes, used), contacts: cut(contacts, touched), steps, train };
     kernel.top = top;
     [rows, touches] = [Math.max(rows, used), Math.max(touches, touched)];
   }
