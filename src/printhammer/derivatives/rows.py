@@ -141,8 +141,9 @@ class _Maps:
         """Compute the images (n, 2) of scaled states of given rows, and the derivatives (n, 2, 2)."""
         steps = _SPACING * np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
         count, places = len(steps), np.repeat(rows, len(steps))
-        shifted = (z[:, np.newaxis] + steps) * self.scales[rows][:, np.newaxis]
-        # On a rigid backstop the difference is one-sided.
+        floor = np.stack([self.lowest[rows] / self.scales[rows, 0], np.full(len(rows), -np.inf)], axis=1)
+        # On a rigid backstop, and behind it, the difference is one-sided.
+        shifted = (np.maximum(z, floor)[:, np.newaxis] + steps) * self.scales[rows][:, np.newaxis]
         shifted[:, :, 0] = np.maximum(shifted[:, :, 0], self.lowest[rows, np.newaxis])
         apart = shifted[:, [1, 3]] - shifted[:, [2, 4]]
         apart = np.stack([apart[:, 0, 0], apart[:, 1, 1]], axis=1) / self.scales[rows]
