@@ -27,21 +27,28 @@ class LoweredModules(BuildHookInterface[Any]):
 
         from printhammer.drive.trains import PulseTrain, SineForce
         from printhammer.hammer.hammer import load, shipped
+        from printhammer.kernel.compile import link
         from printhammer.kernel.compile.bindings import bindings_of
+        from printhammer.kernel.compile.cache import sealed
+        from printhammer.kernel.compile.lanes import specialise_lanes, suits
         from printhammer.kernel.compile.modules import Module, every_template, laws_of
+        from printhammer.kernel.compile.specialise import specialise, variational
         from printhammer.kernel.model.laws import LAW_FUNCTIONS, Laws
         from printhammer.parts import PARTS
         from printhammer.run import problem
+        from printhammer.run.ensemble_group import closed_form
         from printhammer.run.plain import entries
 
         folder = tempfile.TemporaryDirectory()
         atexit.register(folder.cleanup)
 
+        def add(shipped: Path, content: bytes) -> None:
+            path = Path(folder.name, shipped.name)
+            path.write_bytes(content)
+            build_data["force_include"][str(path)] = shipped.relative_to(Path(self.root, "src")).as_posix()
+
         def ship(module: Module) -> None:
-            path = Path(folder.name, module.shipped.name)
-            path.write_bytes(lzma.compress(module.content(), preset=9))
-            place = module.shipped.relative_to(Path(self.root, "src"))
-            build_data["force_include"][str(path)] = place.as_posix()
+            add(module.shipped, lzma.compress(module.content(), preset=9))
 
         for template in (*every_template(), *entries.templates()):
             ship(template)
@@ -56,4 +63,14 @@ class LoweredModules(BuildHookInterface[Any]):
         for hammer in map(load, shipped()):
             # A textbook oscillator has no pulse of its own, and is driven by a force.
             drive = PulseTrain(hammer.waveform) if hammer.waveform else SineForce(1.0, 1.0)
-            ship(entries.page_module(problem.laws_of(hammer, drive)))
+            laws = problem.laws_of(hammer, drive)
+            ship(entries.page_module(laws))
+            kernel = specialise(laws)
+            _rates, kinds = closed_form(drive.kernel_arrays()[2])
+            kernels = [kernel, variational(kernel, forced=False), variational(kernel, forced=True)]
+            if suits(laws) and kinds is not None:
+                kernels.append(specialise_lanes(laws, kinds))
+            for entry in (entry for each in kernels for entry in each.entries):
+                # Processors of the level COMMON share their machine code; that of others runs nowhere else.
+                if link.processor()[1] == link.COMMON:
+                    add(entry.code.shipped, sealed(entry.code.get(entry.machine_code)))

@@ -155,17 +155,23 @@ def test_the_wheel_runs_elsewhere(elsewhere: Path, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["hendriks-1983", "relay-5v"])
-def test_the_wheel_compiles_shipped_hammers_without_numba(elsewhere: Path, tmp_path: Path, name: str) -> None:
+def test_the_wheel_compiles_without_numba_and_shipped_hammers_not_at_all(
+    elsewhere: Path, tmp_path: Path, name: str
+) -> None:
     code = f"""
 import os, sys
+from pathlib import Path
 os.environ["NUMBA_CACHE_DIR"] = "empty"
 import printhammer as ph
+from printhammer.kernel.compile import link
 hammer = ph.load({name!r})
 width = hammer.waveform.width
 drives = [ph.PulseTrain(hammer.waveform, period=period * width, pulses=2) for period in (4.0, 5.0)]
 motion = ph.simulate(hammer, drives[0])
 _ = motion.dots, motion.energy, motion.x
 assert ph.Ensemble(hammer, drives, 9.0 * width).run(dots=True).ok.all()
+assert not list(Path("empty").rglob("*.code")) or link.processor()[1] != link.COMMON
+assert ph.simulate(hammer, ph.SineForce(1e-3, 0.1 / width), end=9.0 * width).ok
 assert "numba" not in sys.modules
 """
     assert output_of(elsewhere / "python", "-c", code, cwd=tmp_path) == ""

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.errors import refused
 
+from printhammer import units
 from printhammer.errors import InputError
 from printhammer.units import DIMENSIONS, describe, from_si, parse, split, to_si
 
@@ -188,3 +189,20 @@ def test_first_conversion_in_a_process() -> None:
         check=True,
     )
     assert done.stdout.strip() == "5.08e-05"
+
+
+def test_common_units_are_those_of_the_file() -> None:
+    for name, measure in units._common().items():
+        assert measure == units._looked_up(name), name
+
+
+def test_common_units_do_not_load_the_library_of_units() -> None:
+    code = """
+import sys
+from printhammer.units import parse
+assert parse("3 um", "m") == 3e-6 and parse("2 N s/m", "N s/m") == 2.0 and parse("1 %", "1") == 0.01
+assert "pint" not in sys.modules
+assert parse("1 ft", "m") == 0.3048
+assert "pint" in sys.modules
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)

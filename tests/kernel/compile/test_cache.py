@@ -16,10 +16,11 @@ import pytest
 from printhammer.kernel.compile import cache, records
 
 CODE = b"machine code"
+NOWHERE = Path("no wheel")
 
 
 def kept(name: str = "curves.code") -> cache.Code:
-    return cache.Code(name, "curves", "a line", lambda: True)
+    return cache.Code(name, "curves", "a line", lambda: True, NOWHERE)
 
 
 def make() -> bytes:
@@ -28,6 +29,25 @@ def make() -> bytes:
 
 def unmade() -> bytes:
     raise AssertionError
+
+
+def test_machine_code_of_a_wheel_is_read_and_not_kept_again(tmp_path: Path, folder: Path) -> None:
+    shipped = tmp_path / "shipped.code"
+    shipped.write_bytes(cache.sealed(CODE))
+    code = cache.Code("curves.code", "curves", "a line", lambda: True, shipped)
+    assert code.exists()
+    assert code.get(unmade) == CODE
+    assert not folder.exists()
+
+
+@pytest.mark.parametrize("damaged", [b"", cache.sealed(CODE)[:-1], cache.sealed(CODE) + b"x", CODE])
+def test_damaged_machine_code_of_a_wheel_is_made_anew(tmp_path: Path, folder: Path, damaged: bytes) -> None:
+    shipped = tmp_path / "shipped.code"
+    shipped.write_bytes(damaged)
+    code = cache.Code("curves.code", "curves", "a line", lambda: True, shipped)
+    assert not code.exists()
+    assert code.get(make) == CODE
+    assert (folder / "printhammer" / "curves.code").exists()
 
 
 @pytest.fixture
@@ -183,13 +203,13 @@ def test_a_record_that_is_none_is_passed_over(tmp_path: Path, text: str) -> None
     records.note(tmp_path, "runs", 2.5)
     assert records.expected([tmp_path], "runs") == 2.5
     # Modules that a checkout has to lower first take longer, and are recorded by themselves.
-    lowered = cache.Code("runs.code", "runs", "a line", lambda: False).work
+    lowered = cache.Code("runs.code", "runs", "a line", lambda: False, NOWHERE).work
     assert records.expected([tmp_path], lowered) > 2.0 * records.expected([], "runs")
     records.note(tmp_path, lowered, 12.0)
     assert records.expected([tmp_path], lowered) == 12.0
     assert records.expected([tmp_path], "runs") == 2.5
     # So do those with the circuit of a coil.
-    circuit = cache.Code("runs.code", "runs", "a line", lambda: False, True).work
+    circuit = cache.Code("runs.code", "runs", "a line", lambda: False, NOWHERE, True).work
     assert records.expected([], circuit) > records.expected([], lowered)
     records.note(tmp_path, circuit, 24.0)
     assert records.expected([tmp_path], circuit) == 24.0
@@ -197,7 +217,7 @@ def test_a_record_that_is_none_is_passed_over(tmp_path: Path, text: str) -> None
 
 
 def test_what_may_follow_is_told_until_it_is_there(folder: Path, said: list[str]) -> None:
-    first, second = kept(), cache.Code("peaks.code", "peaks", "a line", lambda: True)
+    first, second = kept(), cache.Code("peaks.code", "peaks", "a line", lambda: True, NOWHERE)
     first.with_it, second.with_it = (second,), (first,)
     assert [first.get(make), second.get(make)] == [CODE, CODE]
     assert said == [

@@ -107,14 +107,19 @@ def _content(path: Path) -> bytes | None:
     except OSError:
         return None
     head = len(_MARK) + hashlib.sha256().digest_size
-    mark, payload = content[:head], content[head:]
-    return payload if mark == _MARK + hashlib.sha256(payload).digest() else None
+    payload = content[head:]
+    return payload if content == sealed(payload) else None
+
+
+def sealed(payload: bytes) -> bytes:
+    """Return the content of a file that holds a payload: mark, digest and payload."""
+    return _MARK + hashlib.sha256(payload).digest() + payload
 
 
 def _write(path: Path, payload: bytes) -> None:
     draft = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        draft.write_bytes(_MARK + hashlib.sha256(payload).digest() + payload)
+        draft.write_bytes(sealed(payload))
         draft.replace(path)
     finally:
         with suppress(OSError):
@@ -217,22 +222,33 @@ class Code(File):
     """Cached machine code of an entry point, compiled on first use.
 
     `kind` is the name of the code in the records of compile times; `label` describes the laws in messages.
-    `is_lowered` returns whether all modules of the code are already lowered, as in a wheel; `circuit` states
-    whether the coil has a circuit.
+    `is_lowered` returns whether all modules of the code are already lowered, as in a wheel. `shipped` is the
+    file in which a wheel contains the machine code itself, if it does; `circuit` states whether the coil has
+    a circuit.
     """
 
     def __init__(
-        self, name: str, kind: str, label: str, is_lowered: Callable[[], bool], circuit: bool = False
+        self,
+        name: str,
+        kind: str,
+        label: str,
+        is_lowered: Callable[[], bool],
+        shipped: Path,
+        circuit: bool = False,
     ) -> None:
         super().__init__(name)
         self.kind, self.label, self._is_lowered = kind, label, is_lowered
-        self._circuit = circuit
+        self.shipped, self._circuit = shipped, circuit
         self.with_it: tuple[Code, ...] = ()
         """Other machine code that is often needed after this one, announced in the same message."""
         self.is_begun = False
 
+    def read(self) -> bytes | None:
+        """Return the machine code from the wheel or the disk cache; None if it has to be compiled."""
+        return _content(self.shipped) or super().read()
+
     def get(self, make: Callable[[], bytes]) -> bytes:
-        """Return the machine code; if not cached, announce the compilation, compile, and record the time."""
+        """Return the machine code; if neither shipped nor cached, announce, compile, and record the time."""
         code = self.read()
         if code is not None:
             return code

@@ -20,6 +20,23 @@ LAW, CHOICE = "law.", "choice."
 """Prefixes of the symbols of laws and of choices; symbols of integer choices end with `.int`."""
 INTEGER: Final = ".int"
 
+COMMON: Final = "x86-64-v3"
+"""Level of the x86-64 instruction set for which all processors that have it get the same machine code."""
+_LEVEL_3: Final = [
+    "avx2",
+    "bmi",
+    "bmi2",
+    "cx16",
+    "f16c",
+    "fma",
+    "lzcnt",
+    "movbe",
+    "popcnt",
+    "sahf",
+    "sse4.2",
+    "xsave",
+]
+
 _OURS: Final = (ENTRY, LAW, CHOICE, "_ZN")
 """Prefixes of the symbols that must be defined after linking; `_ZN` is the prefix of numba's functions."""
 
@@ -48,8 +65,15 @@ def _machine() -> Any:
 
 @cache
 def processor() -> tuple[str, str, str]:
-    """Return the compilation target: triple of the system, name and features of the processor."""
-    return llvm.get_process_triple(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+    """Return the compilation target: triple of the system, name and features of the processor.
+
+    Processors with the instructions of `COMMON` get code for that level, so that their results have the same
+    bits, and that the wheel can contain the code.
+    """
+    system, features = llvm.get_process_triple(), llvm.get_host_cpu_features()
+    if system.startswith("x86_64-") and all(features.get(name) for name in _LEVEL_3):
+        return system, COMMON, ""
+    return system, llvm.get_host_cpu_name(), features.flatten()
 
 
 def link(template: bytes, laws: Iterable[bytes], choices: Mapping[str, int], calling: str) -> Any:

@@ -227,15 +227,19 @@ class Entry:
                 flavours, self._choices = (), {}
         self._laws = [laws_of(role, bindings, lanes) for lanes in flavours for role in bindings.digests]
         self._function: Callable[..., Any] | None = None
-        parts = [module.identity() for module in (self._template, *self._laws)]
-        here = (*link.processor(), version("llvmlite"), _digest_of(("compile/link.py", "compile/calls.py")))
-        digest = hashlib.sha256(repr((parts, sorted(self._choices.items()), here)).encode())
         modules = [self._template, *self._laws]
+        here = (*link.processor(), _digest_of(("compile/link.py", "compile/calls.py")))
+
+        def file_of(parts: Sequence[str]) -> str:
+            digest = hashlib.sha256(repr((parts, sorted(self._choices.items()), here)).encode())
+            return f"{name}_{digest.hexdigest()[:24]}.code"
+
         self.code = Code(
-            f"{name}_{digest.hexdigest()[:24]}.code",
+            file_of([version("llvmlite"), *(module.identity() for module in modules)]),
             KINDS.get(name, name),
             label,
             lambda: all(module.is_there() for module in modules),
+            SHIPPED / file_of([module.name for module in modules]),
             variant.get("HAS_CIRCUIT", False),
         )
 
@@ -247,11 +251,12 @@ class Entry:
         """Return the entry point as a Python function, compiled if necessary."""
         with one_at_a_time:
             if self._function is None:
-                address = link.load(self.code.get(self._make))
+                address = link.load(self.code.get(self.machine_code))
                 self._function = calls.caller(address, self._signature, self._results)
         return self._function
 
-    def _make(self) -> bytes:
+    def machine_code(self) -> bytes:
+        """Link the modules and compile them to machine code."""
         calling = calls.calling_code(link.ENTRY, self._signature, link.CALL)
         return link.emit(self._linked(calling))
 

@@ -70,6 +70,11 @@ class Kernel:
         self.__dict__[name] = function
         return function
 
+    @property
+    def entries(self) -> tuple[Entry, ...]:
+        """Entry points of the kernel; empty if they are interpreted."""
+        return tuple(self._entries.values())
+
     def is_ready(self, name: str) -> bool:
         """Whether an entry point is compiled in this process or has machine code on disk."""
         return name not in self._entries or self._entries[name].is_ready()
