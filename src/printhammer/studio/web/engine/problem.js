@@ -55,11 +55,28 @@ function pulseOf(kernel, hammer, state, limits) {
   const [pieces, about] = [kernel.array("f", PIECES, PIECE), kernel.array("f", ABOUT.count)];
   const [rows] = kernel.call("pulse", Object.keys(limits.WAVEFORMS).indexOf(wave.shape), kernel.copy("f", numbers), pieces, about);
   if (rows < 1) throw new Refusal(wave.shape === "sampled" ? limits.sampled : `the constants of the ${wave.shape} pulse do not make one`);
-  return { pieces: { letter: "f", at: pieces.at, shape: [rows, PIECE] }, about };
+  return { pieces: cut(pieces, rows), about };
 }
 
 /** Return what the kernel needs for a state: constants, control, bounds, the tables of the pulse, rest and window. */
 export function pose(kernel, hammer, state, limits) {
+  const key = JSON.stringify([state.hammer, state.constants, state.waveform]);
+  if (latest.key !== key) latest = { key, device: kernel.temporarily(() => kept(prepare(kernel, hammer, state, limits))) };
+  const { constants, pieces, ends, about, rest, wait, ...device } = latest.device;
+  const posed = {
+    ...device, rest, wait, constants: kernel.copy("f", constants), pieces: kernel.copy("f", pieces, pieces.length / PIECE, PIECE),
+    replace: state.overlap === "replace" || about[ABOUT.replaces] !== 0, carry: hammer.carry.map(Number).with(hammer.placeOfRest, rest),
+  };
+  const scaled = scalesOf(kernel, hammer, { ...posed, ends: kernel.copy("f", ends) });
+  Object.assign(posed, scaled(state.pattern ? NaN : 1 / state.rate, limits.DISPLAY_TOLERANCE));
+  posed.exact = [...posed.scales, ...scaled(NaN, limits.TOLERANCE).control.slice(2)];
+  return posed;
+}
+
+let latest = { key: null }; // what was prepared last: many works in a row have the same device
+
+/** The numbers of a device and its pulse that do not depend on the train, with arrays in the memory of the module. */
+function prepare(kernel, hammer, state, limits) {
   const numbers = numbersOf(hammer, state);
   const places = placesOf(numbers);
   const [mass] = numbers.body;
@@ -67,29 +84,38 @@ export function pose(kernel, hammer, state, limits) {
   kernel.call("constants", ...ARRAYS.map((name) => kernel.copy("f", numbers[name])), constants, domain);
   const { pieces, about } = pulseOf(kernel, hammer, state, limits);
   const ends = kernel.copy("f", [...domain.values, ...numbers.limits.slice(2)]);
-  const out = kernel.array("f", 8);
-  const scalars = (length) => ({ letter: "f", at: out.at, shape: [length], values: out.values });
-  if (hammer.circuit) check(...kernel.call("supply", constants, ends, about, scalars(4)), "supply", out, limits);
-  const posed = {
-    constants, pieces, mass, places, replace: state.overlap === "replace" || about.values[ABOUT.replaces] !== 0, peak: about.values[ABOUT.largest],
+  const found = kernel.array("f", 4);
+  if (hammer.circuit) check(...kernel.call("supply", constants, ends, about, found), "supply", found, limits);
+  const device = {
+    constants, pieces, ends, about, mass, places, peak: about.values[ABOUT.largest],
     circuit: hammer.circuit, width: hammer.circuit ? 9 : 5, columns: hammer.circuit ? 15 : 10,
   };
-  posed.rest = restOf(kernel, hammer, constants, ends, limits);
-  posed.carry = hammer.carry.map(Number).with(hammer.placeOfRest, posed.rest);
-  const scaled = (period, tolerance) => {
-    kernel.call("scales", constants, ends, KINDS.indexOf(hammer.quantity), posed.peak, period, kernel.copy("f", [posed.rest, 0]), tolerance, out);
+  device.rest = restOf(kernel, hammer, constants, ends, limits);
+  const carry = hammer.carry.map(Number).with(hammer.placeOfRest, device.rest);
+  const alone = { ...device, carry, replace: about.values[ABOUT.replaces] !== 0 };
+  device.wait = waitOf(kernel, { ...alone, ...scalesOf(kernel, hammer, device)(NaN, limits.DISPLAY_TOLERANCE) }, about);
+  const [times, values] = [kernel.array("f", SHOWN), kernel.array("f", SHOWN)];
+  kernel.call("map_rates", 0, about.values[ABOUT.shown], times);
+  kernel.call("pulse_values", pieces, times, values);
+  device.pulse = { t: [...times.values], value: [...values.values] };
+  return device;
+}
+
+/** The same with copies of its arrays, outside the memory of the module. */
+function kept(device) {
+  const { constants, pieces, ends, about } = device;
+  const copies = Object.entries({ constants, pieces, ends, about }).map(([name, array]) => [name, array.values.slice()]);
+  return { ...device, ...Object.fromEntries(copies) };
+}
+
+/** Return a function of the period of a train, s, and a tolerance, which gives the control and the bounds of a run. */
+function scalesOf(kernel, hammer, { constants, ends, peak, rest }) {
+  return (period, tolerance) => {
+    const out = kernel.array("f", 8);
+    kernel.call("scales", constants, ends, KINDS.indexOf(hammer.quantity), peak, period, kernel.copy("f", [rest, 0]), tolerance, out);
     const list = [...out.values];
     return { control: list.slice(0, 4), bounds: list.slice(4), scales: list.slice(0, 2) };
   };
-  Object.assign(posed, scaled(state.pattern ? NaN : 1 / state.rate, limits.DISPLAY_TOLERANCE));
-  posed.exact = [...posed.scales, ...scaled(NaN, limits.TOLERANCE).control.slice(2)];
-  posed.wait = waitOf(kernel, { ...posed, ...scaled(NaN, limits.DISPLAY_TOLERANCE) }, about);
-  const times = kernel.array("f", SHOWN);
-  kernel.call("map_rates", 0, about.values[ABOUT.shown], times);
-  const values = kernel.array("f", SHOWN);
-  kernel.call("pulse_values", pieces, times, values);
-  posed.pulse = { t: [...times.values], value: [...values.values] };
-  return posed;
 }
 
 /** The rest position, m. */
