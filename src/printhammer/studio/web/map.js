@@ -1,5 +1,6 @@
 // The frequency-time map: colours of displacement, and a cursor that sets the rate.
 import { axes, line, refusal } from "./axes.js";
+import { worded } from "./captions.js";
 import { surface } from "./pen.js";
 import { colours, FONT, SMALL } from "./theme.js";
 import { digits, shown, timeUnit, unitOf } from "./units.js";
@@ -152,13 +153,15 @@ export function mapView(body, studio) {
     pen.textBaseline = "middle";
     pen.fillStyle = c.panel;
     pen.globalAlpha = 0.85;
-    pen.fillRect(box.x + box.w - 62, box.y + 2, 60, 13);
+    const text = worded("lost dot", studio.described?.strike);
+    const wide = pen.measureText(text).width + 20;
+    pen.fillRect(box.x + box.w - wide - 2, box.y + 2, wide, 13);
     pen.globalAlpha = 1;
     pen.fillStyle = `rgb(${LOST})`;
-    pen.fillRect(box.x + box.w - 58, box.y + 6, 8, 4);
+    pen.fillRect(box.x + box.w - wide + 2, box.y + 6, 8, 4);
     pen.fillStyle = c.ink;
     pen.textAlign = "right";
-    pen.fillText("lost dot", box.x + box.w - 6, box.y + 8.5);
+    pen.fillText(text, box.x + box.w - 6, box.y + 8.5);
     pen.restore();
   }
 
