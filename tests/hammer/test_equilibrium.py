@@ -3,6 +3,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from tests.errors import refused
 from tests.hammers import CRUDE
 
@@ -16,6 +18,7 @@ from printhammer.hammer.equilibrium import (
     release_current,
     rest_state,
 )
+from printhammer.hammer.statics import spacing
 from printhammer.parts import BackstopPart, MagnetPart, PackPart, SpringPart
 from printhammer.parts.backstop.elastomer import ElastomerBackstop
 from printhammer.parts.backstop.hertz import HertzBackstop
@@ -268,3 +271,8 @@ def test_the_shipped_hammer_is_held_and_released() -> None:
     )
     assert picture.positive_intervals == ()
     assert 0.5 < printhammer.release_current(hammer) < 1.0
+
+
+@given(st.floats(-1e3, 1e3) | st.sampled_from([0.0, -0.0, 5e-324, 2.2250738585072014e-308, 1e-310]))
+def test_the_spacing_of_numbers_is_that_of_the_library(x: float) -> None:
+    assert spacing(x) == math.ulp(x)

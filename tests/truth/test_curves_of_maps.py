@@ -23,7 +23,7 @@ from tests.known_maps import (
 from printhammer.chaos.continuation.arclength import Steps
 from printhammer.chaos.curves.bifurcation_curve import BifurcationCurve, curve_of
 from printhammer.chaos.curves.normal_forms import doubling_coefficient
-from printhammer.chaos.curves.systems import Place
+from printhammer.chaos.curves.systems import CurvePoint
 from printhammer.chaos.curves.tracing import PRECISION, CurveTracer
 
 SHARP = 1e-9
@@ -232,7 +232,7 @@ def coefficient_of(known: Map, u: Bounds, p: float, r: float) -> float:
     """The coefficient of the doubling of a fixed point."""
     plane = known_maps.plane((-9.0, 9.0), (-9.0, 9.0))
     matrix = np.array(known.derivative(np.array(u), p, r))
-    place = Place(p + SHIFT, r, UNITS * np.array(u), 0.0, matrix, "")
+    place = CurvePoint(p + SHIFT, r, UNITS * np.array(u), 0.0, matrix, "")
     with standing_in(known):
         return doubling_coefficient(plane, place)
 

@@ -59,8 +59,6 @@ class StaticForce:
     """
 
     def __init__(self, hammer: HammerLike) -> None:
-        if not hasattr(hammer, "backstop"):
-            raise InputError.of("hammer", hammer, "a hammer, such as load('hendriks-1983')")
         self.hammer = hammer
         self.statics = statics_of(hammer)
         self.front, self.rigid, self.memory = self.statics.front, self.statics.rigid, self.statics.memory
@@ -127,6 +125,8 @@ class StaticForce:
 
 def statics_of(hammer: HammerLike) -> Statics:
     """Return the law functions and constants on which the static force of a hammer depends."""
+    if not hasattr(hammer, "backstop"):
+        raise InputError.of("hammer", hammer, "a hammer, such as load('hendriks-1983')")
     magnet_force, magnet = law_of(hammer, hammer.magnet, "magnet_force")
     spring_force, spring = law_of(hammer, hammer.spring, "spring_force")
     pack_loading, pack = law_of(hammer, hammer.pack, "pack_loading")

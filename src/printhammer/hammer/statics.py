@@ -14,6 +14,12 @@ from printhammer.support.roots import bisected, find_roots
 NEAREST: Final = 1e-18
 """Smallest distance from an anchor in the search for equilibria, m: far below any compression; arbitrary."""
 
+LEAST: Final = 5e-324
+"""Smallest positive number of double precision."""
+
+LEAST_NORMAL: Final = 2.2250738585072014e-308
+"""Smallest normal number of double precision."""
+
 FARTHER: Final = (1.0, 10.0, 100.0, 1000.0)
 """Search radii for equilibria about the origin, m, tried in turn if the hammer sets no limit; arbitrary."""
 
@@ -126,6 +132,8 @@ def compressed(current: float, low: float, s: Statics) -> float:
 def spacing(x: float) -> float:
     """Return the distance from a number to the next larger one in magnitude, as `math.ulp`."""
     x = abs(x)
+    if x < LEAST_NORMAL:
+        return LEAST
     power = 1.0
     while power > x:
         power *= 0.5
