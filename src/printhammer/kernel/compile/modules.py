@@ -115,9 +115,19 @@ class Module:
 
 
 class WebModule(Module):
-    """WebAssembly module that contains several entry points of a kernel."""
+    """WebAssembly module that contains several entry points of a kernel; `label` describes its laws."""
 
     suffix = ".wasm"
+
+    def __init__(self, sources: str, make: Callable[[], bytes], label: str) -> None:
+        super().__init__("web", sources, make)
+        self._label = label
+
+    def content(self) -> bytes:
+        """Return the content of the module; announce its compilation, which takes up to a minute."""
+        if not self.is_there():
+            say_once(f"compiling WebAssembly ({self._label}): up to a minute; once, kept on disk")
+        return super().content()
 
     @staticmethod
     def is_readable(content: bytes) -> bool:
@@ -290,4 +300,4 @@ def web_module_of(entries: Sequence[Entry]) -> WebModule:
         return web.join({each.name: each.web_object() for each in entries}, description)
 
     sources = _digest_of(("compile/link.py", "compile/calls.py", "compile/web/build.py"))
-    return WebModule("web", repr(([each.sources for each in entries], sources)), make)
+    return WebModule(repr(([each.sources for each in entries], sources)), make, entries[0].code.label)
