@@ -171,7 +171,7 @@ motion = ph.simulate(hammer, drives[0])
 _ = motion.dots, motion.energy, motion.x
 assert ph.Ensemble(hammer, drives, 9.0 * width).run(dots=True).ok.all()
 assert not list(Path("empty").rglob("*.code")) or link.processor()[1] != link.COMMON
-assert ph.simulate(hammer, ph.SineForce(1e-3, 0.1 / width), end=9.0 * width).ok
+assert ph.simulate(hammer, ph.SineForce(1e-3, 0.1 / width), duration=9.0 * width).ok
 assert "numba" not in sys.modules
 """
     assert output_of(elsewhere / "python", "-c", code, cwd=tmp_path) == ""
