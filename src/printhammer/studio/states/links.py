@@ -143,7 +143,7 @@ def read_file(text: str, where: str, shelf: Shelf) -> Told:
 
 
 def open_file(path: Path, shelf: Shelf) -> None:
-    """Have a shelf start with the state in a file that the studio has exported.
+    """Make the state in an exported file the start state of a shelf.
 
     Raises
     ------
