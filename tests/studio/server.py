@@ -13,6 +13,7 @@ from tests.hammers import CRUDE
 from websockets.sync.client import ClientConnection, connect
 
 from printhammer.studio.frames import unframe
+from printhammer.studio.states.state import START
 
 SCRIPT = """
 import sys
@@ -21,20 +22,7 @@ from printhammer.studio import serve
 ready = lambda address: print(address, flush=True)
 serve(load(sys.argv[1]), port=int(sys.argv[2]), token=sys.argv[3], ready=ready)
 """
-STATE: dict[str, Any] = {
-    "hammer": "",
-    "text": "",
-    "constants": {},
-    "waveform": None,
-    "rate": 1200.0,
-    "pulses": 9,
-    "pattern": "",
-    "overlap": "add",
-    "low": 500.0,
-    "high": 2000.0,
-    "line": "",
-    "views": ["motion", "map", "strobe"],
-}
+STATE: dict[str, Any] = {**START, "hammer": "", "views": ["motion", "map", "strobe"]}
 """A state of the crude hammer, whose name is filled in by `Studio.state`."""
 
 

@@ -10,10 +10,10 @@ from tests.studio.test_workers import Compiler, until
 
 from printhammer.hammer.hammer import load, shipped
 from printhammer.studio.frames import unframe
-from printhammer.studio.pictures.ahead import START, frames_ahead, opening
+from printhammer.studio.pictures.ahead import frames_ahead, opening
 from printhammer.studio.pictures.engine import motion_frame
 from printhammer.studio.session import Session
-from printhammer.studio.states.state import read_state
+from printhammer.studio.states.state import START, read_state
 from printhammer.studio.workers.crew import Crew
 
 VIEWS = ["motion", "map"]

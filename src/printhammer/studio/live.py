@@ -31,7 +31,7 @@ from printhammer.studio.pictures.engine import MOST_ENDS, POINTS
 from printhammer.studio.pictures.section import AT_ONCE, LATER
 from printhammer.studio.states.controls import describe, vocabulary
 from printhammer.studio.states.links import FORMAT, KIND
-from printhammer.studio.states.state import VIEWS, State, read_state
+from printhammer.studio.states.state import START, VIEWS, State, read_state
 from printhammer.support.constants import quantities
 
 if TYPE_CHECKING:
@@ -76,21 +76,6 @@ _SENTENCES: Final = {
 
 OPENING: Final = ("motion", "sketch", "map", "line")
 """Views with which a page opens: the map, and beside it the actuator, its curve and what it prints."""
-
-_START: Final[dict[str, Any]] = {
-    "text": "",
-    "constants": {},
-    "waveform": None,
-    "rate": 1200.0,
-    "pulses": 9,
-    "pattern": "",
-    "overlap": "add",
-    "low": 500.0,
-    "high": 2000.0,
-    "line": "HAMMER",
-    "views": list(VIEWS),
-}
-"""Entries of a state as a page opens with them."""
 
 
 def live_page(shelf: Shelf) -> str:
@@ -187,7 +172,7 @@ def _hammer(shelf: Shelf, name: str, modules: dict[str, str]) -> dict[str, Any]:
     """Compose the entry of a hammer; add its module to `modules`, by its identity."""
     hammer = shelf.hammer(name)
     described = describe(hammer)
-    opening = {**_START, "hammer": name, **described["start"]}
+    opening = {**START, "hammer": name, **described["start"]}
     state = read_state(opening, shelf)
     entry: dict[str, Any] = {
         "described": described,

@@ -17,25 +17,10 @@ from typing import TYPE_CHECKING, Any, Final
 from printhammer.studio.frames import frame, unframe
 from printhammer.studio.states.controls import opening_of
 from printhammer.studio.states.shelf import Shelf
-from printhammer.studio.states.state import read_state
+from printhammer.studio.states.state import START, read_state
 
 if TYPE_CHECKING:
     from printhammer.studio.states.state import State
-
-START: Final[dict[str, Any]] = {
-    "text": "",
-    "constants": {},
-    "waveform": None,
-    "rate": 1200.0,
-    "pulses": 9,
-    "pattern": "",
-    "overlap": "add",
-    "low": 500.0,
-    "high": 2000.0,
-    "line": "",
-    "views": [],
-}
-"""Opening state of the page, as in `state.js`, except for the hammer."""
 
 SIZE: Final = (128, 192)
 """Numbers of rates and times of a precomputed map."""

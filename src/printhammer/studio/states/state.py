@@ -28,6 +28,21 @@ if TYPE_CHECKING:
 VIEWS: Final = ("motion", "forces", "loops", "phase", "sketch", "map", "strobe", "energy", "line")
 """Names of the views that a studio page can display."""
 
+START: Final[Mapping[str, Any]] = {
+    "text": "",
+    "constants": {},
+    "waveform": None,
+    "rate": 1200.0,
+    "pulses": 9,
+    "pattern": "",
+    "overlap": "add",
+    "low": 500.0,
+    "high": 2000.0,
+    "line": "",
+    "views": [],
+}
+"""Entries of the opening state of a page, except for the hammer; `state.js` adds the views and a line."""
+
 
 class ProtocolError(Exception):
     """Message that the page never sends; it ends the connection, with its text as the reason."""
