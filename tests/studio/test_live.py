@@ -184,6 +184,28 @@ def test_a_rate_is_followed_and_a_superseded_state_dropped(live: Page) -> None:
     live.wait(f"window.studio.studio.frames.map.pattern === '1101' && {WHOLE}")
 
 
+@pytest.mark.slow
+def test_changed_constants_and_pulses_are_computed_as_by_python(live: Page) -> None:
+    hammer = ph.load(NAME)
+    wide = hammer.waveform.model_copy(update={"width": 1.1 * hammer.waveform.width})
+    heavy = hammer.replace({"mass": 1.1 * hammer.mass})
+    thick = hammer.replace({"pack.front": 1.05 * hammer.pack.front})
+    for changed, wave, patch in (
+        (heavy, hammer.waveform, {"constants": {"mass": heavy.mass}}),
+        (thick, hammer.waveform, {"constants": {"pack.front": thick.pack.front}}),
+        (hammer, wide, {"constants": {}, "waveform": fields_of(wide)}),
+        (hammer, hammer.waveform, {"constants": {}, "waveform": None}),
+    ):
+        before = live.run("window.studio.studio.frames.dots.serial")
+        live.run(f"window.studio.studio.store.set({json.dumps(patch)}); 1")
+        live.wait(f"window.studio.studio.frames.dots.serial !== {before} && !window.studio.studio.busy")
+        shown = live.run("window.studio.studio.frames.dots.dots[0]")
+        dot = ph.simulate(changed, ph.PulseTrain(wave, rate=1200.0, pulses=9)).dots[0]
+        assert shown["flight_time"] == pytest.approx(dot.flight_time, rel=1e-4)
+        assert shown["peak_force"] == pytest.approx(dot.peak_force, rel=1e-3)
+    live.wait(WHOLE)
+
+
 SHOWN = "[...document.querySelectorAll('.panel')].filter((each) => each.checkVisibility())"
 SHOWN += ".map((each) => each.classList[1])"
 

@@ -61,6 +61,7 @@ export function engineOf(shelf, script, receive, page) {
       if (!answer || serial < (seen[view] ?? 0) || (number && latest !== serial)) return;
       seen[view] = serial;
       shown[view] = keyOf(state, KEYS[view]);
+      whole[view] = null; // what was complete is no longer shown
       receive(answer.reason ? { kind: view, serial, reason: answer.reason, ...NOTHING[view], data: {} } : { ...answer.frames[0], ...(view === "strobe" ? { last: steps.at(-1).points } : {}), serial });
       if (answer.reason) return;
     }
@@ -81,7 +82,7 @@ export function engineOf(shelf, script, receive, page) {
       if (parts.reason) { empty(parts.reason); return; }
       receive({ detail: full ? "full" : "preview", ...await codesOf(crew, parts, state), serial });
       shown.map = key;
-      if (full) whole.map = key;
+      whole.map = full ? key : null;
     }
   }
 
