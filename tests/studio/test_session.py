@@ -106,6 +106,16 @@ def test_a_map_that_is_shown_is_not_computed_again() -> None:
     assert [frame["serial"] for frame in found if frame["kind"] == "map"] == [1, 1, 3, 3]
 
 
+def test_a_map_is_computed_again_after_a_coarse_one_of_another_state() -> None:
+    with opened() as (made, page):
+        made.receive(state(1, views=["motion", "map"]))
+        page.until("map", detail="full")
+        made.receive(state(2, views=["motion", "map"], pulses=3))
+        page.until("map", serial=2, detail="preview")
+        made.receive(state(3, views=["motion", "map"]))
+        page.until("map", serial=3, detail="full")
+
+
 def test_views_that_do_not_belong_to_a_state_are_told_with_its_curves() -> None:
     with opened() as (made, page):
         made.receive(state(1, views=["motion", "map"]))

@@ -286,8 +286,8 @@ class Session:
         with self._change:
             if view in KEYS:
                 self._shown[view] = KEYS[view](order.state)
-                if whole:
-                    self._whole[view] = self._shown[view]
+                # What was complete before is no longer shown.
+                self._whole[view] = self._shown[view] if whole else None
             elif view == "motion":
                 self._accepted = (order.serial, order.state)
             self._change.notify_all()
