@@ -1,4 +1,4 @@
-"""Claims about bursts of nine pulses against the rate, Figs. 8 and 9.
+"""Claims about bursts of nine pulses as a function of the rate, Figs. 8 and 9.
 
 The claim about the sensitivity of the frequency-time map to the rate is included.
 """

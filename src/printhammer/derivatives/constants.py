@@ -50,7 +50,7 @@ def flow(
 
 
 def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
-    """Return the derivatives of the rest state at time 0, (3, n): displacement, velocity, latest maximum.
+    """Return the derivatives of displacement, velocity and latest maximum at rest at time 0, shape (3, n).
 
     If a pulse with a sharp edge is fired at time 0, a shift of its firing changes the initial velocity. With
     a coil circuit, the shape is (6, n), for a start without current.

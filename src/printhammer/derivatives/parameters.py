@@ -94,7 +94,7 @@ def parameters(hammer: Hammer, drive: Drive, names: Sequence[str]) -> list[Param
 
 
 def rest_changes(hammer: Hammer, wanted: Sequence[Parameter]) -> FloatArray:
-    """Compute the derivatives of the rest displacement, m, by ``value / scale`` of each constant, (n,)."""
+    """Compute the derivatives of the rest displacement, m, by each scaled constant, shape (n,)."""
     changes = np.zeros(len(wanted))
     for k, parameter in enumerate(wanted):
         # The supply does not affect the state of rest.

@@ -103,7 +103,7 @@ def row_multipliers(
 
 
 def leading(jacobians: FloatArray) -> FloatArray:
-    """Compute the eigenvalue of largest absolute value of each 2 x 2 matrix, (rows,); NaN for NaN entries.
+    """Compute the largest eigenvalue, by absolute value, of each 2 x 2 matrix, shape (rows,); NaN for NaN.
 
     A real eigenvalue keeps its sign; a complex pair is represented by its absolute value.
     """
@@ -115,7 +115,7 @@ def leading(jacobians: FloatArray) -> FloatArray:
 
 
 class _Maps:
-    """Strobe maps of many rows of dots, on scaled states, shape (rows, 2)."""
+    """Strobe maps of many rows of dots, as functions of scaled states, shape (rows, 2)."""
 
     def __init__(
         self, hammers: Sequence[Hammer], drives: Sequence[Drive], effort: Effort, firing: int

@@ -234,7 +234,7 @@ class Spread(Result):
     @property
     @derived("quantity_unit", _WORST, "dot quantity")
     def worst(self) -> FloatArray:
-        """Worst-case deviation of each quantity of each dot, all constants at their limits, SI, (d, q)."""
+        """Worst-case deviation of each quantity of each dot, SI, shape (d, q): constants at their limits."""
         return np.asarray(self.dots.sum(axis=-1))
 
     @property
@@ -246,7 +246,7 @@ class Spread(Result):
     @property
     @derived("J", _WORST, "energy")
     def run_worst(self) -> FloatArray:
-        """Worst-case deviation of each energy of the run, all constants at their limits, J, (4,)."""
+        """Worst-case deviation of each energy of the run, J, shape (4,): all constants at their limits."""
         return np.asarray(self.run.sum(axis=-1))
 
     @property

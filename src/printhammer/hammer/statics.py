@@ -44,7 +44,7 @@ class Statics(NamedTuple):
     spring_force: Any
     pack_loading: Any
     backstop_elastic: Any
-    """Law functions of the parts, of absent parts those of `printhammer.parts.absent`."""
+    """Law functions of the parts; for absent parts, those of `printhammer.parts.absent`."""
     magnet: Any
     spring: Any
     pack: Any
@@ -86,7 +86,7 @@ def total_force(x: float, current: float, s: Statics) -> float:
 
 
 def force_at(x: float, about: tuple[float, Statics]) -> float:
-    """Return the net force at a current, N; `about` is the current, A, and the statics."""
+    """Return the net force, N, at a displacement, m; `about` is the pair of current, A, and statics."""
     return total_force(x, about[0], about[1])
 
 

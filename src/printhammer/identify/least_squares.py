@@ -374,7 +374,7 @@ def _solution(
 
 
 def sandwich(rows: FloatArray, errors: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Compute the HC2 covariance of a linear regression, (n, n), and its degrees of freedom, (n,).
+    """Compute the HC2 covariance of a linear regression, shape (n, n), and its degrees of freedom, (n,).
 
     `rows` is the weighted Jacobian, shape (m, n), and `errors` are the weighted residuals; rows beyond the
     residuals belong to the prior, with variance 1. The degrees of freedom, for Student's t of each parameter,

@@ -131,7 +131,7 @@ def misses(claim: Claim, value: Mapping[str, Any] | None) -> list[Miss]:
 
 
 def agreement(value: Any, band: list[str]) -> str:
-    """Format how many words of a list equal those in the band, such as "9 of 12 as printed"."""
+    """Format the number of words in a list that equal those in the band, such as "9 of 12 as printed"."""
     words = value if isinstance(value, (list, tuple)) else []
     same = sum(one == other for one, other in zip(words, band, strict=False))
     return f"{same} of {len(band)} as printed"

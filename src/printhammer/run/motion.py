@@ -92,7 +92,7 @@ class Motion(Result, fields=False):
 
     @property
     def status(self) -> str:
-        """How the run ended: "ok", "range left", "runaway", "step limit" or "step underflow"."""
+        """Status of the run: "ok", "range left", "runaway", "step limit" or "step underflow"."""
         return self._record.status_name
 
     @property
@@ -160,7 +160,7 @@ class Motion(Result, fields=False):
 
     @property
     def linkage(self) -> FloatArray:
-        """Flux linkage of the coil on the output grid, Wb, (n,); zero unless the drive is a voltage."""
+        """Flux linkage of the coil on the output grid, Wb, shape (n,); zero unless the drive is a voltage."""
         return self._electric(12)
 
     @property

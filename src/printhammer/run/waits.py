@@ -1,4 +1,4 @@
-"""Run windows of many devices (`printhammer.run.window`), from single pulses simulated as ensembles."""
+"""Windows of the runs of many devices (`printhammer.run.window`), from an ensemble of single pulses."""
 
 from __future__ import annotations
 

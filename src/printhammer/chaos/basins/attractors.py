@@ -1,4 +1,4 @@
-"""Attractors: identification from the strobe states of pulse trains, and assignment of trains."""
+"""Attractors of pulse trains: identified from strobe states, and matched to further trains."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 MATCH: Final = 1e-2
-"""Largest distance of periodic orbits that count as one attractor, in half-widths of the strobe window."""
+"""Largest distance of two periodic orbits that count as one attractor, in half-widths of the window."""
 
 CLOUD: Final = 2000
 """Number of points that represent a strange attractor."""

@@ -296,7 +296,7 @@ def two_pulse_drives(first: Waveform, seconds: Sequence[Waveform], last: float) 
 def _piece(
     hammer: Hammer, drives: Sequence[TwoPulseDrive], gaps: FloatArray, tail: float, effort: Effort
 ) -> tuple[npt.NDArray[Any], ...]:
-    """Simulate all widths at some gaps: second dot, status, peak, m, force, N, flight time, s."""
+    """Simulate a block of gaps at all widths; return dot, status, peak, m, force, N, and flight time, s."""
     begin, number = 0.0, 1
     every: list[Drive]
     if drives[0].pulses[0].replaces:
@@ -344,7 +344,7 @@ def _piece(
 
 
 def _highest(grid: FloatArray, x: FloatArray, after: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Find the largest local maximum of each sampled motion after a given time, and its time, (M,).
+    """Find the largest local maximum of each sampled motion after a given time, and its time, shape (M,).
 
     The samples, shape (M, T), are evenly spaced; samples after the end of a run are NaN, and so is a maximum
     that does not exist.

@@ -98,8 +98,8 @@ def carry(
 ) -> None:
     """Run the trains of all strands, in one or several directions, and close the joints between strands.
 
-    `start` is the initial state of a strand. `run` runs the trains of some rows from given states and stores
-    the results in the table; `trial` returns the results instead: columns, periods, distances.
+    `start` is the initial state of a strand. `run` runs the trains of selected rows from given states and
+    stores the results in the table; `trial` returns the results instead: columns, periods, distances.
     """
     for k in range(max(len(strand.rows) for strand in strands)):
         long = [strand.rows for strand in strands if k < len(strand.rows)]
@@ -298,7 +298,7 @@ class DiagramBuilder:
         return bool(count and rests_of(regime, points[-count:], self.effort.tolerance))
 
     def compare(self) -> None:
-        """Mark the trains whose period differs at finer tolerances; in their cycles rounding decides.
+        """Mark the trains whose period differs at finer tolerances, so that rounding determines the cycle.
 
         An armature that comes to rest on the backstop forgets its past, but between two rests a small error
         may grow to the size of the motion; rounding then decides the length of the cycle.

@@ -30,7 +30,7 @@ _MUCH: Final = 1e3
 """Multiplier above which the parameter step of the finite difference is reduced in proportion."""
 _BESIDE: Final = 1e-7  # Finite-difference step of the state at gentle touches, in scales of the run
 _GENTLE: Final = 3e-4
-"""Speed of a pack touch, in scales of the run, below which finite differences replace the tangent flow."""
+"""Touch speed on the pack, relative to the run's speed scale, below which finite differences are used."""
 _IN_PACK: Final = f"{IN_PACK} at the section; another phase of the period can be chosen"
 _MOST_TOUCHES: Final = 100  # Number of contacts in a period above which the map has no value
 _MANY: Final = f"more than {_MOST_TOUCHES} contacts"

@@ -24,7 +24,7 @@ from printhammer.support.arrays import FloatArray
 _GENTLE: Final = 1e-2
 """Largest distance of a touch from a grazing, in half-widths, for a branch to end in that grazing."""
 _NEAR: Final = 1e-2
-"""Largest distance, in scales of the parameter, from the last orbit to the grazing that ends the branch."""
+"""Largest distance from the last orbit to the grazing that ends its branch, in parameter scales."""
 _STEEP: Final = 10.0
 """Smallest multiplier of an orbit close to its grazing; beyond it no multiplier crosses the unit circle."""
 _CLOSER: Final = 0.7
@@ -64,7 +64,7 @@ def _orbits(
     node: Node,
     way: list[tuple[float, float, float]],
 ) -> list[Node] | None:
-    """Convert orbits, given by phase and speed of an impact and parameter, to nodes that follow a node."""
+    """Convert orbits, each by impact phase, impact speed and parameter, to nodes that extend a branch."""
     nodes = [node]
     place = family.regime.hammer.position
     for phase, speed, value in way:

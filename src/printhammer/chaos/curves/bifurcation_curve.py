@@ -133,7 +133,7 @@ class BifurcationCurve(Result, rows="point"):
     @property
     @derived("1", "whether stability is lost, the other multiplier being inside the unit circle", "point")
     def limits(self) -> BoolArray:
-        """Mask of the points of lost stability, (N,): the other multiplier is inside the unit circle."""
+        """Mask of the points where stability is lost, (N,): the other multiplier is in the unit circle."""
         if self.kind == "grazing":
             return np.asarray(np.abs(self.multipliers).max(axis=1) < 1.0)
         return np.asarray(np.abs(self.multipliers).max(axis=1) < 1.0 + SAME)
@@ -242,8 +242,9 @@ def settled_plane(
 ) -> tuple[tuple[FloatArray, FloatArray], IntArray]:
     """Compute the periods, in firings, of trains from rest over a grid of both parameters.
 
-    The result contains the values of the first parameter, (m,), of the second, (n,), and the periods, (n, m):
-    0 without a period, -1 if the run ended early. InputError if a number of values is negative.
+    The result contains the values of the first parameter, shape (m,), of the second, shape (n,), and the
+    periods, shape (n, m): 0 without a period, -1 if the run ended early. InputError if a number of values is
+    negative.
     """
     if min(grid) < 0:
         raise InputError.of("grid", grid, "two numbers of values, not negative")

@@ -69,7 +69,7 @@ KINDS: Final = (*TESTS, GRAZING)
 """Kinds of bifurcation that can be followed."""
 
 SPACING: Final = 1e-6
-"""Step size of finite differences, in scales; its error only affects the convergence of Newton's method."""
+"""Step size of finite differences, in scales of the variables; only the convergence depends on its error."""
 _PARTS: Final = 5.0
 """Ratio of a parameter's range to its scale; the state is scaled by half-widths of the strobe window."""
 
@@ -204,8 +204,8 @@ class GrazingSystem:
     def at(self, phase: float, first: float, second: float) -> tuple[CurvePoint, FloatArray] | str:
         """Compute the orbit that leaves a grazing touch, and its miss at the next touch.
 
-        The miss is the difference of both states, in scales of the state. A text with the reason is returned
-        if the run ends early; InputError if the parameters are invalid.
+        The miss is the difference of both states, in units of the state scales. A text with the reason is
+        returned if the run ends early; InputError if the parameters are invalid.
         """
         flight = _flight(self.plane, self.surface, phase, 0.0, first, second)
         if flight.trouble:

@@ -49,7 +49,7 @@ _GENTLE: Final = 1e-6  # Impact speed, in scales, at which a curve ends in a gra
 _SLOW: Final = 0.05
 """Impact speed, in half-widths of the window, below which a curve may end in a resonant grazing."""
 _FAR: Final = 0.02
-"""Distance in the plane, in scales, within which a point of codimension two is the end of a curve."""
+"""Distance in the scaled plane within which a point of codimension two is the end of a curve."""
 _TURNS: Final = 8
 """Maximum number of section changes along a curve."""
 
@@ -298,12 +298,12 @@ class CurveTracer:
         return self.kind.removeprefix("period ")
 
     def distance(self, one: CurvePoint, other: CurvePoint) -> float:
-        """Compute the distance of two points in the parameter plane, in scales of the parameters."""
+        """Compute the distance of two points in the parameter plane, in units of the parameter scales."""
         away = np.array([one.first - other.first, one.second - other.second]) / self.plane.scales[2:]
         return float(np.linalg.norm(away))
 
     def grazing_near(self, place: CurvePoint, within: float) -> CurvePoint | None:
-        """Find the grazing near an orbit of the curve at which the same test function vanishes."""
+        """Find the grazing near an orbit of the curve at which the curve's test function vanishes."""
         regime = replace(self.plane.at(place.first, place.second), phase=place.phase)
         for touch in near_touches(regime, place.state, self.plane.firings, self.plane.tolerance)[:3]:
             guess = np.array([touch.phase, place.first, place.second])
@@ -348,7 +348,7 @@ class CurveTracer:
         return f"{name} = {value:.9g} {self.plane.regime.quantity(name).si}".removesuffix(" 1")
 
     def in_words(self, stop: Stop, points: list[CodimensionTwo], end: int) -> Stop:
-        """Return a stop whose sentence names the parameters and, if any, the point at the end."""
+        """Return a stop whose sentence names the parameters and any codimension-two point at the end."""
         at = self.at_value(1, stop.parameter)
         if stop.reason == "grazing" and points:
             point = points[-1 if end else 0]

@@ -24,7 +24,7 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray
 
 PHASES: Final = (0.0, 0.5)
-"""Phases of the sections at which orbits are sought; the second serves orbits in the pack at the first."""
+"""Phases at which orbits are sought; orbits inside the pack at the first phase are found at the second."""
 
 _ALIKE: Final = 0.02
 """Distance, in half-widths of the strobe window, below which two guesses are duplicates."""

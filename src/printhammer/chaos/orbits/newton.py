@@ -69,7 +69,7 @@ class Images:
 
 
 class StrobeMaps(Protocol):
-    """Interface that computes the images of states, (n, 2), each after its own number of firings, (n,)."""
+    """Interface that computes the images of states, shape (n, 2), each after its own number of firings."""
 
     def __call__(self, states: FloatArray, firings: IntArray) -> Images:
         """Compute the images of states under the strobe map, with derivatives."""

@@ -321,7 +321,7 @@ def orbit_of(regime: Regime, closing: Closing, tolerance: float) -> Orbit:
 
 
 def multipliers_of(jacobians: FloatArray) -> npt.NDArray[np.complex128]:
-    """Compute the multipliers: eigenvalues of a product of matrices, (m, 2, 2), the last factor on the left.
+    """Compute the eigenvalues of a product of matrices, shape (m, 2, 2), the last factor on the left.
 
     The eigenvalues are computed from trace and determinant, and the determinant as the product of the
     factors' determinants, since the rounding of the matrix product would destroy the small eigenvalue of a

@@ -79,7 +79,7 @@ _LONG: Final = 400
 """Number of firings of the train from rest whose close returns are guesses."""
 _BLOCKS: Final = (128, 1024)  # Numbers of starts to which more are rounded up; the last is doubled repeatedly
 _BATCHES: Final = (8, 48)
-"""Ladder of numbers of guesses: a request is rounded up to a rung; the last rung doubles repeatedly."""
+"""Numbers of guesses, ascending; a request is rounded up to one of them, or to a doubling of the last."""
 _EVEN: Final = 8
 """Orbit period, in firings, below which orbits get more guesses, in inverse proportion to the period."""
 _JOINED: Final = 48
@@ -407,7 +407,7 @@ def _doublings(first: int, below: int) -> list[int]:
 
 
 def _steps(ladder: Sequence[int], most: int) -> list[int]:
-    """List the rungs of a ladder, extended by doubling, up to the first rung of at least `most`."""
+    """List the numbers of an ascending sequence, extended by doubling, up to the first of at least `most`."""
     rungs = list(ladder)
     while rungs[-1] < most:
         rungs.append(2 * rungs[-1])

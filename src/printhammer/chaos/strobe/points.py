@@ -268,7 +268,7 @@ def points_of(series: Any, firing: Firing) -> Any:
 def strobe_of(
     train: Train, firing: IntArray, states: States, tolerance: float, judged: Verdict | None
 ) -> Strobe:
-    """Build the result `Strobe` of a train from its states at some firings and its classification."""
+    """Build the result `Strobe` of a train from its states at selected firings and its classification."""
     return Strobe(
         hammer=train.hammer,
         drive=train.drive,

@@ -118,7 +118,7 @@ class Train(Declared):
 
 @dataclass(frozen=True)
 class States:
-    """States of one train at some firings; for the fields see `printhammer.chaos.strobe.points.Strobe`."""
+    """States of one train at selected firings; fields as in `printhammer.chaos.strobe.points.Strobe`."""
 
     t: FloatArray
     x: FloatArray

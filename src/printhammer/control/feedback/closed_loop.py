@@ -92,7 +92,7 @@ class FeedbackStrategy(Declared):
         return loops
 
     def _legs(self, hammer: Hammer, now: Sequence[tuple[Loop, int]], ends: FloatArray) -> list[Leg]:
-        """Split the time up to `ends` into stages; each firing of a dot changes the pack to its slot's."""
+        """Split the time up to `ends` into stages; each firing of a dot sets the pack to that of its slot."""
         if self.places is None:
             return [Leg([hammer] * len(now), ends)]
         before = [self.places[loop.slots[max(dot - 1, 0)]] for loop, dot in now]

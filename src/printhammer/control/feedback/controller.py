@@ -342,7 +342,7 @@ class Controller:
 
 
 def _steps(loops: Sequence[Loop]) -> tuple[FloatArray, FloatArray]:
-    """Return times, s, and heights, A, of all steps of the current command, (M, S), zero-padded."""
+    """Return times, s, and heights, A, of all steps of the current command, shape (M, S), zero-padded."""
     rows = []
     for loop in loops:
         steps = [
@@ -359,7 +359,7 @@ def _steps(loops: Sequence[Loop]) -> tuple[FloatArray, FloatArray]:
 
 
 def _current(at: FloatArray, height: FloatArray, edge: float, t: FloatArray) -> FloatArray:
-    """Return the current, A, at times t, (M, K), after steps of the command, (M, S), by first-order lag."""
+    """Return the current, A, at times t, shape (M, K), after the steps of the command (first-order lag)."""
     total = np.zeros_like(t)
     for k in range(at.shape[1]):
         since = np.maximum(t - at[:, k, np.newaxis], 0.0)

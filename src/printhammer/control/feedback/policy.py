@@ -238,7 +238,7 @@ class Policy:
         return way, np.take_along_axis(cost, way[:, np.newaxis], axis=1)[:, 0], choice
 
     def _doubts(self) -> FloatArray:
-        """Return the cost due to the uncertain speed of a touch, for all actions, (touches, actions).
+        """Return the cost due to the uncertain speed of a touch, for all actions, shape (touches, actions).
 
         The steepest slope in the neighbourhood counts: near a discontinuity, where the number of bounces
         changes, the table between two speeds is meaningless.
@@ -257,7 +257,7 @@ class Policy:
         return doubts
 
     def _front_doubt(self, choice: Choice, rows: IntArray, error: FloatArray) -> FloatArray:
-        """Return the cost due to the uncertain position of the pack's front, (touches, actions)."""
+        """Return the cost due to the uncertain position of the pack's front, shape (touches, actions)."""
         weaker = error[:, np.newaxis] * choice.by_speed(self.fronts.front_force)[rows]
         force = choice.force[rows]
         zero = np.zeros(1)
@@ -268,7 +268,7 @@ class Policy:
         return both - self.dot_cost(force, zero) + np.square(late)
 
     def costs(self, number: int) -> FloatArray:
-        """Compute the cost-to-go, (touches, lateness), with `number` dots before a rest."""
+        """Compute the cost-to-go, shape (touches, lateness), with `number` dots before a rest."""
         while len(self._costs) <= min(number, _ROUNDS):
             self._costs.append(self._one_more(self._costs[-1]))
         return self._costs[min(number, _ROUNDS)]

@@ -78,7 +78,7 @@ def soft_landing(plant: Plant, forces: ForceMap) -> Landing:
 def _residual_speeds(
     plant: Plant, forces: ForceMap, release: FloatArray, rows: IntArray, tried: FloatArray
 ) -> FloatArray:
-    """Simulate brake pulses, (rows, pulses, 2): start and width, s; return the residual speeds, m/s."""
+    """Simulate brake pulses, shape (rows, pulses, 2): start and width, s; return the residual speeds, m/s."""
     driver, scale = plant.driver, plant.single.flight_time
     drives, states = [], []
     for row, pulses in zip(rows.tolist(), tried, strict=True):

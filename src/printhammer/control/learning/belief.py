@@ -106,7 +106,7 @@ class Belief:
         return np.asarray(mean), np.sqrt(self.weights @ (spread + (means - mean) ** 2))
 
     def draw(self, count: int, seed: int) -> FloatArray:
-        """Draw samples of the constants from a widened posterior distribution, (count, constants).
+        """Draw samples of the constants from a widened posterior distribution, shape (count, constants).
 
         Standard deviations are multiplied by `_CARE`, and modes are drawn by the square roots of their
         probabilities: where readings are curved, the Laplace approximation is too narrow.
@@ -183,7 +183,7 @@ def _linearise(constants: FloatArray, shown: FloatArray) -> Search[_Iterate]:
 
 
 def _objective(places: FloatArray, shown: FloatArray, value: FloatArray, noise: FloatArray) -> FloatArray:
-    """Compute the negative log posterior density of constants (M, constants), up to a constant, (M,)."""
+    """Compute the negative log posterior of each row of constants, up to an additive constant, shape (M,)."""
     rest = (value - shown) / noise
     each = (_FREEDOM + 1.0) * np.log1p(rest**2 / _FREEDOM)
     lost = np.isfinite(value) & ~np.isfinite(shown)
@@ -192,7 +192,7 @@ def _objective(places: FloatArray, shown: FloatArray, value: FloatArray, noise: 
 
 
 def _normal(place: _Iterate, value: FloatArray, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Compute the Gauss-Newton matrix of the objective and its negative gradient, (constants,)."""
+    """Compute the Gauss-Newton matrix of the objective and its negative gradient, shape (constants,)."""
     rest = value - place.shown
     known = np.isfinite(rest) & np.isfinite(place.slopes).all(axis=1)
     rest, slopes = np.where(known, rest, 0.0), np.where(known[:, None], place.slopes, 0.0)

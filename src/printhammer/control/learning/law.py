@@ -95,7 +95,7 @@ class Adjustable:
 
     @property
     def open_loop(self) -> FloatArray:
-        """Settings of the open loop, (4, entries): the same pulse at every slot."""
+        """Settings of the open loop, shape (4, entries): the same pulse at every slot."""
         settings = np.zeros_like(self.base)
         settings[WIDTH] = self.task.width
         return settings
@@ -183,10 +183,10 @@ PRINTED: Final = _judged_slots()
 from rest."""
 
 JUDGED: Final = np.asarray(PRINTED) >= LEAD_IN
-"""Mask of the dots of `PRINTED` that are evaluated, (dots,): all except the lead-in."""
+"""Mask of the dots of `PRINTED` that are evaluated, shape (dots,): all except the lead-in."""
 
 IN_CYCLE: Final = np.asarray(PRINTED)[JUDGED] < LEAD_IN + 2**SLOTS
-"""Mask of the dots of the cycle among the evaluated dots, (evaluated dots,)."""
+"""Mask of the dots of the cycle among the evaluated dots, shape (evaluated dots,)."""
 
 
 class Verdict(NamedTuple):
@@ -331,7 +331,7 @@ class LearningLaw:
         return np.asarray((sums / np.maximum(np.bincount(shown), 1))[:, wanted]).ravel()
 
     def _off(self, hammers: Sequence[Hammer], corrections: Sequence[FloatArray]) -> Printing[FloatArray]:
-        """Simulate the deviations of arrival and force of `TRIED`, normalised by the limits, (M, 2 dots)."""
+        """Simulate the deviations of arrival and force of `TRIED`, over the limits, shape (M, 2 dots)."""
         press, limits = self.production.press(hammers), self.entries.task.limits
         known = {id(row): self.entries.settings(row) for row in corrections}
         _dots, judgement = yield from press.order_line([known[id(row)] for row in corrections], TRIED)
@@ -339,7 +339,7 @@ class LearningLaw:
         return np.clip(np.nan_to_num(np.concatenate(off, axis=1), nan=GATE), -GATE, GATE)
 
     def _mean_deviations(self, unit: _Unit, corrections: Sequence[FloatArray]) -> Printing[FloatArray]:
-        """Compute the mean deviations over the posterior modes, plus the model error, (M, 2 dots)."""
+        """Compute the mean deviations over the posterior modes, plus the model error, shape (M, 2 dots)."""
         hammers = [hammer for _ in corrections for hammer in unit.hammers]
         rows = [row for row in corrections for _ in unit.hammers]
         off = yield from self._off(hammers, rows)
@@ -347,7 +347,7 @@ class LearningLaw:
         return np.asarray(np.einsum("m,kmd->kd", unit.weights, by_hammer) + unit.more)
 
     def _slopes(self, hammer: Hammer, corrections: FloatArray) -> Printing[FloatArray]:
-        """Compute the sensitivity G of the deviations to the inputs by differences, (2 dots, inputs)."""
+        """Compute the sensitivity G of the deviations by differences, shape (2 dots, inputs)."""
         rows = [corrections, *(corrections + np.eye(len(corrections)))]
         off = yield from self._off([hammer] * len(rows), rows)
         return np.asarray((off[1:] - off[0]).T)
@@ -381,7 +381,7 @@ class LearningLaw:
 
 
 def order_loops(press: Press, entries: Adjustable) -> Printing[list[BoolArray]]:
-    """Compute, for each open loop, the mask of dots of `PRINTED` within limits, (M, dots), as a coroutine."""
+    """Compute, for each open loop, the mask of good dots of `PRINTED`, shape (M, dots), as a coroutine."""
     count = len(press.hammers)
     return (
         yield from together(
@@ -393,7 +393,7 @@ def order_loops(press: Press, entries: Adjustable) -> Printing[list[BoolArray]]:
 def order_good(
     press: Press, settings: Sequence[FloatArray], pulses: Sequence[Waveform] | None = None
 ) -> Printing[BoolArray]:
-    """Compute the mask of evaluated dots of `PRINTED` within limits, (M, dots), as a coroutine."""
+    """Compute the mask of evaluated dots of `PRINTED` within limits, shape (M, dots), as a coroutine."""
     _dots, judgement = yield from press.order_line(settings, PRINTED, pulses)
     return np.asarray(judgement.good[:, JUDGED])
 
@@ -404,7 +404,7 @@ def _badness(off: FloatArray) -> float:
 
 
 def _gain(off: FloatArray, slopes: FloatArray) -> FloatArray:
-    """Compute the gain L of the law, (inputs, 2 dots): a pseudo-inverse of G weighted as in `_badness`."""
+    """Compute the gain L, shape (inputs, 2 dots): a pseudo-inverse of G weighted as in `_badness`."""
     weight = 1.0 + 2.0 * _STEEP * off**2
     normal = slopes.T @ (weight[:, None] * slopes) + _DAMPING * len(TRIED) * np.eye(slopes.shape[1])
     return np.asarray(np.linalg.solve(normal, slopes.T * weight))

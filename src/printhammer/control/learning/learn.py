@@ -49,7 +49,7 @@ class Progress(NamedTuple):
 
     @property
     def good(self) -> BoolArray:
-        """Mask of the evaluated dots within limits, without the lead-in, (units, dots)."""
+        """Mask of the evaluated dots within limits, without the lead-in, shape (units, dots)."""
         return np.asarray(self.cycle.good[:, JUDGED])
 
 
@@ -241,7 +241,7 @@ class Learning(Result, rows=_DOTS):
 
     @property
     def share(self) -> FloatArray:
-        """Fraction of the dots that the simulated unit prints within limits, at each stage, (stages,)."""
+        """Fraction of the simulated unit's dots within limits, at each stage, shape (stages,)."""
         return np.asarray(self.good[:, self.slot >= LEAD_IN].mean(axis=1))
 
     @property

@@ -35,7 +35,7 @@ _LATE: Final = (
 
 
 class Mean(NamedTuple):
-    """Mean readings of dots, normalised by the limits, and the numbers of readings, (measured, dots)."""
+    """Mean normalised readings of dots, and the numbers of readings, shape (measured, dots)."""
 
     value: FloatArray  # NaN where no dot was seen
     seen: FloatArray  # Number of readings in each mean

@@ -82,7 +82,7 @@ class Surrogate:
         return np.asarray(self.constant + rows @ self.slope + bent)
 
     def gradient(self, rows: FloatArray) -> FloatArray:
-        """Compute the derivatives of the predicted reading with respect to the constants, (M, constants)."""
+        """Compute the derivatives of the predicted reading by the constants, shape (M, constants)."""
         return np.asarray(self.slope + rows @ self.curvature)
 
 
@@ -227,7 +227,7 @@ class Press:
     hammers: Sequence[Hammer]
 
     def ladder(self, rungs: Sequence[Rung]) -> tuple[FloatArray, FloatArray]:
-        """Simulate a ladder; return flight times, s, and forces relative to the nominal force, (M, dots)."""
+        """Simulate a ladder; return flight times, s, and normalised forces, shape (M, dots)."""
         return printed(self.order_ladder(rungs), self.task)
 
     def line(
@@ -244,7 +244,7 @@ class Press:
         return printed(self.order_line(settings, slots, pulses), self.task)
 
     def multipliers(self, settings: FloatArray) -> FloatArray:
-        """Compute the multipliers of rows printed with settings (4, entries), for each hammer, (M,).
+        """Compute the multipliers of rows printed with settings (4, entries), for each hammer, shape (M,).
 
         A multiplier is the largest absolute Floquet multiplier of two rows, with a dot in every slot and in
         every second slot; see `printhammer.derivatives.rows.row_multipliers`. The result is NaN if neither

@@ -71,7 +71,7 @@ class Production:
 
     @property
     def noise(self) -> FloatArray:
-        """Standard deviations of a time and a force reading, normalised by the limits, (measured,)."""
+        """Standard deviations of a time and a force reading, normalised by the limits, shape (measured,)."""
         limits = self.task.limits
         return np.array([self.sensor.noise / limits.arrival, (self.sensor.force or 0.0) / limits.force])[
             : self.measured

@@ -44,7 +44,7 @@ class LeastWorkRates(Result):
         return f"bursts of least work of {self.hammer.name}"
 
     def summary(self) -> Summary:
-        """Tabulate dots, coil work and lower bound of a burst, one row per rate."""
+        """Tabulate dots, coil work and the lower bound on the coil work of each burst, one row per rate."""
         columns = [
             self.cells("rates", "rate", ".6g"),
             Cells("adequate dots", [f"{adequate} of {self.count}" for adequate in self.adequate]),

@@ -307,7 +307,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
 
     @property
     def look_ahead(self) -> IntArray:
-        """Number of slots that a dot must be known in advance, (rates, entries); see `header.look_ahead`."""
+        """Number of slots by which a dot must be known in advance, shape (rates, entries)."""
         times = {name: getattr(self, name) for name in COLUMNS}
         return look_ahead(times, self.rates, self.gaps, self.reach)
 

@@ -90,7 +90,7 @@ class Draft:
         )
 
     def places(self, cells: Cells) -> tuple[IntArray, IntArray]:
-        """Return the row and column indices of the entries of some histories at all rates."""
+        """Return the row and column indices of the entries of several histories at all rates."""
         columns = [number_of(history, self.task.reach) for _row, history in cells]
         return np.array([row for row, _history in cells], np.int64), np.array(columns, np.int64)
 
@@ -234,7 +234,7 @@ def polish(draft: Draft) -> None:
 
 
 def _polish_level(draft: Draft, level: Sequence[History]) -> None:
-    """Improve the entries of some histories at all rates, by two least-squares fits.
+    """Improve the entries of several histories at all rates, by two least-squares fits.
 
     The first fit makes each entry right in the shortest pattern that ends with its history; if all earlier
     dots are right, the entry is then right in every pattern. Entries that remain rough are fitted to all

@@ -79,7 +79,7 @@ def numbers_before(history: Sequence[int], reach: int) -> list[int]:
 
 
 def shared_numbers(gaps: int, reach: int) -> IntArray:
-    """Map every history number, aliases included, to the number of the plain history, (entries,)."""
+    """Map every history number, aliases included, to the number of the plain history, shape (entries,)."""
     every = itertools.product(range(reach + 1), repeat=gaps)
     return np.array([number_of(row, reach) for row in every], np.int64)
 

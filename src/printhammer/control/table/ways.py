@@ -243,7 +243,7 @@ def costs(task: Task, ways: Ways) -> FloatArray:
 
 
 def growths(task: Task, ways: Ways) -> FloatArray:
-    """Compute the factor by which an error in a long row of each candidate grows from dot to dot, (ways,).
+    """Compute the growth factor of an error, from dot to dot, in a long row of each candidate, shape (ways,).
 
     An unknown factor is NaN. If the first two dots meet their target, the state after them is the fixed point
     of the row. If the cost shows that they miss it, and the row looks stable, the fixed point is located by
@@ -260,7 +260,7 @@ def growths(task: Task, ways: Ways) -> FloatArray:
 
 
 def seconds(task: Task, ways: Ways) -> FloatArray:
-    """Return deviations of force and arrival of the second dots, as fractions of the limits, (ways, 2)."""
+    """Return normalised deviations of force and arrival of the second dots, shape (ways, 2)."""
     return _deviations(task, task.hammers[0], ways, rows_of(task, ways, 2))[:, 1]
 
 

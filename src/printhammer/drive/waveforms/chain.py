@@ -15,8 +15,7 @@ from printhammer.errors import InputError
 from printhammer.support.arrays import FloatArray
 
 TAIL: Final = 1e-3
-"""Largest remainder of a decaying part that may be cut off when the next part begins, as a fraction of its
-peak."""
+"""Largest remainder of a decaying waveform that the next one may cut off, as a fraction of its peak."""
 
 _SAMPLES: Final = 257  # Samples of the remaining waveform; arbitrary
 _ROUNDING: Final = 1e-14  # Relative difference of times that counts as rounding

@@ -102,7 +102,7 @@ class Rail(_Driver):
 class Chopper(_Driver):
     """Chopper: supply on for the width, chopped between two currents or by a fixed off-time.
 
-    While it is chopped off, the current circulates through a diode.
+    While the chopper keeps the supply off, the current circulates through a diode.
     """
 
     shape: ClassVar[str] = "chopper"

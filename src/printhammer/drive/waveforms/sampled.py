@@ -202,5 +202,5 @@ class Sampled(Waveform):
         )
 
     def content(self) -> dict[str, FloatArray]:
-        """Return the samples, part of the identity of the waveform: times, s, and values, A or N."""
+        """Return the samples, which identify the waveform: times, s, and values, A or N."""
         return {"times": self.times, "values": self.values}

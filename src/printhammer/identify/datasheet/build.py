@@ -63,7 +63,7 @@ GUESSES: Final = {
         0.3, 1.0, "a third of the stated inductance bypasses the armature, within a factor of e"
     ),
 }
-"""Log-normal priors of the magnet's constants, SI; "core" is an air gap, "fringe" and "leakage" fractions."""
+"""Log-normal priors of the magnet's constants, SI; core: equivalent air gap; fringe, leakage: fractions."""
 
 
 @dataclass(frozen=True)

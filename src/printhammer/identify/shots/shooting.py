@@ -121,7 +121,7 @@ class Shooting:
     def _variants(
         self, values: FloatArray, derivatives: bool
     ) -> list[tuple[Hammer, float, list[PulseTrain]]]:
-        """Return hammer, rest state and drives at parameter values, and for each perturbed parameter."""
+        """Return hammer, rest state and drives at parameter values, then with each parameter perturbed."""
         parameters = self.parameters
         count = len(parameters.keys)
         variants = []

@@ -266,7 +266,7 @@ class Code(File):
 
     @property
     def work(self) -> str:
-        """Kind of compilation in the records, with what makes it longer: a circuit, modules to lower."""
+        """Kind of compilation in the records, with suffixes for a coil circuit and for modules to lower."""
         variants = {records.CIRCUIT: self._circuit, records.LOWERED: not self._is_lowered()}
         return ", ".join([self.kind, *(name for name, holds in variants.items() if holds)])
 

@@ -21,7 +21,7 @@ LAW, CHOICE = "law.", "choice."
 INTEGER: Final = ".int"
 
 COMMON: Final = "x86-64-v3"
-"""Level of the x86-64 instruction set for which all processors that have it get the same machine code."""
+"""x86-64 instruction-set level; all processors that support this level get the same machine code."""
 _LEVEL_3: Final = [
     "avx2",
     "bmi",

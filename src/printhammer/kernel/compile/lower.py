@@ -156,12 +156,12 @@ def _lanes() -> dict[str, Any]:
 
 
 def _execute_lanes(plain: dict[str, Any], vector: dict[str, Any]) -> dict[str, Any]:
-    """Execute the templates of lanes, bound to laws without branches or calls.
+    """Execute the templates of the lane kernel, bound to laws without branches or calls.
 
     Total force and step functions are those of the scalar kernel, with :mod:`printhammer.kernel.lanes.math`
     in place of :mod:`math`, the drive in closed form, the constants of a hammer as a tuple, and all functions
-    inlined. The functions that handle events are scalar and use the scalar kernel. `plain` holds the names of
-    the templates of the scalar kernel, `vector` the laws for lanes and the choices.
+    inlined. The functions that handle events are scalar and use the scalar kernel. `plain` is the namespace
+    of the scalar kernel's templates; `vector` holds the laws for lanes, and the compile-time choices.
     """
     scalar, vector = ({**names, "lane_math": _lane_math()} for names in (plain, vector))
 

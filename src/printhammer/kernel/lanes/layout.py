@@ -66,7 +66,7 @@ V = 2
 A = 3
 """Row of the acceleration [m/s^2]; in the contact pool, dv/ds."""
 H = 4
-"""Row of the next step size [s]; in the contact pool, in the variable s."""
+"""Row of the next step size: in seconds, or in the regularised variable s in the contact pool."""
 NEXT = 5
 """Row of the time of the next edge of the drive or of the end of the run, whichever is earlier [s]."""
 SAMPLE = 6

@@ -40,7 +40,7 @@ def contact_rate(w: float, v: float, t: float, hammer: Hammer, drive: Drive) -> 
 
 @compiled
 def length_while_pushed_in(left: float, w: float, v: float, kv: float) -> float:
-    """Return the length in s of a time interval `left` [s] while forces press the armature into the backstop.
+    """Convert a time interval `left` [s] under inward force to the regularised variable s of the backstop.
 
     Solves 2 w ds - v ds^2 - kv ds^3 / 3 = left for ds by Newton's method; the left side increases with ds.
     """
@@ -56,7 +56,7 @@ def length_while_pushed_in(left: float, w: float, v: float, kv: float) -> float:
 
 @compiled
 def length_of(left: float, w: float, v: float, kv: float) -> float:
-    """Return the approximate length in s of a time interval `left` [s] in the backstop.
+    """Convert a time interval `left` [s] in the backstop to the regularised variable s, approximately.
 
     Solves 2 w ds - v ds^2 = left for ds; the root is regular also at release, w = 0. The cubic term is
     included if it matters and the armature does not leave. `s_at` iterates this approximation.
@@ -74,7 +74,7 @@ def length_of(left: float, w: float, v: float, kv: float) -> float:
 
 @compiled
 def s_at(t: float, t0: float, w0: float, v0: float, kv0: float, hammer: Hammer, drive: Drive) -> float:
-    """Return the value of s at which a step in the backstop that starts at time `t0` reaches time `t` [s].
+    """Return the regularised variable s at which a backstop step that starts at `t0` reaches time `t` [s].
 
     If `t` is later than the release, the value of s at the release is returned.
     """
@@ -94,7 +94,7 @@ def s_at(t: float, t0: float, w0: float, v0: float, kv0: float, hammer: Hammer, 
 
 @inlined
 def longest_contact_step(w: float, hammer: Hammer, drive: Drive) -> float:
-    """Return the largest stable step in s for the contact stiffness at compression ``w**2`` [m].
+    """Return the largest stable step in the regularised variable s at compression ``w**2`` [m].
 
     The decay rate of a coil circuit, if any, also limits the step.
     """
@@ -130,7 +130,7 @@ def leave(
     drive: Drive,
     control: Control,
 ) -> tuple[float, float, float, float, float]:
-    """Locate the release from the backstop, w = 0, in a step `h` up to the fraction `upper`."""
+    """Locate the release from the backstop, at zero compression, up to the fraction `upper` of a step `h`."""
     t, w, v, kv = start
     low, high = 0.0, upper
     negligible = 1e-12 * math.sqrt(control[0])
@@ -155,7 +155,7 @@ def leave(
 def reach_time(
     start: ContactState, h: float, upper: float, t_upper: float, target: float, hammer: Hammer, drive: Drive
 ) -> ContactState:
-    """Locate time `target` [s] in a step `h` in s whose fraction `upper` ends at time `t_upper` [s]."""
+    """Locate time `target` [s] in a backstop step `h` whose fraction `upper` ends at time `t_upper` [s]."""
     t, w, v, kv = start
     low, high = 0.0, upper
     fraction = upper * (target - t) / (t_upper - t)
@@ -207,7 +207,7 @@ def contact_switch(
     drive: Drive,
     control: Control,
 ) -> tuple[int, ContactState]:
-    """Return the first event in a backstop step of length `h` in the variable s, and the state at the event.
+    """Return the first event in a backstop step of length `h` in the regularised variable s, and its state.
 
     `leaves` states whether w falls to zero within the step, so that the armature leaves the backstop.
     """
@@ -248,7 +248,8 @@ def advance_contact(
     -------
     tuple
         The event (EDGE at `t_next`, NO_SWITCH, FAILED, LEFT_BACKSTOP, PUSH_ENDED or CIRCUIT), the state at
-        the end of the step, the proposed length of the next step in s, and the electric state at the end.
+        the end of the step, the proposed length of the next step in the regularised variable s, and the
+        electric state at the end.
     """
     t, w, v, kv = start
     shortest = 1e-14 * math.sqrt(control[0]) / control[1]

@@ -201,7 +201,7 @@ def contact_gap(w: float, v: float, electric: Electric, hammer: Hammer, live: An
 def contact_gap_and_change(
     t: float, w: float, v: float, kv: float, electric: Electric, h: float, hammer: Hammer, live: Any
 ) -> tuple[float, float]:
-    """Evaluate the event function of the current path in the backstop, and its derivative in s times `h`."""
+    """Evaluate the current path's event function in the backstop, and `h` times its derivative by s."""
     gap = contact_gap(w, v, electric, hammer, live)
     pause = SHARE * h
     pace = 2.0 * w * pause
@@ -214,7 +214,7 @@ def contact_gap_and_change(
 def land_on_gap_in_contact(
     start: Any, h: float, hammer: Hammer, drive: Drive
 ) -> tuple[float, float, float, float, Electric]:
-    """Locate a change of the current path in a backstop step `h` in s.
+    """Locate a change of the current path in a backstop step `h` of the regularised variable s.
 
     Returns
     -------

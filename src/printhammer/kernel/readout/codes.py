@@ -1,4 +1,4 @@
-"""Frequency-time map in pieces: rates and firing times of its members, displacements as colour codes."""
+"""Frequency-time map computed in pieces: rates and firing times of its members, displacement codes."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def write_rates(low: float, high: float, rates: Any) -> None:
 def write_trains(rates: Any, slots: Any, pattern: bool, starts: Any, firings: Any) -> None:
     """Write the firing times [s] of a train at each rate, and the start index of each train.
 
-    The firings are those of the `slots`, int64: at the slot number over the rate in a `pattern`, else at
-    the slot number times the period.
+    `slots`, int64, are the slot numbers of the firings. The time of a firing is its slot number divided by
+    the rate in a `pattern`, else its slot number times the period.
     """
     count = slots.shape[0]
     starts[0] = 0

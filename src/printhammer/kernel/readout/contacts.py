@@ -110,7 +110,7 @@ def write_contacts(
 def write_loading(
     rows: Any, nodes: Any, increments: Any, work: Any, works: Any, steps: Any, starts: Any, ends: Any
 ) -> None:
-    """Write the work done on the pack in all whole steps before the peak of each contact, and what remains.
+    """Write the work on the pack in whole steps before each contact's peak, and the remaining interval.
 
     Parameters
     ----------

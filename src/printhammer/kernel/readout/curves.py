@@ -17,8 +17,8 @@ def write_times(nodes: Any, fewest: int, most: int, out: Any) -> int:
     """Write the times of a curve's points [s], dense where the steps are short; return their number.
 
     Every step is divided: into parts of at most 1 / `fewest` of the run, and into three at least if there are
-    fewer steps than `fewest`. Of more than `most` nodes only `most` are used, evenly spaced by index.
-    `out` needs `fewest` + 3 times the number of nodes as its length.
+    fewer steps than `fewest`. If there are more than `most` nodes, only `most` of them are used, evenly
+    spaced by index. `out` needs `fewest` + 3 times the number of nodes as its length.
     """
     last = nodes.shape[0] - 1
     used = min(last + 1, most)

@@ -1,4 +1,4 @@
-"""Peaks of the pack contacts of a run, for its dots: much faster than the peaks of all contacts.
+"""Peaks of the pack contacts of a run, for its dots; computed faster than the peaks of all contacts.
 
 Against a pack whose law has memory, the armature turns back at a node, which is the peak of the contact. Only
 other packs need the search of :func:`printhammer.kernel.single.resample.peaks`.
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def write_pack_peaks(contacts: Any, nodes: Any, train: Any, hammer: Any, out: Any) -> None:
     """Write time of largest depth, largest depth and peak force of m contacts to `out`, shape (m, 3).
 
-    For a contact with the backstop: the time of touch, and twice 0. Arguments as for
+    The row of a backstop contact holds the touch time and two zeros. Arguments as for
     :func:`printhammer.kernel.single.resample.peaks`.
     """
     named = Train(*train)

@@ -1,6 +1,6 @@
 """Sums of the columns of a table: correctly rounded, and pairwise in the order of NumPy.
 
-Like the other modules of this folder without decorators, plain Python functions that the page runs compiled.
+As in the other modules of this folder, the functions are undecorated Python, which the page runs compiled.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ ROOT_RATE = 9
 MEMORY_NOW = 10
 """Index of the memory value of the pack law for the latest local maximum."""
 STEP = 11
-"""Index of the next step size: in seconds, or in the variable s in the backstop."""
+"""Index of the next step size: in seconds, or in the regularised variable s in the backstop."""
 FREE_STEP = 12
 PACK_STEP = 13
 CONTACT_STEP = 14
@@ -36,7 +36,7 @@ CONTACT_STEP = 14
 STARTED = 15
 """Index of the mode of the latest step."""
 ENTERED = 16
-"""Index of the flag that `ROOT_RATE` must be recomputed."""
+"""Index of the flag that is 1 if `ROOT_RATE` must be recomputed."""
 WAIT = 17
 """Index of the time after which the forces on an armature at rest are checked again [s]."""
 STUCK = 18

@@ -19,13 +19,13 @@ ENERGY = STATE + 1
 COIL, DRIVE, PACK_LOSS, BACKSTOP_LOSS, DAMPING_LOSS = range(ENERGY, ENERGY + 5)
 ENERGIES = 5
 ROWS = ENERGY + ENERGIES
-"""Number of rows of a column without a circuit; without forcing, only the first three exist."""
+"""Number of rows of a tangent column without a coil circuit; without forcing, only the first three exist."""
 ELECTRICS = 3
 """Number of components of the electric state; the end of an off-time is an additional row."""
 
 START, STAGE, MEMORIES = STAGES, STAGES + 1, STAGES + 2
 WORK_ROWS = STAGES + 3
-"""Number of rows of the working space: slopes of the stages, state at the start, stage state, memories."""
+"""Number of rows of the working space: stage slopes, initial state, stage state, pack memory values."""
 TIME = STATE
 """Index of the time in a row of the working space, after displacement (or w) and velocity."""
 FIRST_COLUMN = TIME + 1

@@ -85,7 +85,7 @@ def begin_step(node: Any, work: Any) -> None:
 def length_in_contact(
     t: float, leaves: bool, t0: float, w0: float, v0: float, hammer: Hammer, drive: Drive
 ) -> float:
-    """Return the length in s from a state in the backstop at time `t0` to the time `t` [s].
+    """Return the length in the regularised variable s from a backstop state at time `t0` to time `t` [s].
 
     Like :func:`printhammer.kernel.methods.contact.s_at`, with the lower accuracy that the columns need. If
     the armature `leaves` at `t`, solves w = 0 instead, since dt/ds = 0 there.

@@ -210,5 +210,5 @@ class GridMagnet(MagnetPart):
         return (self._table.current[0], self._table.current[-1])
 
     def content(self) -> Mapping[str, Any]:
-        """Return the points, part of the identity of the magnet: x, m; current, A; values, SI."""
+        """Return the points of the table, which identify the magnet: x, m; current, A; values, SI."""
         return {"x": self._table.x, "current": self._table.current, self.quantity: self._table.values}

@@ -86,7 +86,7 @@ class Paper(Declared):
         )
 
     def deviations(self, slots: int, pitch: float) -> FloatArray:
-        """Draw deviations of stiffness and front, (2, slots), in standard deviations; `pitch` is in m."""
+        """Draw deviations of stiffness and front, in standard deviations, shape (2, slots); `pitch` in m."""
         rng = np.random.default_rng(self.seed)
         white = rng.standard_normal((2, slots))
         kept = math.exp(-pitch / self.length) if self.length else 0.0

@@ -31,7 +31,7 @@ FIRST_SLOT: Final = 1e-3
 
 @cache
 def eight_slot_patterns() -> BoolArray:
-    """Return the 255 patterns of eight slots with at least one dot, (255, 8), read-only.
+    """Return the 255 patterns of eight slots with at least one dot, shape (255, 8), read-only.
 
     Row n holds the binary digits of n + 1, the most significant one in slot 0.
     """

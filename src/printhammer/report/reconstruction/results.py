@@ -170,7 +170,7 @@ class Family(_Table):
 
 
 class FamilyPanels(_Table):
-    """How many of the twelve panels of Fig. 11 agree with the paper, for one hammer of the family."""
+    """Number of the twelve panels of Fig. 11 that agree with the paper, for one hammer of the family."""
 
     exact: _Count = Field(description="the number with the verdict of the paper, with the default integrator")
     computed: _Count = Field(

@@ -77,12 +77,12 @@ that pack the constants of parts."""
 
 
 Numbers = dict[str, tuple[tuple[str | None, ...], tuple[float, ...]]]
-"""Arrays of numbers by name: the dotted key of the constant that sets each number, None for others; and the
-numbers, SI, NaN for a missing one."""
+"""Numbers of a hammer as named arrays: for each array, the dotted keys of the constants that set its numbers
+(None where no constant does), and the numbers, SI (NaN where missing)."""
 
 
 def numbers_of(hammer: Hammer) -> Numbers:
-    """Return the arrays from which the entry points `constants` and `rest` compute what depends on a hammer.
+    """Return the arrays of a hammer from which the entry points `constants` and `rest` compute.
 
     The arrays are `body`, those of the parts by role, and `limits`, whose first two numbers `constants`
     writes. Numbers whose key changes are replaced; positions of backstop and front occur twice.

@@ -1,6 +1,7 @@
 """Entry points with which a page poses a run: constants, rest, supply, scales and window from plain numbers.
 
-They do what `printhammer.run.problem` does. An outcome other than 0 is a refusal, see `REFUSALS`.
+They compute what `printhammer.run.problem` computes from a hammer and a drive. An outcome other than 0 is a
+refusal, see `REFUSALS`.
 """
 
 from __future__ import annotations
@@ -285,7 +286,7 @@ def fill_scales(
 
 
 def begin_window(about: Any, rest: float, front: float, out: Any) -> int:
-    """Write the smallest window of a device, s; return whether a single pulse decides on a longer one.
+    """Write the smallest window of a device, s; return whether a single pulse is needed to confirm it.
 
     `about` are the numbers about the pulse, `rest` and `front` positions, m, the latter NaN without a pack.
     """
@@ -331,4 +332,4 @@ REFUSALS: Final[dict[str, dict[int, tuple[str, str | None]]]] = {
         ),
     },
 }
-"""What is wrong, and what is expected, by entry point and outcome; the numbers are those in `out`."""
+"""Messages for refused inputs: fault and expectation, by entry point and outcome, with numbers from `out`."""

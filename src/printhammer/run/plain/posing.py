@@ -158,7 +158,7 @@ def typical_scales(
 
 
 def allowances(tolerance: float) -> tuple[float, float]:
-    """Return the allowances of the error estimates of orders six and seven, which control order eight."""
+    """Return the tolerances of the order 6 and order 7 error estimates, from that of the order 8 method."""
     return (10.0 * tolerance) ** (7.0 / 9.0), 10.0 * tolerance
 
 

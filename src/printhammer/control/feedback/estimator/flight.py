@@ -193,7 +193,7 @@ def least_squares(
 
 
 def _integrate(grid: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Integrate once and twice over equal time steps, (M, K), backwards from the last; trapezoidal rule."""
+    """Integrate once and twice over equal steps, from the last time backwards, shape (M, K) (trapezoidal)."""
     step = (grid[:, -1:] - grid[:, :1]) / (grid.shape[1] - 1)
 
     def backwards(integrand: FloatArray) -> FloatArray:
