@@ -119,6 +119,35 @@ def test_a_device_has_its_own_word_and_an_oscillator_loses_no_dot(modules: Path)
     assert firings == "Two firings"
 
 
+NAMES = """
+const { titleOf, viewsOf, moverOf } = await import("./words.js");
+const device = (title, strike, front, rigid, ...sections) => ({
+  title, strike, rigid, places: { backstop: 0, front }, constants: sections.map((section) => ({ section })),
+});
+const devices = [
+  device("A hammer", "dot", 1, false, "magnet", "pack"),
+  device("A relay", "closing", 1, true, "magnet", "pack"),
+  device("A ball that bounces", "dot", null, true), device("An oscillator", "dot", null, true),
+];
+console.log(JSON.stringify(devices.map((each) => ({
+  views: viewsOf(each), mover: moverOf(each), titles: viewsOf(each).map((view) => titleOf(view, each)),
+}))));
+"""
+
+
+def test_views_and_titles_suit_the_device(modules: Path) -> None:
+    command = ["node", "--input-type=module", "--eval", NAMES]
+    answer = subprocess.run(command, cwd=modules, capture_output=True, text=True, check=True)
+    hammer, relay, ball, oscillator = json.loads(answer.stdout)
+    assert len(hammer["views"]) == len(relay["views"]) == 9
+    assert {"Printed line", "Energy per dot", "Actuator"} <= set(hammer["titles"])
+    assert {"Closings", "Energy per closing", "Actuator"} <= set(relay["titles"])
+    for textbook, mover in ((ball, "ball"), (oscillator, "mass")):
+        assert textbook["mover"] == mover
+        assert set(hammer["views"]) - set(textbook["views"]) == {"line", "energy", "loops"}
+        assert mover.capitalize() in textbook["titles"]
+
+
 MOVE = """
 const { moving } = await import("./controls.js");
 const constants = [

@@ -1,6 +1,7 @@
 // What a view tells, in a sentence: read below its title, and by those who do not see the picture.
 import { strobeText } from "./planes.js";
 import { digits, shown } from "./units.js";
+import { large } from "./words.js";
 
 const NUMBERS = ["no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve"];
 const ORDINALS = ["first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth", "eleventh", "twelfth"];
@@ -8,7 +9,6 @@ const ORDINALS = ["first", "second", "third", "fourth", "fifth", "sixth", "seven
 const count = (number, noun, nouns = `${noun}s`) => `${NUMBERS[number] ?? number} ${number === 1 ? noun : nouns}`;
 export const ordinal = (number) => ORDINALS[number - 1] ?? `${number}th`;
 const listed = (names) => (names.length < 2 ? names.join("") : `${names.slice(0, -1).join(", ")} and ${names.at(-1)}`);
-const large = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 const range = (low, high, si) => (digits(low, 3) === digits(high, 3) ? shown(low, si, 3) : `${shown(low, si, 3).replace(/ \S+$/, "")} to ${shown(high, si, 3)}`);
 
 /** Return what the firings of a burst did: "Nine dots, the second lost". */

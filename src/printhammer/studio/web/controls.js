@@ -1,72 +1,64 @@
-// The controls: one row for each constant, with unit, range, hint and reset, in groups that can be searched.
+// The controls: what is turned most in front, below a fold a row for each constant, with unit, range, hint and reset; they can be searched.
 import { element } from "./dom.js";
-import { isDriver, isVoltage } from "./pulses.js";
+import { isDriver } from "./pulses.js";
 import { choiceRow, sliderRow, textRow } from "./rows.js";
 import { START } from "./state.js";
 import { waveformEditor } from "./waveform.js";
+import { large, moverOf, prints } from "./words.js";
 
-const TITLES = { armature: "Armature and geometry", magnet: "Magnet", spring: "Spring", pack: "Pack", backstop: "Backstop", coil: "Coil" };
+const TITLES = { train: "Firings", map: "Map", magnet: "Magnet", spring: "Spring", pack: "Pack", backstop: "Backstop", coil: "Coil" };
 
-/** Build the controls for a hammer; returns how they follow the state. */
+/** Build the controls for a hammer, what is turned most in front; returns how they follow the state. */
 export function buildControls(holder, studio) {
   const rows = [];
   const search = element("input", { type: "search", placeholder: "search the controls", "aria-label": "search the controls", class: "search" });
-  holder.replaceChildren(search);
+  const front = element("div", { class: "rows front" });
+  const fold = element("details", { class: "fold" }, element("summary", {}, "All constants ", studio.parts.honesty));
+  holder.replaceChildren(search, front, fold);
   const { described } = studio;
   const start = { ...START, ...described.start };
-  const add = (group, options) => {
-    const row = sliderRow(options, studio);
-    group.append(row.element);
+  const put = (place, row) => {
+    place.append(row.element);
     rows.push(row);
+    return row;
   };
+  const add = (place, options) => put(place, sliderRow(options, studio));
 
-  const drive = group(holder, "Drive", true);
   const rate = {
     id: "rate", name: "rate", hint: "Firings per second; a time between them is written 1/660us.", unit: "Hz", low: Math.min(50, start.low), high: 5000, log: true,
     get: (state) => state.rate, set: (value) => ({ rate: value }), reset: () => ({ rate: start.rate }),
   };
-  add(drive, rate);
+  add(front, rate);
   // On a phone the rate stays below the view.
   studio.parts.pinned.replaceChildren();
   add(studio.parts.pinned, { ...rate, id: "pinned rate" });
-  add(drive, {
-    id: "pulses", name: "pulses", hint: "Number of firings.", unit: "1", low: 1, high: studio.limits.pulses, whole: true,
+  const most = studio.limits.pulses;
+  add(front, {
+    id: "pulses", name: "pulses", hint: "Number of firings.", unit: "1", low: 1, high: most, whole: true,
     get: (state) => state.pulses, set: (value) => ({ pulses: value }), reset: () => ({ pulses: start.pulses }),
   });
-  const most = studio.limits.pulses;
-  const pattern = textRow({
-    name: "pattern", hint: `Which slots are fired, such as 1101, at most ${most}; empty: all pulses.`, wanted: `0 and 1, at least one 1, at most ${most} in all`,
-    get: (state) => state.pattern, set: (value) => (/^[01]*1[01]*$|^$/.test(value) && value.length <= most ? { pattern: value } : null),
-  }, studio);
-  drive.append(pattern.element);
-  rows.push(pattern);
-  const overlap = choiceRow("overlap", "What overlapping pulses do: add up, or the latest replaces the others, as that of a driver always does.", ["add", "replace"], (state) => state.overlap, (value) => ({ overlap: value }), studio);
-  drive.append(overlap.element);
-  rows.push(overlap);
-
-  const line = textRow({
-    name: "line", hint: `Text that is printed, nine wires high, slot by slot at this rate, at most ${studio.limits.line} characters; empty: the dots of the burst.`, wanted: `at most ${studio.limits.line} characters`,
-    get: (state) => state.line, set: (value) => (value.length <= studio.limits.line ? { line: value } : null),
-  }, studio);
-  drive.append(line.element);
-  rows.push(line);
-
-  if (described.combined.length) {
-    const paper = group(holder, "Paper", true);
-    for (const control of described.combined) add(paper, { ...control, id: control.key, name: control.key, hint: control.meaning, ...moving(control, studio) });
+  for (const control of described.combined) add(front, { ...control, id: control.key, name: control.key, hint: control.meaning, ...moving(control, studio) });
+  if (prints(described)) {
+    put(front, textRow({
+      name: "line", hint: `Text that is printed, nine wires high, slot by slot at this rate, at most ${studio.limits.line} characters; empty: the dots of the burst.`, wanted: `at most ${studio.limits.line} characters`,
+      get: (state) => state.line, set: (value) => (value.length <= studio.limits.line ? { line: value } : null),
+    }, studio));
   }
-  const pulse = group(holder, "Pulse", true);
-  rows.push(waveformEditor(pulse, studio, sliderRow));
+  rows.push(waveformEditor(front, studio, sliderRow));
 
   const sections = new Map();
-  const open = described.open ?? [];
+  const section = (name, title = TITLES[name] ?? name) => {
+    if (!sections.has(name)) sections.set(name, fold.appendChild(element("section", { class: "rows" }, element("h3", {}, title))));
+    return sections.get(name);
+  };
   // What a voltage drives is looked at first.
-  const listed = [...described.constants, ...open].sort((one, other) => (other.section === "coil") - (one.section === "coil"));
+  const listed = [...described.constants, ...described.open ?? []].sort((one, other) => (other.section === "coil") - (one.section === "coil"));
+  const mover = moverOf(described);
   for (const constant of listed) {
-    if (!sections.has(constant.section)) sections.set(constant.section, group(holder, TITLES[constant.section] ?? constant.section, false));
-    add(sections.get(constant.section), {
-      ...constant, id: constant.key, name: constant.unit === "degC" ? "temperature" : constant.symbol, title: constant.meaning,
-      hint: `${constant.key}: ${constant.meaning}${constant.unit === "1" ? "" : `, ${constant.unit}`}. ${constant.equation}. ${constant.status}: ${constant.source}.`,
+    const meaning = mover === "armature" ? constant.meaning : constant.meaning.replace("armature", mover);
+    add(section(constant.section, constant.section === "armature" ? large(mover) : TITLES[constant.section]), {
+      ...constant, id: constant.key, name: constant.unit === "degC" ? "temperature" : meaning, title: constant.key,
+      hint: `${constant.key}: ${meaning}${constant.unit === "1" ? "" : `, ${constant.unit}`}. ${constant.equation}. ${constant.status}: ${constant.source}.`,
       get: (state) => state.constants[constant.key] ?? constant.value,
       set: (value) => ({ constants: { ...studio.store.state.constants, [constant.key]: value } }),
       reset: () => {
@@ -75,20 +67,20 @@ export function buildControls(holder, studio) {
       },
     });
   }
-  const limits = group(holder, "Map", false);
+  put(section("train"), textRow({
+    name: "pattern", hint: `Which slots are fired, such as 1101, at most ${most}; empty: all pulses.`, wanted: `0 and 1, at least one 1, at most ${most} in all`,
+    get: (state) => state.pattern, set: (value) => (/^[01]*1[01]*$|^$/.test(value) && value.length <= most ? { pattern: value } : null),
+  }, studio));
+  const overlap = put(section("train"), choiceRow("overlap", "What overlapping pulses do: add up, or the latest replaces the others, as that of a driver always does.", ["add", "replace"], (state) => state.overlap, (value) => ({ overlap: value }), studio));
   for (const end of ["low", "high"]) {
-    add(limits, {
+    add(section("map"), {
       id: end, name: `${end === "low" ? "lowest" : "highest"} rate`, hint: "End of the map's axis of firing rates.", unit: "Hz", low: Math.min(50, start.low), high: 10000, log: true,
       get: (state) => state[end], set: (value) => ({ [end]: value }), reset: () => ({ [end]: start[end] }),
     });
   }
-  searched(holder, search);
-  let driven = false;
+  searched(holder, search, fold);
   return () => {
     const { state } = studio.store;
-    const voltage = isVoltage(state.waveform ?? described.waveform);
-    if (voltage && !driven && sections.has("coil")) sections.get("coil").parentElement.open = true;
-    driven = voltage;
     // Of a driver the latest firing always replaces those before it.
     overlap.element.querySelector("select").disabled = isDriver(studio, state.waveform ?? described.waveform);
     for (const row of rows) row.follow(state);
@@ -96,16 +88,15 @@ export function buildControls(holder, studio) {
 }
 
 /** Show only the rows in whose name, key, meaning or source all words of the search occur. */
-function searched(holder, search) {
+function searched(holder, search, fold) {
   const none = holder.appendChild(element("p", { class: "none", hidden: true }, "no control is called so"));
   let open = null;
   search.addEventListener("input", () => {
     const words = search.value.toLowerCase().split(/\s+/).filter(Boolean);
-    const groups = [...holder.querySelectorAll("details")];
-    open ??= groups.map((each) => each.open);
+    open ??= fold.open;
     let left = 0;
-    groups.forEach((each, k) => {
-      const title = each.querySelector("summary").textContent.toLowerCase();
+    for (const each of holder.querySelectorAll(".rows")) {
+      const title = (each.querySelector("h3")?.textContent ?? "drive pulse").toLowerCase();
       let count = 0;
       for (const row of each.querySelectorAll("[data-words]")) {
         row.hidden = !words.every((word) => row.dataset.words.includes(word) || title.includes(word));
@@ -113,8 +104,8 @@ function searched(holder, search) {
       }
       left += count;
       each.hidden = words.length > 0 && count === 0;
-      each.open = words.length ? count > 0 : open[k];
-    });
+    }
+    fold.open = words.length ? true : open;
     none.hidden = left > 0;
     if (!words.length) open = null;
   });
@@ -159,10 +150,4 @@ export function moving(control, studio) {
       return { constants };
     },
   };
-}
-
-function group(holder, title, open) {
-  const body = element("div", { class: "rows" });
-  holder.append(element("details", { open }, element("summary", {}, title), body));
-  return body;
 }

@@ -11,7 +11,7 @@ const MOST = 12;
 
 /** Build the row of what can be found. */
 export function findRow(studio) {
-  const dot = make("select", { "aria-label": "which dot" }, ...Array.from({ length: MOST }, (_each, k) => make("option", { value: k + 1 }, ordinal(k + 1))));
+  const dot = make("select", { "aria-label": "which dot", class: "find-dot" }, ...Array.from({ length: MOST }, (_each, k) => make("option", { value: k + 1 }, ordinal(k + 1))));
   dot.value = "2";
   const lost = make("button", { type: "button", class: "find-lost", onclick: () => search(lost, (ended) => lostRate(Number(dot.value), ended)), title: "Find the lowest rate of the map at which this dot is lost" }, "dot lost");
   const strange = make("button", { type: "button", class: "find-strange", onclick: () => search(strange, strangeRate), title: "Find the next rate at which an endless train never repeats itself" }, "strange rate");
@@ -96,5 +96,5 @@ export function findRow(studio) {
     }
     return { text: `no strange train among ${GRID} rates from ${shown(low, "Hz")} to ${shown(high, "Hz")}` };
   }
-  return make("span", { class: "finds" }, make("span", { class: "what" }, "Find:"), dot, lost, strange);
+  return make("span", { class: "finds" }, dot, lost, strange);
 }

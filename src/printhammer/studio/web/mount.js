@@ -158,6 +158,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     studio.parts.hammers.value = state.text ? `${DROPPED}${[...dropped.keys()].indexOf(state.text)}` : frame.asked;
     studio.parts.honesty.textContent = honesty(frame.hammer);
     studio.parts.honesty.title = frame.hammer.note;
+    studio.layout.describe(frame.hammer);
     follow = buildControls(studio.parts.controls, studio);
     studio.loaded = state.text || frame.asked;
     const whole = { ...state, hammer: state.text ? "" : frame.asked, ...start };

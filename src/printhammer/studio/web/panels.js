@@ -4,18 +4,17 @@ import { element as make } from "./dom.js";
 import { copy, csvOf, pngOf, save, savePage, svgOf } from "./exports.js";
 import { findRow } from "./finds.js";
 import { HELP } from "./keys.js";
+import { menuOf } from "./menu.js";
 import { pinRow } from "./pins.js";
 import { readoutOf } from "./readout.js";
 import { bare, DEEPEST, VIEWS } from "./state.js";
 import { storyRow } from "./stories.js";
 import { tourOf } from "./tour.js";
+import { titleOf, viewsOf } from "./words.js";
 
-const TITLES = { motion: "Motion", sketch: "Actuator", map: "Frequency-time map", forces: "Forces", phase: "Phase plane", strobe: "Strobe", loops: "Loops of force", energy: "Energy per dot", line: "Printed line" };
-const SHORT = { motion: "Motion", sketch: "Actuator", map: "Map", forces: "Forces", phase: "Phase plane", strobe: "Strobe", loops: "Loops", energy: "Energy", line: "Line" };
-const OF_PACK = ["line", "energy"]; // views of what is struck
 const NARROW = 820; // pixels, as in the style sheet
-/** The views of the opening, the large ones. */
-const OPENING = ["sketch", "motion", "line"];
+/** The views beside the large one. */
+const BESIDE = ["sketch", "motion", "line"];
 const PRESETS = {
   "single pulse": { pulses: 1, pattern: "" }, "two pulses": { pulses: 2, pattern: "", rate: 1000 }, "burst of nine": { pulses: 9, pattern: "", rate: 1200 },
   "fast burst": { pulses: 9, pattern: "", rate: 1800 }, "letters": { pattern: "1101011100101", rate: 1200 }, "long train": { pulses: 40, pattern: "", rate: 1000 },
@@ -38,18 +37,15 @@ export function layout(studio, makers) {
     if (frame.kind === "refusal") studio.say(frame.reason, true);
     else action(frame.texts[kind]);
   };
-  const out = make("select", { "aria-label": "export", class: "out" }, make("option", { value: "" }, "export …"));
   const leaving = {
     "hammer, TOML": () => text("hammer", (content) => save("studio-hammer.toml", content, "text/plain")),
     "drive, TOML": () => text("drive", (content) => save("studio-drive.toml", content, "text/plain")),
     "copy as Python": () => text("python", (content) => copy(content, studio, "Python")),
     "copy as command": () => text("command", (content) => copy(content, studio, "command")),
-    "copy address": () => copy(studio.address(), studio, "address"),
-    "page, read only": () => savePage(studio),
     "state, file": () => text("state", (content) => save("studio-state.json", content, "application/json")),
   };
-  out.append(...Object.keys(leaving).map((name) => make("option", { value: name }, name)));
-  out.addEventListener("change", () => { leaving[out.value]?.(); out.value = ""; });
+  const out = make("select", { "aria-label": "export", class: "out", onchange: () => { leaving[out.value]?.(); out.value = ""; } },
+    make("option", { value: "" }, "export …"), ...Object.keys(leaving).map((name) => make("option", { value: name }, name)));
 
   const undo = button("undo", "Undo (Ctrl+Z)", () => studio.undo(), { class: "undo" });
   const redo = button("redo", "Redo (Ctrl+Shift+Z)", () => studio.redo(), { class: "redo" });
@@ -69,19 +65,27 @@ export function layout(studio, makers) {
   const status = make("div", { class: "status", role: "status" });
   const grid = make("main", { class: "grid", tabindex: -1 });
   const chooser = make("div", { class: "chooser", role: "group", "aria-label": "views" });
-  const bar = make("header", { class: "bar" },
-    make("h1", {}, "printhammer studio"), hammers, presets, undo, redo,
-    button("pin", "Pin this run, to compare others with it (P)", () => studio.pin(), { class: "pin" }), button("unpin", "unpin: take all pins away (U)", () => studio.unpin()),
-    out, button("open", "Open a hammer file or a measured CSV", () => file.click()), make("span", { class: "space" }), chooser, units,
-    button("◐", "Light or dark (T)", () => studio.toggleTheme(), { class: "theme" }), button("?", "Keys (?)", () => studio.help(), { class: "help" }), file);
-  const sheet = make("button", { type: "button", class: "sheet", "aria-expanded": "false", onclick: () => sheet.setAttribute("aria-expanded", String(side.classList.toggle("open"))) }, "Controls");
-  const pinned = make("div", { class: "pinned" });
-  const side = make("aside", { class: "side", "aria-label": "controls" }, pinned, sheet, honesty, controls, hint);
   const stories = storyRow(studio);
   const tour = tourOf(studio, stories);
-  const strip = make("nav", { class: "strip", "aria-label": "stories from the paper" }, make("span", { class: "what" }, "From the paper"), ...stories.buttons, make("button", { type: "button", class: "story tour", onclick: tour.begin }, "Tour, two minutes"), make("span", { class: "space" }), findRow(studio));
+  const strip = make("nav", { class: "strip", "aria-label": "stories from the paper" }, ...stories.buttons, make("button", { type: "button", class: "story tour", onclick: tour.begin }, "Tour"));
+  const share = menuOf("share", "Share", "Share what is set", [
+    ["", button("copy link", "Copy the address, which holds what is set", () => copy(studio.address(), studio, "address"))],
+    ["", button("save as a page", "Save what is set as a page of its own: one file, which computes without a network", () => savePage(studio))],
+    ["", out],
+  ], true);
+  const menu = menuOf("more", "☰", "Menu", [
+    ["Views", chooser], ["Presets", presets],
+    ["Runs", button("pin", "Pin this run, to compare others with it (P)", () => studio.pin(), { class: "pin" }), button("unpin", "unpin: take all pins away (U)", () => studio.unpin())],
+    ["Files", button("open", "Open a hammer file or a measured CSV", () => file.click())],
+    ["Find", findRow(studio)],
+    ["Show", units, button("◐", "Light or dark (T)", () => studio.toggleTheme(), { class: "theme" }), button("?", "Keys (?)", () => studio.help(), { class: "help" })],
+  ]);
+  const bar = make("header", { class: "bar" }, make("h1", {}, "printhammer"), hammers, strip, undo, redo, share, menu, file);
+  const sheet = make("button", { type: "button", class: "sheet", "aria-expanded": "false", onclick: () => sheet.setAttribute("aria-expanded", String(side.classList.toggle("open"))) }, "Controls");
+  const pinned = make("div", { class: "pinned" });
+  const side = make("aside", { class: "side", "aria-label": "controls" }, pinned, sheet, controls, hint);
   const stage = make("div", { class: "stage" }, stories.note, tour.element, pinRow(studio), grid);
-  const page = make("div", { class: "studio" }, bar, strip, side, stage, status, dialog);
+  const page = make("div", { class: "studio" }, bar, side, stage, status, dialog);
   studio.element.classList.add("studio-place");
   studio.element.replaceChildren(page);
   onRatio(() => studio.theme());
@@ -108,14 +112,15 @@ export function layout(studio, makers) {
   const tabs = make("div", { class: "tabs", role: "group", "aria-label": "large view" });
   const tab = (name) => {
     const { views } = studio.store.state;
-    const next = OPENING.includes(name) ? views : VIEWS.filter((view) => view === name || OPENING.includes(view));
+    const next = BESIDE.includes(name) ? views : VIEWS.filter((view) => view === name || BESIDE.includes(view));
     if (next.join() !== views.join()) studio.store.set({ views: next });
     if (isNarrow() && !panels[name].classList.contains("large")) enlarge(name);
     mark();
   };
+  studio.hero = tab;
   const mark = () => {
     const large = VIEWS.find((name) => panels[name].classList.contains("large"));
-    for (const each of tabs.children) each.setAttribute("aria-pressed", String(large ? each.dataset.tab === large : !panels[each.dataset.tab].hidden && !OPENING.includes(each.dataset.tab)));
+    for (const each of tabs.children) each.setAttribute("aria-pressed", String(large ? each.dataset.tab === large : !panels[each.dataset.tab].hidden && !BESIDE.includes(each.dataset.tab)));
   };
   grid.append(tabs);
   const opening = grid.appendChild(make("div", { class: "opening" }));
@@ -123,15 +128,15 @@ export function layout(studio, makers) {
   for (const name of VIEWS) {
     const body = make("div", { class: "body" });
     const caption = captions[name] = make("p", { class: "caption", id: `caption-${name}` });
-    const leave = make("select", { class: "leave", "aria-label": `save ${TITLES[name]}` }, ...["save", "PNG", "SVG", "CSV"].map((kind, k) => make("option", { value: k ? kind : "" }, kind)));
-    const panel = make("section", { class: `panel view-${name}`, "aria-label": TITLES[name], hidden: true },
-      make("h2", {}, make("span", {}, TITLES[name]), make("output", { class: "readout" }), leave, button("⤢", `Enlarge ${TITLES[name]}`, () => enlarge(name), { class: "enlarge" })), caption, body);
-    (OPENING.includes(name) ? opening : grid).append(panel);
-    tabs.append(make("button", { type: "button", "aria-pressed": "false", "data-tab": name, class: OPENING.includes(name) ? "beside" : "", onclick: () => tab(name) }, SHORT[name]));
+    const leave = make("select", { class: "leave", "aria-label": `save ${titleOf(name)}` }, ...["save", "PNG", "SVG", "CSV"].map((kind, k) => make("option", { value: k ? kind : "" }, kind)));
+    const panel = make("section", { class: `panel view-${name}`, "aria-label": titleOf(name), hidden: true },
+      make("h2", {}, make("span", {}, titleOf(name)), make("output", { class: "readout" }), leave, button("⤢", `Enlarge ${titleOf(name)}`, () => enlarge(name), { class: "enlarge" })), caption, body);
+    (BESIDE.includes(name) ? opening : grid).append(panel);
+    tabs.append(make("button", { type: "button", "aria-pressed": "false", "data-tab": name, class: BESIDE.includes(name) ? "beside" : "", onclick: () => tab(name) }, titleOf(name, null, true)));
     panels[name] = panel;
     studio.views[name] = withReadout(name, makers[name](body, studio), panel, studio);
     leave.addEventListener("change", () => { leaveView(name, leave.value, body); leave.value = ""; });
-    chooser.append(make("button", { type: "button", "aria-pressed": "false", title: TITLES[name], "aria-label": `${VIEWS.indexOf(name) + 1} ${TITLES[name]}`, "data-view": name, onclick: () => toggle(name) }, String(VIEWS.indexOf(name) + 1)));
+    chooser.append(make("button", { type: "button", "aria-pressed": "false", "data-view": name, onclick: () => toggle(name) }, `${VIEWS.indexOf(name) + 1} ${titleOf(name, null, true)}`));
   }
 
   async function leaveView(name, kind, body) {
@@ -141,7 +146,7 @@ export function layout(studio, makers) {
     if (!table) return;
     const whole = `${studio.described.name}-${Number(studio.store.state.rate.toPrecision(6))}Hz-${name}`;
     if (kind === "CSV") save(`${whole}.csv`, csvOf(table), "text/csv");
-    if (kind === "SVG") save(`${whole}.svg`, svgOf(view, width, height, `${TITLES[name]}: ${captionOf(name, studio)} ${origin(studio)}`), "image/svg+xml");
+    if (kind === "SVG") save(`${whole}.svg`, svgOf(view, width, height, `${titleOf(name, studio.described)}: ${captionOf(name, studio)} ${origin(studio)}`), "image/svg+xml");
     if (kind === "PNG") save(`${whole}.png`, await pngOf(view, width, height, origin(studio)), "image/png");
   }
   function toggle(name) {
@@ -177,7 +182,7 @@ export function layout(studio, makers) {
         const [text, whole] = [captionOf(name, studio), pictureText(name, studio)];
         if (captions[name].textContent !== text) captions[name].textContent = text;
         const picture = panels[name].querySelector('[role="img"]');
-        if (picture) picture.setAttribute("aria-label", `${TITLES[name]}: ${whole}`);
+        if (picture) picture.setAttribute("aria-label", `${titleOf(name, studio.described)}: ${whole}`);
         else panels[name].querySelector("canvas").setAttribute("aria-description", whole);
       }
     }, 60);
@@ -185,18 +190,19 @@ export function layout(studio, makers) {
   studio.element.addEventListener("painted", tell);
   let shown = "";
   const show = (all) => {
-    // Without a pack nothing is printed, and no dot takes energy.
-    const views = studio.described?.places.front === null && all.some((view) => !OF_PACK.includes(view)) ? all.filter((view) => !OF_PACK.includes(view)) : all;
-    const beside = OPENING.filter((view) => views.includes(view) || !all.includes(view)).length;
+    const known = viewsOf(studio.described);
+    const fitting = all.filter((view) => known.includes(view));
+    const views = fitting.length ? fitting : known.slice(0, 1);
+    const beside = BESIDE.filter((view) => known.includes(view)).length;
     if (views.join() === shown) return;
     shown = views.join();
     for (const [name, panel] of Object.entries(panels)) panel.hidden = !views.includes(name);
     for (const each of chooser.children) each.setAttribute("aria-pressed", String(views.includes(each.dataset.view)));
-    const others = views.filter((view) => !OPENING.includes(view)).length;
+    const others = views.filter((view) => !BESIDE.includes(view)).length;
     const whole = others > 0 && views.length - others === beside;
     // One view beside what moves, its curve and what it prints is the hero: it takes half.
     grid.classList.toggle("with-hero", whole && others === 1);
-    if (whole && others === 1 && isNarrow() && !grid.classList.contains("one")) enlarge(views.find((view) => !OPENING.includes(view)));
+    if (whole && others === 1 && isNarrow() && !grid.classList.contains("one")) enlarge(views.find((view) => !BESIDE.includes(view)));
     mark();
     grid.classList.toggle("with-opening", whole);
     grid.style.setProperty("--rows", String(Math.ceil(others / 2)));
@@ -204,7 +210,25 @@ export function layout(studio, makers) {
     grid.dataset.count = String(views.length);
     keepFocus();
   };
-  return { page, bar, controls, pinned, hint, status, grid, dialog, hammers, honesty, layout: { show, enlarge } };
+  /** Name the views as the device has them; those that do not apply have no tab. */
+  const describe = (described) => {
+    const known = viewsOf(described);
+    VIEWS.forEach((name, k) => {
+      const title = titleOf(name, described);
+      panels[name].setAttribute("aria-label", title);
+      panels[name].querySelector("h2 span").textContent = title;
+      for (const [each, before] of [[tabs.children[k], ""], [chooser.children[k], `${k + 1} `]]) {
+        each.textContent = `${before}${titleOf(name, described, true)}`;
+        each.hidden = !known.includes(name);
+      }
+    });
+    // What is found and preset is about trains of dots.
+    presets.closest(".entry").hidden = Boolean(described.start.rate);
+    page.querySelector(".find-lost").textContent = `${described.strike} lost`;
+    for (const each of page.querySelectorAll(".find-lost, .find-dot")) each.hidden = described.places.front === null;
+    shown = "";
+  };
+  return { page, bar, controls, pinned, hint, status, grid, dialog, hammers, honesty, layout: { show, enlarge, describe } };
 }
 
 /** Return a view that tells beside its title what is there at the time of the cursor. */

@@ -7,7 +7,7 @@ const STEPS = 1000;
 const FINE = 0.1; // of a step, with Shift
 const NOTCH = 5; // steps of a wheel
 
-/** A slider with a number; options: id, name, hint, unit (SI), low, high, log, whole, get, set, reset. */
+/** A slider with a number; options: id, name, symbol, hint, unit (SI), low, high, log, whole, get, set, reset. */
 export function sliderRow(options, studio) {
   const { id, name, unit, low, high, log, whole } = options;
   const value = (part) => (log ? low * (high / low) ** part : low + part * (high - low));
@@ -88,9 +88,9 @@ export function sliderRow(options, studio) {
     box.toggleAttribute("data-editing", on);
   }
   reset.addEventListener("click", () => { words.clear(); studio.store.set(options.reset(), `reset ${id}`); });
-  const row = element("div", { class: "row" }, element("label", { for: label, title: options.title ?? options.hint }, name), box, sign, reset, element("div", { class: "reach" }, ends[0], slider, ends[1]), words.element);
+  const row = element("div", { class: "row" }, element("label", { for: label, title: options.title ?? options.hint }, name, ...(options.symbol ? [" ", element("i", { class: "symbol" }, options.symbol)] : [])), box, sign, reset, element("div", { class: "reach" }, ends[0], slider, ends[1]), words.element);
   hinted(row, `${options.hint.replace(/[^.]$/, "$&.")} Shift for fine steps, the wheel when it is in use, a double click to reset.`, studio);
-  row.dataset.words = `${name} ${id} ${options.title ?? ""} ${options.hint}`.toLowerCase();
+  row.dataset.words = `${name} ${options.symbol ?? ""} ${id} ${options.title ?? ""} ${options.hint}`.toLowerCase();
 
   function show() {
     const number = options.get(studio.store.state);

@@ -1,6 +1,9 @@
 // The state that the user has set, its history, and its text in the address.
 export const VIEWS = ["motion", "sketch", "map", "forces", "phase", "strobe", "loops", "energy", "line"];
 
+/** The views with which a page opens: the map, and beside it what moves, its curve and what it prints. */
+export const OPENING = ["motion", "sketch", "map", "line"];
+
 const NUMBERS = ["rate", "pulses", "low", "high"];
 const TEXTS = ["hammer", "text", "pattern", "overlap", "line"];
 const JOINED = 700; // ms within which changes of one control are one step of the history
@@ -10,7 +13,7 @@ export const MOST_PINS = 4;
 
 export const START = Object.freeze({
   hammer: "", text: "", constants: {}, waveform: null, rate: 1200, pulses: 9, pattern: "", overlap: "add",
-  low: 500, high: 2000, line: "HAMMER", views: VIEWS,
+  low: 500, high: 2000, line: "HAMMER", views: OPENING,
 });
 
 export class Store {
@@ -77,7 +80,7 @@ export function toText(state) {
   for (const [key, value] of Object.entries(state.constants)) found.set(key, value);
   if (state.waveform) found.set("waveform", JSON.stringify(state.waveform));
   if (state.pins?.length) found.set("pins", JSON.stringify(state.pins.map(({ name, state: pinned }) => ({ name, state: Object.fromEntries(Object.entries(pinned).filter(([key, value]) => JSON.stringify(value) !== JSON.stringify(START[key]))) }))));
-  if (state.views.join() !== VIEWS.join()) found.set("views", state.views.join("-"));
+  if (state.views.join() !== OPENING.join()) found.set("views", state.views.join("-"));
   return found.toString();
 }
 

@@ -1,16 +1,16 @@
 // A tour of two minutes: what the parts of the page are, one after the other, each marked while it is told.
 import { element as make } from "./dom.js";
-import { VIEWS } from "./state.js";
+import { OPENING, VIEWS } from "./state.js";
 
 const STEPS = [
   [".view-sketch", "The actuator, to scale along its stroke. The coil lifts the armature off its magnet on the left; it flies to the pack of ribbon and paper on the platen. Press ▶ or Space to let it move, three hundred times as slowly as it is."],
   [".view-motion", "The same against time: blue where its face is, orange the current. The thin line is the time that is shown in all views; move it with the pointer. Drag over a part to enlarge it, Escape shows all."],
   [".view-line", "What comes of it: a dot for each firing, below the moment at which it touches the paper, as large as its force. Under it a text, as this hammer prints it at this rate."],
   ['[data-key="rate"]', "The firing rate. Everything follows while you turn it. Type into the box beside it what you like: 1500, 1.5 kHz or 1/660us; Shift makes fine steps, a double click goes back."],
-  [".view-map", "All rates at once: time to the right, rate upward, blue at the backstop, orange in the paper, red where a dot is lost. Click into it to take another rate."],
+  [".view-map", "All rates at once: time to the right, rate upward, blue at the backstop, orange in the paper, red where a dot is lost. Drag across it: the rate follows, and the word is printed anew below the pointer."],
   [".view-forces", "Why it is so: the forces of the five equations. The backstop takes the hardest blows, and what it does not take is left for the next firing."],
   [".view-strobe", "The state at every firing of an endless train. One point: it repeats itself. A few: with a longer period. A cloud on a curve: it never does."],
-  [".pin", "Pin a run, and it stays behind the next ones in grey. Undo goes back over everything, and the address of the page always holds what you see."],
+  [".more", "In the menu a run is pinned: it stays behind the next ones in grey. Undo goes back over everything, and the address of the page always holds what you see."],
   [".strip", "Six stories from the paper begin here, each with what to notice. That is all: the key ? lists the keys."],
 ];
 const EACH = 14; // s, of two minutes
@@ -31,6 +31,8 @@ export function tourOf(studio, stories) {
     if (k >= STEPS.length) { end(); return; }
     at = Math.max(k, 0);
     const [where, what] = STEPS[at];
+    const view = /^\.view-(\w+)$/.exec(where)?.[1];
+    if (view) studio.hero(view);
     marked?.classList.remove("marked");
     const target = studio.parts.page.querySelector(where);
     // A view that is hidden cannot be shown to anybody.
@@ -59,8 +61,7 @@ export function tourOf(studio, stories) {
     element: holder,
     begin: () => {
       stories.shut();
-      const missing = ["sketch", "motion", "line", "map", "forces", "strobe"].some((view) => !studio.store.state.views.includes(view));
-      if (missing) studio.store.set({ views: VIEWS });
+      if (studio.store.state.views.join() !== OPENING.join()) studio.store.set({ views: OPENING });
       if (studio.parts.grid.classList.contains("one")) studio.enlarge(VIEWS.find((name) => studio.parts.grid.querySelector(`.view-${name}.large`)));
       holder.hidden = false;
       go(0);

@@ -1,0 +1,40 @@
+// Names of views and of moving parts, as they suit the device that is shown; and which views apply to it.
+import { VIEWS } from "./state.js";
+
+const TITLES = { motion: "Motion", sketch: "Actuator", map: "Frequency-time map", forces: "Forces", phase: "Phase plane", strobe: "Strobe", loops: "Loops of force", energy: "Energy per dot", line: "Printed line" };
+const SHORT = { ...TITLES, map: "Map", loops: "Loops", energy: "Energy", line: "Line" };
+
+export const large = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+const plural = (noun) => (noun === "pull-in" ? "pull-ins" : `${noun}s`);
+
+/** Whether a device prints: what it strikes are dots on paper. */
+export const prints = (described) => described.places.front !== null && described.strike === "dot";
+/** Whether a device has a law of a part. */
+export const has = (described, section) => described.constants.some((constant) => constant.section === section);
+
+/** Return what moves: an armature where there is a magnet or a pack, else the ball or the mass of a textbook. */
+export function moverOf(described) {
+  if (!described || described.places.front !== null || has(described, "magnet")) return "armature";
+  return /\bball\b/i.test(described.title) ? "ball" : "mass";
+}
+
+/** Return what a mover rests on or strikes at the low end of its way. */
+export const stopOf = (described) => (moverOf(described) === "armature" ? "backstop" : moverOf(described) === "ball" ? "table" : "stop");
+
+/** Return the title of a view of a device. */
+export function titleOf(name, described, short = false) {
+  if (described && name === "sketch" && moverOf(described) !== "armature") return large(moverOf(described));
+  if (described && described.strike !== "dot") {
+    if (name === "line") return large(plural(described.strike));
+    if (name === "energy" && !short) return `Energy per ${described.strike}`;
+  }
+  return (short ? SHORT : TITLES)[name];
+}
+
+/** Return the views that apply to a device: without a pack nothing is printed, and a rigid stop has no loop. */
+export function viewsOf(described) {
+  if (!described) return VIEWS;
+  const { places: { front, backstop }, rigid } = described;
+  const lacks = { line: front === null, energy: front === null, loops: front === null && (backstop === null || rigid) };
+  return VIEWS.filter((name) => !lacks[name]);
+}
