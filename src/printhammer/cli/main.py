@@ -24,7 +24,7 @@ from printhammer.errors import PrinthammerError
 
 BAD_INPUT: Final = 2  # Exit status, by convention of command lines
 _COLUMNS: Final = 76
-"""Largest line length of an example in the help."""
+"""Largest line length of an example in the help; arbitrary."""
 
 HELP: Final = (
     "A laboratory for impact print hammers: motion, contacts, dots, and the claims of Hendriks (1983)."

@@ -363,7 +363,7 @@ TEMPERATURES: Final = (20.0, 40.0, 60.0, 80.0, 100.0, 120.0, 140.0)
 
 _LEFT: Final = 1e-3  # Residual current at which a pulse counts as ended, as a fraction of its largest
 _DECAYED: Final = 0.01  # Residual current that adds at most 2 % to the heat of the next dot, likewise
-_DOUBLINGS: Final = 8  # Iteration limit of the doublings of the simulated time
+_DOUBLINGS: Final = 8  # Iteration limit of the doublings of the simulated time; arbitrary
 
 
 def heat_of(hammer: Hammer) -> DotHeat:

@@ -51,7 +51,7 @@ REACH: Final = 0.15  # Half-width of the search range about the nominal impact, 
 FAINTEST: Final = 5.0  # Detection threshold, in standard deviations
 _DEGREE: Final = 1  # Degree of the nuisance polynomial
 _LEAST: Final = 8  # Smallest number of samples in the window
-_MOST: Final = 200_000  # Largest number of samples in a record
+_MOST: Final = 200_000  # Largest number of samples in a record; arbitrary
 _SPAN: Final = 1.5  # Range of the converter, relative to the largest value around the touch
 _FLOWING: Final = 0.02  # Current at the touch, over the largest current, that counts as decayed
 _MOST_BEFORE: Final = 0.5  # Largest length of the window before the touch, in flight times
@@ -331,7 +331,7 @@ def _vertex(score: FloatArray, place: int) -> float:
 Signal = Literal["current", "voltage"]
 SIGNALS: Final = get_args(Signal)
 UNITS: Final = {"current": "A", "voltage": "V"}
-_MOST_BITS: Final = 24  # Largest resolution of a converter
+_MOST_BITS: Final = 24  # Largest resolution of a converter; arbitrary
 
 
 class Sampling(Declared):

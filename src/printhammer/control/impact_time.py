@@ -35,7 +35,7 @@ LEVELS: Final = (0.001, 0.003, 0.01)
 """Default standard deviations of a sample, as fractions of the peak current or of 10 V."""
 
 MOST: Final = 2000
-"""Largest number of sampling settings in a study."""
+"""Largest number of sampling settings in a study; arbitrary."""
 
 _MOST_MISSED: Final = 0.99  # Largest fraction of missed impacts of a sensor
 _MOST_DOTS: Final = 10_000  # Largest number of dots; arbitrary, to refuse typing errors

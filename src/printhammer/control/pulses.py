@@ -28,7 +28,7 @@ WIDEST: Final = 2.0  # Largest width of a pulse, as a multiple of the hammer's o
 MARGIN: Final = 1e-3
 _SAMPLES: Final = 4001  # Number of samples of a simulated current
 _SPAN: Final = 2.0  # Length of the first simulation, in pulse widths
-_DOUBLINGS: Final = 6  # Iteration limit of the doublings of the simulated time
+_DOUBLINGS: Final = 6  # Iteration limit of the doublings of the simulated time; arbitrary
 
 
 def current_bound(hammer: Hammer, largest: float | str | None = None, key: str = "largest_current") -> float:

@@ -43,7 +43,7 @@ _CLOSED: Final = 1e-6  # Distance from state to image below which an orbit is cl
 _LONGEST_STEP: Final = 0.1  # Longest Newton step, in scales of the state
 # Size of the derivative below which steps are not limited; arbitrary, well below 1
 _CONTRACTING: Final = 0.3
-_ITERATIONS: Final = 12  # Iteration limit
+_ITERATIONS: Final = 12  # Iteration limit; arbitrary
 
 
 def row_multipliers(

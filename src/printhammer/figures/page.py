@@ -114,22 +114,22 @@ ZOOM_SHAPE: Final = 3.5
 """Width of the region of largest error, in units of the height of the column of wires."""
 
 _WIDTH: Final = 7.6  # Width of the figure, inches
-_SIDE: Final = 0.2  # Margin at either side, inches
-_LABEL: Final = 0.24  # Height of a heading, inches
+_SIDE: Final = 0.2  # Margin at either side, inches; arbitrary
+_LABEL: Final = 0.24  # Height of a heading, inches; arbitrary
 _GAP: Final = 0.1  # Gap between panels, inches
 _BESIDE: Final = 0.15  # Gap between panels side by side, inches
 _UPRIGHT: Final = 0.5  # Ratio of height to width above which panels are side by side; arbitrary
-_BAR: Final = 1.5  # Length of the colour bar, inches
-_LEAST_MARK: Final = 1.8  # Smallest size of a mark, points
+_BAR: Final = 1.5  # Length of the colour bar, inches; arbitrary
+_LEAST_MARK: Final = 1.8  # Smallest size of a mark, points; arbitrary
 _NEUTRAL: Final = "#c6ccd1"
-_TALLEST: Final = 4.5  # Largest height of a panel, inches
+_TALLEST: Final = 4.5  # Largest height of a panel, inches; arbitrary
 _LARGEST: Final = 0.1  # Largest distance between slots in the figure, inches
-_FOOT: Final = 0.62  # Height of the text at the foot, inches
+_FOOT: Final = 0.62  # Height of the text at the foot, inches; arbitrary
 _INCH: Final = 25.4e-3  # An inch, m
-_FINENESS: Final = 10  # Pixels per slot of a page
-_ACROSS: Final = 2000  # Largest number of pixels across
-_ZOOM_FINENESS: Final = 50  # Pixels per slot of the region of largest error
-_SHEET_FINENESS: Final = 16  # Pixels per slot of a sheet at true size
+_FINENESS: Final = 10  # Pixels per slot of a page; arbitrary
+_ACROSS: Final = 2000  # Largest number of pixels across; arbitrary
+_ZOOM_FINENESS: Final = 50  # Pixels per slot of the region of largest error; arbitrary
+_SHEET_FINENESS: Final = 16  # Pixels per slot of a sheet at true size; arbitrary
 _MICRONS: Final = Scale("Placement error", "m", "um")
 
 

@@ -29,7 +29,7 @@ _FALSE_OUTLIERS: Final = 0.01
 _EXACT: Final = 1e-11
 """RMS residual, as a fraction of the largest datum, below which the data count as exact."""
 
-_ROUNDS: Final = 30  # Iteration limit of the fit
+_ROUNDS: Final = 30  # Iteration limit of the fit; arbitrary
 
 _ALONE: Final = 0.9
 """Leverage above which a row alone determines a parameter."""

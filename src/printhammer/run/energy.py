@@ -25,7 +25,7 @@ from printhammer.support.arrays import FloatArray
 
 _SAMPLES: Final = np.array([*np.linspace(0.0, 1.0, 9)[:-1], 1.0 - 1e-9])
 _BISECTIONS: Final = 52  # Bisections that exhaust the bits of a float
-_HALVINGS: Final = 12  # Iteration limit of the step halving
+_HALVINGS: Final = 12  # Iteration limit of the step halving; arbitrary
 _HEAT_ERROR: Final = 1e-13  # Relative error at which the heat integral has converged
 
 

@@ -45,13 +45,13 @@ from printhammer.support.arrays import FloatArray, IntArray
 if TYPE_CHECKING:
     from printhammer.kernel.compile.lanes import LaneKinds
 
-_NODES: Final = 2048
-_CONTACTS: Final = 256
+_NODES: Final = 2048  # Initial number of rows for nodes; arbitrary, enlarged on demand
+_CONTACTS: Final = 256  # Initial number of rows for contacts; arbitrary, likewise
 MOST_COLUMNS: Final = 6
 _EXTRA: Final = 4
 """Rows for extra contacts of a member, in addition to one per firing, before their number is known;
 arbitrary."""
-_STROBE_WIDTH: Final = 4
+_STROBE_WIDTH: Final = 4  # As in `printhammer.kernel.single.stretch`
 _ELECTRIC_WIDTH: Final = 3
 _PIECE: Final = 4 * lane_layout.LANES
 """Number of members in one unit of work for vector lanes."""

@@ -44,7 +44,7 @@ MAX_STEPS: Final = 50_000_000  # Default largest number of steps of a run
 _NODES: Final = 2048  # Rows of nodes in the smallest working space
 _CONTACTS: Final = 256  # Rows of contacts in the smallest working space
 _NODES_A_FLIGHT: Final = 40  # Rows of nodes per flight in the initial guess of the memory
-_MOST_FLIGHTS: Final = 1e6  # Largest number of flights of that guess
+_MOST_FLIGHTS: Final = 1e6  # Largest number of flights of that guess; arbitrary
 
 
 def live_size(firings: int) -> int:

@@ -24,7 +24,7 @@ from printhammer.run.problem import Problem, scales_of
 from printhammer.run.supply import waveforms_of
 
 TOLERANCE: Final = 5e-7  # Tolerance of the single pulse, whose outcome is only compared with thresholds
-MOST_STEPS: Final = 500_000  # Largest number of steps of a single pulse
+MOST_STEPS: Final = 500_000  # Largest number of steps of a single pulse; arbitrary
 _MOST_KEPT: Final = 512  # Number of cached windows at which the cache is emptied
 
 _FLIGHT: Final = 0.28e-3  # Flight time of the paper's hammer, for which default rates and times are stated, s

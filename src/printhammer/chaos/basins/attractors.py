@@ -37,7 +37,7 @@ INSIDE: Final = 0.95
 """Fraction of a train's points that have to lie within reach of a strange attractor for a match."""
 
 ATTEMPTS: Final = 12
-"""Maximum number of aperiodic trains followed in the search for strange attractors."""
+"""Maximum number of aperiodic trains followed in the search for strange attractors; arbitrary."""
 
 POLISHED: Final = 12
 """Maximum number of unsettled trains per batch whose orbits are located by Newton's method."""

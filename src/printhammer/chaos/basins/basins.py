@@ -183,7 +183,7 @@ Range = tuple[float | str, float | str, SupportsIndex]
 
 
 _ROWS: Final = 12
-"""Maximum number of attractors listed in a summary."""
+"""Maximum number of attractors listed in a summary; arbitrary."""
 
 
 class Basins(Result, rows="v x"):

@@ -39,7 +39,7 @@ SERIES: Final = (2, 4, 8)
 """Orbit periods, in firings, of successive windows that count as a series of period doublings."""
 
 MOST_UNDECIDED: Final = 32
-"""Maximum number of undecided aperiodic trains on a route before the search for chaos stops."""
+"""Maximum number of undecided aperiodic trains on a route before the search for chaos stops; arbitrary."""
 
 
 class Window(Declared):

@@ -47,7 +47,7 @@ Kind = Literal["fold", "period doubling", "Neimark-Sacker", Crossing, "change", 
 BIRTH: Final = "period doubling"
 """Reason for stopping where a branch of even period ends in the period doubling that creates it."""
 
-_ROUNDS: Final = 60  # Iteration limit of bisections and root searches
+_ROUNDS: Final = 60  # Iteration limit of bisections and root searches; arbitrary
 _SHARE: Final = 1e-13
 """Accuracy to which a special point is located, as a fraction of a continuation step."""
 _REAL: Final = 1e-9  # Imaginary part above which a multiplier is complex

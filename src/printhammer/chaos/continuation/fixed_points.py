@@ -19,7 +19,7 @@ from printhammer.errors import InputError
 from printhammer.results import Declared, part
 from printhammer.support.arrays import FloatArray
 
-_MOST_CORRECTIONS: Final = 12  # Iteration limit of Newton's method
+_MOST_CORRECTIONS: Final = 12  # Iteration limit of Newton's method; arbitrary
 _STAGNANT: Final = 1e3
 """Multiple of the precision below which a correction that no longer shrinks counts as converged."""
 

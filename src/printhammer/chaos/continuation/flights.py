@@ -31,7 +31,7 @@ _CLOSE: Final = 0.01
 """Time before and after a touch during which the surface is removed, as a fraction of the period."""
 _STILL: Final = 1e-9  # Speed, relative to the typical one, below which an orbit turns at its section
 _SPACING: Final = 1e-6  # Finite-difference step of Newton's method, in scaled variables
-_ROUNDS: Final = 20  # Iteration limit of Newton's method
+_ROUNDS: Final = 20  # Iteration limit of Newton's method; arbitrary
 _PRECISION: Final = 1e-12  # Scaled correction below which Newton's method has converged
 _STAGNANT: Final = 1e3  # Multiple of the precision below which stagnation counts as convergence
 _SLOWER: Final = (0.98, 0.9, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.02, 0.005)

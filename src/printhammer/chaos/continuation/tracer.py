@@ -42,7 +42,7 @@ _AT_GRAZING: Final = "it grazes the rigid backstop, where the strobe map has no 
 _SHORTER: Final = 1e-6
 """Scaled closing error after a fraction of the firings, below which an orbit has the shorter period."""
 _DIGITS: Final = ".9g"
-_MOST_SECTIONS: Final = 8  # Maximum number of segments of a branch at different sections
+_MOST_SECTIONS: Final = 8  # Maximum number of segments of a branch at different sections; arbitrary
 _SAME_PHASE: Final = 1e-3
 """Difference of two section phases, as a fraction of the period, below which they are the same."""
 _CLEAR: Final = 1e-3

@@ -44,7 +44,7 @@ _LEVEL: Final = 1e-3
 """Component of a unit tangent along a parameter below which a curve is stationary in this parameter."""
 _VANISHES: Final = 0.1
 """Tangent component at a cusp, relative to the components at neighbouring nodes, that counts as zero."""
-_ROUNDS: Final = 20  # Iteration limit of Newton's method
+_ROUNDS: Final = 20  # Iteration limit of Newton's method; arbitrary
 _MOVE: Final = 1e-6  # Finite-difference step of Newton's method, in scaled variables
 _PRECISION: Final = 1e-11  # Scaled residual below which Newton's method has converged
 _NOISE: Final = 1e-8  # Magnitude below which a test function or a tangent component is noise

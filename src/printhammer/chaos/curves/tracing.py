@@ -51,7 +51,7 @@ _SLOW: Final = 0.05
 _FAR: Final = 0.02
 """Distance in the scaled plane within which a point of codimension two is the end of a curve."""
 _TURNS: Final = 8
-"""Maximum number of section changes along a curve."""
+"""Maximum number of section changes along a curve; arbitrary."""
 
 System = MultiplierSystem | ImpactSystem | GrazingSystem
 

@@ -28,7 +28,7 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray
 
 MOST: Final = 50_000
-"""Largest number of states for the correlation dimension."""
+"""Largest number of states for the correlation dimension; arbitrary."""
 FEWEST: Final = 200
 """Smallest number of states for the correlation dimension."""
 THEILER: Final = 10  # Default of the Theiler window, in steps

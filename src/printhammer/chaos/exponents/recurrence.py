@@ -23,7 +23,7 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 MOST: Final = 4096
-"""Largest number of states of a recurrence plot, whose matrix then has 16 million points."""
+"""Largest number of states of a recurrence plot, whose matrix then has 16 million points; arbitrary."""
 
 RATE: Final = 0.05
 """Default recurrence rate, used if neither a threshold nor a rate is given."""

@@ -64,7 +64,7 @@ FOLLOWS: Final = 0.7
 _CUT: Final = 10  # Ratio of the series length to the largest lag of the displacement (Gottwald and Melbourne)
 _PASSES: Final = 4  # Smallest number of cycles in a series for a cycle to be considered
 _TOGETHER: Final = 1 << 20
-"""Number of complex numbers processed in one batch."""
+"""Number of complex numbers processed in one batch; arbitrary."""
 
 
 class ZeroOne(Result):

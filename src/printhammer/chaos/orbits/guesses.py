@@ -31,7 +31,7 @@ _ALIKE: Final = 0.02
 _EARLY_ALIKE: Final = 0.1
 """Distance, in half-widths, below which two guesses from the first firings of motions are duplicates."""
 _LOOKED_AT: Final = 4000
-"""Maximum number of close returns, closest first, that are tested for duplicates."""
+"""Maximum number of close returns, closest first, that are tested for duplicates; arbitrary."""
 _EARLY: Final = 2
 """Number of first firings of a motion whose close returns count as early."""
 _LEAST: Final = 16

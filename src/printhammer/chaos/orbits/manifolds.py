@@ -50,7 +50,7 @@ _TIGHT: Final = 1e-12
 _SETTLED: Final = 0.1
 """Extent of an image of a fundamental segment, relative to the spacing, below which a sink is sought."""
 _CLOSE: Final = 1e-10  # Relative residual at which Newton's method has converged
-_NEWTON: Final = 8  # Iteration limit of Newton's method
+_NEWTON: Final = 8  # Iteration limit of Newton's method; arbitrary
 _FEW: Final = 4  # Number of points from which the prediction is a cubic
 
 

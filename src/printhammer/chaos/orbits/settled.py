@@ -42,7 +42,7 @@ NEAR: Final = 0.1
 _SHRINKS: Final = 1e-5
 _NOISE: Final = 1e-9
 """Smallest decreases of a distance that count as shrinking: relative, and absolute in half-widths."""
-_ITERATIONS: Final = 20  # Iteration limit of Newton's method
+_ITERATIONS: Final = 20  # Iteration limit of Newton's method; arbitrary
 
 NO_ORBIT: Final = "Newton's method finds no stable orbit of {} there that the states approach"
 

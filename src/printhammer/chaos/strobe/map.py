@@ -56,7 +56,7 @@ _OK: Final = "ok"
 RANGE_LEFT: Final = "range left"
 """Status of an image if no motion can start with the displacement, e.g. behind a rigid backstop."""
 
-_TURN_STEPS: Final = 60  # Iteration limit of the root search for an extremum
+_TURN_STEPS: Final = 60  # Iteration limit of the root search for an extremum; arbitrary
 _STILL: Final = 1e-9
 """Speed, relative to the scale, at which an extremum is located: its displacement error is quadratic."""
 STILL_COIL: Final = 1e-9

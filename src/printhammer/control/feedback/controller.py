@@ -66,7 +66,7 @@ _FADED: Final = 3.0  # Time for a current to decay, in time constants of the dri
 _RELAXED: Final = 0.2
 _CLEAR: Final = 0.22  # Fraction of a launch's flight time after which the armature is off the backstop
 _PATIENCE: Final = 40e-6  # Time between the end of a contact and a throw that is decided again, s
-_POLICIES: Final = 8  # Size of the policy cache
+_POLICIES: Final = 8  # Size of the policy cache; arbitrary
 
 
 class Ahead(NamedTuple):

@@ -65,7 +65,7 @@ SPACING: Final = 0.6
 """Default time between the nodes of the current, as a fraction of the time in which a single pulse indents
 the pack; rounded to a whole fraction of the period."""
 
-MOST_DOTS: Final = 1000  # Largest number of dots in a burst
+MOST_DOTS: Final = 1000  # Largest number of dots in a burst; arbitrary
 Least = Literal["positive work", "heat"]
 # Objective: the positive work of the coil, or its heat, which is proportional to the squared current
 LEASTS: Final = get_args(Least)

@@ -33,8 +33,8 @@ from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.support.arrays import FloatArray, IntArray
 
 REST: Final = 0  # Gap of a dot printed from rest
-MOST_GAPS: Final = 4  # Largest number of gaps in a history
-MOST_REACH: Final = 8  # Largest reach, slots
+MOST_GAPS: Final = 4  # Largest number of gaps in a history; arbitrary
+MOST_REACH: Final = 8  # Largest reach, slots; arbitrary
 History = tuple[int, ...]
 
 

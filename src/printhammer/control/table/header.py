@@ -30,7 +30,7 @@ NANOSECOND: Final = 1e-9
 """Default unit of the times in a header, s."""
 
 _PLACE_BYTES: Final = 4
-"""Size of a rate or an axis value in a header, bytes."""
+"""Size of a rate or an axis value in a header, bytes (a 32-bit integer)."""
 
 _ADVANCE, _, _DELAY, _BRAKE = range(len(COLUMNS))
 

@@ -36,7 +36,7 @@ SHADES: Final = {
 WAYS: Final = {"from rest": style.INK, "up": style.ORANGE, "down": "#7b3fa0"}
 """Colours of points that occur in one direction of the parameter only; distinct from the band colours."""
 
-_POINT: Final = 0.7  # Size of a point, points
+_POINT: Final = 0.7  # Size of a point, points; arbitrary
 _MOST: Final = 3_000_000
 """Number of points above which the points are drawn smaller; arbitrary."""
 _SPARSE: Final = 150

@@ -40,7 +40,7 @@ _MARKS: Final = (("o", style.BLUE), ("s", style.ORANGE), ("^", style.GREEN), ("D
 _LONGER: Final = ("x", style.MUTED)
 _TRACES: Final = 4  # Orbits drawn against time; arbitrary
 _ROOM: Final = 0.07  # Margin around the points, as a fraction of their range; arbitrary
-_SIZE: Final = 5.0  # Size of a mark, points
+_SIZE: Final = 5.0  # Size of a mark, points; arbitrary
 _LINES: Final = ("-", "--", "-.", ":")
 
 

@@ -39,14 +39,14 @@ if TYPE_CHECKING:
 _FEW: Final = 20
 """Smallest number of points for which an inset is drawn; arbitrary."""
 _CYCLE: Final = 8
-"""Largest period, in firings, whose points are marked by rings."""
+"""Largest period, in firings, whose points are marked by rings; arbitrary."""
 
 _SMALL: Final = 0.04
 """Area of an aperiodic attractor, relative to the window, below which an inset enlarges it; arbitrary."""
 # Lower left corners of an inset, fractions of the axes, best first
 _PLACES: Final = ((0.55, 0.36), (0.06, 0.36), (0.06, 0.06), (0.55, 0.06))
 _INSET: Final = (0.38, 0.42)
-"""Width and height of an inset, as fractions of the axes."""
+"""Width and height of an inset, as fractions of the axes; arbitrary."""
 
 RING: Final[dict[str, Any]] = {
     "ls": "none",

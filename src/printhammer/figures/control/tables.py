@@ -148,11 +148,11 @@ def _histogram(ax: Axes, values: FloatArray, limit: float, name: str) -> None:
 
 
 _FIRST: Final = LEAD_IN + 128  # First slot drawn: from here on dots and gaps are mixed
-_SLOTS: Final = 88  # Number of slots drawn
-_HEIGHT: Final = 0.42  # Height of a line, inches
-_SIZE: Final = 20.0  # Area of a dot of nominal force
-_CONTRAST: Final = 4.0  # Exaggeration of the force in the area of a dot
-_SMALLEST: Final = 0.1  # Smallest area, as a fraction of that of nominal force
+_SLOTS: Final = 88  # Number of slots drawn; arbitrary
+_HEIGHT: Final = 0.42  # Height of a line, inches; arbitrary
+_SIZE: Final = 20.0  # Area of a dot of nominal force; arbitrary
+_CONTRAST: Final = 4.0  # Exaggeration of the force in the area of a dot; arbitrary
+_SMALLEST: Final = 0.1  # Smallest area, as a fraction of that of nominal force; arbitrary
 
 
 @styled

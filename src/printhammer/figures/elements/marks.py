@@ -90,7 +90,7 @@ ALONG_Y: Final = ("axes fraction", "data")
 """Coordinates of annotations: x as a fraction of the axes, y in data units; `ALONG_X` is the reverse."""
 
 _LINE_NAME: Final = (0.095, 0.06)
-"""Width and height of a name on a horizontal line, as fractions of the axes."""
+"""Width and height of a name on a horizontal line, as fractions of the axes; arbitrary."""
 
 _BELOW: Final = 30.0
 """Distance from a panel to a legend below its tick labels and axis label, in points."""

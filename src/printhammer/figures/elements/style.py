@@ -40,8 +40,8 @@ SURFACES: Final = {"backstop": "#8a8a8a", "pack": YELLOW}
 WIDTH: Final = 6.4
 """Default width of a figure, in inches."""
 
-TEXT, SMALL, TINY = 9.0, 8.0, 6.5  # Font sizes, points
-LINE, THIN, HAIR = 1.4, 0.9, 0.6  # Line widths, points
+TEXT, SMALL, TINY = 9.0, 8.0, 6.5  # Font sizes, points; arbitrary
+LINE, THIN, HAIR = 1.4, 0.9, 0.6  # Line widths, points; arbitrary
 _LINE_OF_REMARK: Final = 112  # Number of characters in a line of a remark
 
 RC: Final[dict[str, Any]] = {

@@ -98,9 +98,9 @@ def rigid_remark(motion: Motion) -> str:
 
 
 _INSERTS: Final = ((0.52, 0.46), (0.44, 0.4), (0.36, 0.32), (0.3, 0.26))
-"""Widths and heights tried for the inset, largest first, as fractions of the axes."""
+"""Widths and heights tried for the inset, largest first, as fractions of the axes; arbitrary."""
 
-_NOTE: Final = (0.4, 0.09)  # Width and height of the note on loops, fractions of the axes
+_NOTE: Final = (0.4, 0.09)  # Width and height of the note on loops, fractions of the axes; arbitrary
 
 
 @styled

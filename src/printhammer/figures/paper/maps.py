@@ -78,7 +78,7 @@ _ACROSS: Final = 0.80
 _TALL: Final = 0.22
 """Height of a curve from the lowest to the highest position, in units of the picture width."""
 
-_TICK: Final = 0.008  # Length of a tick, in units of the picture width
+_TICK: Final = 0.008  # Length of a tick, in units of the picture width; arbitrary
 
 _SHEETS: Final = 2.0
 """Common z-order of curves and the sheets below them, so that they are drawn in order of creation."""

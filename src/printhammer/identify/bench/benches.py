@@ -72,7 +72,7 @@ _RUN_UP: Final = 10e-6
 """Initial distance of the armature from the backstop, m; arbitrary, since no force acts on the way."""
 
 _LONGEST: Final = 30
-"""Maximum number of doublings of the simulation time for a rebound."""
+"""Maximum number of doublings of the simulation time for a rebound; arbitrary."""
 
 _LEAST: Final = 1e-6
 """Smallest coefficient of restitution considered in the search for a rebound."""

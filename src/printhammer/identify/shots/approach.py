@@ -23,7 +23,7 @@ _NARROW: Final = 0.001
 _RISE: Final = 0.3  # Factor on the width of the penalty after a successful step
 _LONGEST: Final = 0.3
 """Largest change per step: relative for a constant, normalised by stroke and typical speed for a state."""
-_HALVINGS: Final = 6  # Iteration limit of the step halving
+_HALVINGS: Final = 6  # Iteration limit of the step halving; arbitrary
 _TRIES: Final = 2
 """Number of Gauss-Newton steps for each value of the gap penalty."""
 

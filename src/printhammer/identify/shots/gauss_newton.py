@@ -120,7 +120,7 @@ def changes_if_fitted(
     return further
 
 
-_MOST_STEPS: Final = 40  # Iteration limit of the Gauss-Newton method
+_MOST_STEPS: Final = 40  # Iteration limit of the Gauss-Newton method; arbitrary
 _FULL: Final = 0.4
 """Largest relative change of a constant in one Gauss-Newton step."""
 _SHORTEST: Final = 1e-3  # Smallest step fraction of the damping

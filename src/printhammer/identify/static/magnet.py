@@ -151,7 +151,7 @@ _SPARE: Final = 4
 """Smallest number of rows in excess of parameters for which errors and tests are computed; arbitrary."""
 
 _LEVELS: Final = 12
-"""Largest number of distinct currents plotted as separate series."""
+"""Largest number of distinct currents plotted as separate series; arbitrary."""
 
 _COMBINED: Final = "magnet.F0 + spring.Bs (1 + b / spring.As)"
 _SLOPE: Final = "spring.Bs / spring.As"

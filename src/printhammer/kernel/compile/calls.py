@@ -25,6 +25,7 @@ array."""
 _ELEMENTS: Final = {"f": (np.float64, 8), "s": (np.float32, 4), "i": (np.int64, 8)}
 _NUMBERS: Final = {"i": ("q", "i64"), "f": ("d", "double"), "b": ("?7x", "i8")}
 _SLOT: Final = 8
+"""Size of a slot of the argument block, bytes."""
 
 # Byte offsets of fields in array objects and dtype descriptors, fixed by the binary interface of NumPy.
 _DATA, _DIMENSIONS, _SHAPE, _STRIDES, _DESCRIPTION, _FLAGS = 16, 24, 32, 40, 56, 64

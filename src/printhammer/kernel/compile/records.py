@@ -45,6 +45,7 @@ _LOWERING: Final = 4.0
 _CIRCUIT: Final = 2.0
 
 _ANOTHER: Final = 5.0
+"""Compile time assumed for an entry point that is not in `_USUAL`, s; arbitrary."""
 
 
 def maker() -> dict[str, str]:

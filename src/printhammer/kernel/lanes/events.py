@@ -36,9 +36,11 @@ MODE_OF = (M.FREE, M.LOADING, M.UNLOADING, M.BACKSTOP)
 """Mode of all members of a pool, indexed by pool."""
 
 STAYS = -1
+"""Code returned in place of a pool: the member stays in its lane."""
 LEAVES = -2
 """Code returned in place of a pool: the member leaves the lanes, and the scalar kernel repeats its run."""
 DONE = -3
+"""Code returned in place of a pool: the run of the member is complete."""
 
 
 @inlined

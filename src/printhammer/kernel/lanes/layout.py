@@ -36,6 +36,7 @@ PACK = 9
 BACKSTOP_PART = 15
 MAGNET = 21
 CONSTANTS = 27
+"""Number of constants of a hammer in lanes."""
 PLACES = {
     "damping": (DAMPING, 2),
     "spring": (SPRING, 4),
@@ -50,6 +51,7 @@ PLACES = {
 # exponentials and angular frequency of the sine.
 DRIVE_WIDTH = 9
 RATES_WIDTH = 3
+"""Number of rows of the waveform."""
 
 # Codes of the pools, one per mode.
 FREE_POOL = 0
@@ -57,6 +59,7 @@ LOADING_POOL = 1
 UNLOADING_POOL = 2
 CONTACT_POOL = 3
 POOLS = 4
+"""Number of pools."""
 
 # Rows of a block.
 T = 0
@@ -79,6 +82,7 @@ STEPS = 10
 LANDING = 11
 """Row of the code of the switching event at which the current step should end; 0 for none."""
 DRIVE = 12
+"""First row of the drive."""
 EXPONENTIAL_DRIVE = DRIVE + 4
 """Number of rows to copy when a member whose drive has exponentials only moves to another pool."""
 ANY_DRIVE = DRIVE + DRIVE_WIDTH
@@ -136,11 +140,14 @@ EVENTS = 14
 EXTRA = 15
 """Column of the number of extra contacts up to the present time."""
 SLOT_WIDTH = 16
+"""Number of columns of a slot."""
 
 # Bit flags of the events of a lane, to be added.
 SWITCH = 1.0
 """Event flag: the step may contain a switching event and has not been accepted."""
 SAMPLED = 2.0
+"""Event flag: a sample or strobe lies in the step."""
 AT_EDGE = 4.0
+"""Event flag: the step ends at an edge of the drive or at the end of the run."""
 STUCK = 8.0
 """Event flag: the step is too short or not finite, or the step limit or a bound is reached."""

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     State = tuple[float, float, float, float]
 
 PHASE_LIMIT = 2.0
+"""Largest phase advance [rad] of the contact oscillation in one step, as in the scalar kernel."""
 
 
 @inlined

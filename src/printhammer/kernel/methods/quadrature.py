@@ -66,6 +66,7 @@ WEIGHTS = (
     0.31370664587788727,
     0.362683783378362,
 )
+"""Positive points and their weights of the eight-point Gauss-Legendre quadrature."""
 
 
 @compiled

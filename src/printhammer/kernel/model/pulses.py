@@ -25,6 +25,7 @@ Drive = Any
 """Array ``live`` of the active pieces; with a coil circuit, the tuple of ``live`` and the electric state."""
 
 LIVE_WIDTH = 7
+"""Number of elements of an active piece in ``live``: firing time and the row of the piece."""
 
 
 @inlined

@@ -10,6 +10,7 @@ import numpy as np
 GAP = 65535
 """Code of a cell without a displacement; codes of known displacements are 0 to 65534."""
 _STEEPEST = 1e38
+"""Largest number of codes per metre; close to the largest float32, so that the product stays finite."""
 
 
 def write_rates(low: float, high: float, rates: Any) -> None:

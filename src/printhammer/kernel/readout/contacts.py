@@ -26,6 +26,7 @@ the pack contacts of its firing (-1 for a contact of no firing), and 1 if open a
 BEGIN, END = range(12, 14)
 """Columns of the first step within the contact and the step after the last."""
 CONTACT_WIDTH = 14
+"""Number of columns of a contact."""
 
 FIRED_AT, STRUCK, FLIGHT_TIME, IMPACT_SPEED, PEAK_FORCE, INDENTATION = range(6)
 """Columns of a dot: time of the firing [s], 1 if it made a dot, flight time [s], speed at touch [m/s],
@@ -34,6 +35,7 @@ CONTACT_TIME, LOADING_WORK, NET_LOSS, EXTRA_CONTACTS = range(6, 10)
 """Columns of the contact time [s] (NaN while open), the work up to the largest indentation [J], the energy
 dissipated in the pack [J], and the number of extra contacts."""
 DOT_WIDTH = 10
+"""Number of columns of a dot."""
 
 
 def nodes_before(t: float, nodes: Any, included: bool) -> int:

@@ -11,6 +11,7 @@ across the coil [V] (0 without a circuit)."""
 MAGNET, SPRING, PACK, BACKSTOP, DAMPING, DRAG, DRIVE, TOTAL = range(4, 12)
 """Rows of the forces [N] named in `printhammer.run.motion.FORCES`."""
 CURVES = 12
+"""Number of rows of the curves."""
 
 
 def write_times(nodes: Any, fewest: int, most: int, out: Any) -> int:

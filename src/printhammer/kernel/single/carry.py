@@ -56,6 +56,7 @@ USED = 30
 TOUCHED = 31
 """Indices of the numbers of nodes and contacts that the present call has recorded."""
 SIZE = 32
+"""Length of the state array of a run."""
 
 SHORTEST_WAIT = 0.005
 """Shortest interval between checks of an armature at rest, in characteristic times; arbitrary."""
@@ -63,6 +64,7 @@ SHORTEST_WAIT = 0.005
 FRESH = 0.0
 GOES_ON = 1.0
 ON_BRANCH = 2.0
+"""Values of `STATE`: new run, run that continues after a pause, new run on a branch inside the pack."""
 
 
 class Setup(NamedTuple):

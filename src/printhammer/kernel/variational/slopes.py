@@ -52,6 +52,7 @@ SPEED_SPACING = 1e-3
 """Step size of the velocity, as a fraction of the velocity scale."""
 
 BACKWARD, CENTRAL, FORWARD = 0, 1, 2
+"""Rows of the five-point formulas in `OFFSETS` and `WEIGHTS`."""
 OFFSETS = np.array([[0.0, -1.0, -2.0, -3.0, -4.0], [-2.0, -1.0, 1.0, 2.0, 0.0], [0.0, 1.0, 2.0, 3.0, 4.0]])
 WEIGHTS = (
     np.array([[25.0, -48.0, 36.0, -16.0, 3.0], [1.0, -8.0, 8.0, -1.0, 0.0], [-25.0, 48.0, -36.0, 16.0, -3.0]])

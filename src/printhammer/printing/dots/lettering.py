@@ -139,7 +139,7 @@ def _characters(path: Path) -> frozenset[int]:
 
 COLUMNS: Final = 40  # Default number of characters in a print line
 
-_NAMED: Final = 8  # Largest number of missing characters named in a message
+_NAMED: Final = 8  # Largest number of missing characters named in a message; arbitrary
 
 
 def broken(text: str, columns: int = COLUMNS) -> list[str]:

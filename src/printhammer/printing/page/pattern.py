@@ -182,9 +182,9 @@ def write_pattern(path: str | Path, name: str, dots: BoolArray) -> None:
 
 MOST_WIRES: Final = 1000
 MOST_CELLS: Final = 50_000_000
-"""Largest number of wires of a head, and of cells of a pattern."""
+"""Largest number of wires of a head, and of cells of a pattern; arbitrary."""
 
-_TITLE: Final = 60  # Largest length of a title in a picture
+_TITLE: Final = 60  # Largest length of a title in a picture; arbitrary
 
 
 class Pattern(Declared):

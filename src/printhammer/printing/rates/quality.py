@@ -51,7 +51,7 @@ PITCH: Final = 25.4e-3 / 60.0  # Default distance between neighbouring slots on 
 
 _SPREADS: Final = {"flight_time": "s", "force": "N", "indentation": "m", "arrival": "s", "placement": "m"}
 
-MOST_SLOTS: Final = 20_000  # Largest number of slots in a pattern
+MOST_SLOTS: Final = 20_000  # Largest number of slots in a pattern; arbitrary
 
 
 class Spread(Declared):

@@ -54,12 +54,12 @@ LAST: Final = 4000.0  # Last rate of that grid, Hz
 
 STEP: Final = 5.0  # Step of that grid, Hz
 
-MOST_RATES: Final = 10_000  # Largest number of rates in a grid
+MOST_RATES: Final = 10_000  # Largest number of rates in a grid; arbitrary
 
 _AT_FIRST: Final = 2  # Number of rates in the first ensemble, doubled from one to the next; arbitrary
 _FEW: Final = 3  # Number of slots of the patterns that are simulated first
-_AT_ONCE: Final = 16  # Largest number of rates per ensemble
-_HAMMERS_AT_ONCE: Final = 32  # Number of hammers per ensemble
+_AT_ONCE: Final = 16  # Largest number of rates per ensemble; arbitrary
+_HAMMERS_AT_ONCE: Final = 32  # Number of hammers per ensemble; arbitrary
 
 
 class Failure(Declared):

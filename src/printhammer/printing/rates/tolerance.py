@@ -32,7 +32,7 @@ SPREAD: Final = 0.01  # Default relative spread of a constant, to either side; a
 
 STEP: Final = 25.0  # Default step of the rate grid, Hz: coarser than for a single safe rate
 
-MOST: Final = 100_000  # Largest number of hammers in a yield
+MOST: Final = 100_000  # Largest number of hammers in a yield; arbitrary
 
 Judged = Literal["own", "design"]
 GAP: Final = "pack.front"

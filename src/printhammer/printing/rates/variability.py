@@ -148,7 +148,7 @@ CONSTANTS: Final = {
 }
 """Constants that each standard deviation applies to: the first of the groups that the hammer has."""
 
-_TRIES: Final = 10  # Maximum number of batches drawn, each of the requested size
+_TRIES: Final = 10  # Maximum number of batches drawn, each of the requested size; arbitrary
 WIDEST: Final = 3.0
 """Largest deviation of a drawn constant, in standard deviations; larger draws are clipped; arbitrary."""
 
