@@ -150,8 +150,8 @@ function burst(pen, width, height, { dots, quality }, motion, studio, explained)
   pen.restore();
 }
 
-/** Draw a printed text: where dots are wanted, and how they came out. */
-function printed(pen, width, height, frame) {
+/** Draw a printed text: where dots are wanted, how they came out, and unless it is drawn alone how many. */
+export function printed(pen, width, height, frame, alone = false) {
   const c = colours();
   if (frame.reason) { refusal(pen, width, height, frame.reason); return; }
   pen.save();
@@ -165,7 +165,7 @@ function printed(pen, width, height, frame) {
   ];
   // On one line where they fit, so that the text is as large as it can be.
   const joined = words.join("; ");
-  const lines = pen.measureText(joined).width < width - 16 ? [joined] : words.flatMap((each) => broken(pen, each, width - 16));
+  const lines = alone ? [] : pen.measureText(joined).width < width - 16 ? [joined] : words.flatMap((each) => broken(pen, each, width - 16));
   const room = height - 14 * lines.length - 10;
   const [left, right] = extent(data["wanted x"]);
   const [top, bottom] = extent(data["wanted y"]);

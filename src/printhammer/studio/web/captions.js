@@ -1,7 +1,7 @@
 // What a view tells, in a sentence: read below its title, and by those who do not see the picture.
 import { strobeText } from "./planes.js";
 import { digits, shown } from "./units.js";
-import { large } from "./words.js";
+import { large, moverOf, stopOf } from "./words.js";
 
 const NUMBERS = ["no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve"];
 const ORDINALS = ["first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth", "eleventh", "twelfth"];
@@ -71,8 +71,10 @@ function loopText({ places: { backstop, front }, data: { x } }) {
 }
 
 const TEXTS = {
-  sketch: ({ motion }) => {
+  sketch: ({ motion }, studio) => {
     const { backstop, front } = motion.places;
+    const mover = moverOf(studio.described);
+    if (mover !== "armature") return `The ${mover}${backstop === null ? "" : ` and the ${stopOf(studio.described)}`}, to scale along the way.`;
     const places = [...motion.data["strobe x"]].slice(1);
     if (backstop === null || front === null || !places.length) return "The face of the armature, to scale along its stroke.";
     const away = places.filter((x) => x - backstop > 0.02 * (front - backstop)).length;
@@ -82,7 +84,7 @@ const TEXTS = {
     const { fired } = motion;
     const gap = fired.length > 1 ? `, fired every ${shown(fired[1] - fired[0], "s", 4)}` : "";
     const coil = motion.data.u ? ` The coil takes up to ${shown(motion.peak, "A", 3)} from ${shown(motion.supply, "V", 3)}.` : "";
-    if (!dots) return `The face of the armature against time${gap}.${coil}`;
+    if (!dots) return `The displacement against time${gap}.${coil}`;
     const { quality } = dots;
     const flight = quality.struck ? ` ${flightText(dots.dots)}` : "";
     return `${burstText(dots, motion.places.front === null)}${gap}.${flight}${coil}`;
@@ -144,6 +146,7 @@ export function worded(text, strike = "dot") {
 /** Return what a view tells of the frames that are there; nothing before there are any. */
 export function captionOf(name, studio) {
   const { frames, described } = studio;
+  const text = () => worded(TEXTS[name](frames, studio), described?.strike).replaceAll("backstop", stopOf(described));
   // A number and its unit stay on one line.
-  return frames.motion ? worded(TEXTS[name](frames, studio), described?.strike).replace(/(\d) (?=[%µA-Za-z]{1,3}\b|%)/g, "$1\u00a0") : "";
+  return frames.motion ? text().replace(/(\d) (?=[%µA-Za-z]{1,3}\b|%)/g, "$1\u00a0") : "";
 }

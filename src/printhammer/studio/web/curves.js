@@ -3,9 +3,9 @@ import uPlot from "./vendor/uPlot.js";
 import { axes, before, curve, extent, inside, key, line, MARGIN, ticks, widened } from "./axes.js";
 import { colours, FONT } from "./theme.js";
 import { digits, shown, timeUnit, unitOf } from "./units.js";
+import { has, stopOf } from "./words.js";
 
-const FORCES = ["total", "magnet", "spring", "damping", "backstop", "pack"];
-const DRAG = "drag"; // of a hammer that is damped in flight
+const FORCES = ["total", "drive", "magnet", "spring", "damping", "drag", "backstop", "pack"];
 const SPACE = { 1: 14, 2: 60, 3: 30 }; // pixels between ticks, by side
 const LEAST = 1e-6; // N
 const KEY = 0.2; // of the height, for the key of forces
@@ -22,9 +22,10 @@ export function motionView(body, studio) {
     ],
     scales: (frame) => ({ x: placesRange(frame), ...driveRanges(frame) }),
     under: (pen, plane, box) => {
-      places(pen, plane, box, studio.frames.motion);
+      places(pen, plane, box, studio.frames.motion, stopOf(studio.described));
       ghosts(pen, plane, studio);
     },
+    over: (pen, plane, box) => remarks(pen, plane, box, studio),
   });
 }
 
@@ -32,9 +33,9 @@ export function motionView(body, studio) {
 export function forcesView(body, studio) {
   return curveView(body, studio, {
     label: "Forces against time",
-    series: () => forcesOf(studio.frames.motion).map((name) => ({ name, si: "N", scale: "x", colour: colours()[name], values: (f) => f.data[`F ${name}`], dash: DASHES[name] })),
+    series: () => forcesOf(studio.frames.motion, studio.described).map((name) => ({ name, si: "N", scale: "x", colour: colours()[name], values: (f) => f.data[`F ${name}`], dash: DASHES[name] })),
     scales: (frame) => {
-      const [low, high] = widened(...forcesOf(frame).reduce((ends, name) => extent(frame.data[`F ${name}`], ...ends), [0, 0]));
+      const [low, high] = widened(...forcesOf(frame, studio.described).reduce((ends, name) => extent(frame.data[`F ${name}`], ...ends), [0, 0]));
       // The key lies above the peaks; forces of rounding only are none.
       const span = Math.max(high - low, LEAST);
       return { x: [low, low + (1 + KEY) * span] };
@@ -44,7 +45,12 @@ export function forcesView(body, studio) {
 }
 
 const widthOf = ({ name, thin }) => (thin || name === "total" ? 0.8 : 1.3);
-const forcesOf = (frame) => (frame && `F ${DRAG}` in frame.data ? [...FORCES, DRAG] : FORCES);
+/** Return the forces of the laws that a device has; a rigid stop acts without one. */
+function forcesOf(frame, described) {
+  const stop = described.places.backstop !== null && !described.rigid;
+  const laws = { magnet: has(described, "magnet"), spring: has(described, "spring"), pack: described.places.front !== null, backstop: stop, damping: stop };
+  return FORCES.filter((name) => laws[name] ?? (name === "total" || !frame || `F ${name}` in frame.data));
+}
 
 function quantity(studio) { return studio.frames.motion?.quantity === "force" ? "force" : "current"; }
 
@@ -71,7 +77,7 @@ function within(frame, scale, value) {
   return value >= 1.01 * low - 1e-9 && value <= 1.01 * high;
 }
 
-function places(pen, plane, box, frame) {
+function places(pen, plane, box, frame, stop) {
   const c = colours();
   const { backstop, front, platen } = frame.places;
   pen.save();
@@ -80,7 +86,7 @@ function places(pen, plane, box, frame) {
   pen.fillStyle = c.pack;
   if (front !== null) pen.fillRect(box.x, plane.Y(platen ?? front), box.w, Math.max(plane.Y(front) - plane.Y(platen ?? front), 1));
   pen.globalAlpha = 1;
-  for (const [name, place] of [["backstop", backstop], ["pack", front], ["platen", platen]]) {
+  for (const [name, place] of [[stop, backstop], ["pack", front], ["platen", platen]]) {
     if (place === null) continue;
     pen.strokeStyle = c.muted;
     pen.setLineDash([]);
@@ -119,11 +125,52 @@ function ghosts(pen, plane, studio) {
     pen.strokeStyle = c.ghost;
     pen.lineWidth = 1.2;
     curve(pen, plane, ghost.motion.data.t, ghost.motion.data.x);
+    named(pen, plane, studio.frames.motion, ghost, c);
   }
   if (studio.overlay?.what === "displacement") {
     pen.strokeStyle = c.overlay;
     pen.lineWidth = 1.5;
     curve(pen, plane, studio.overlay.data.t, studio.overlay.data.values);
+  }
+}
+
+/** Write the name of a run that stays behind where it is farthest from the one that is set. */
+function named(pen, plane, frame, { name, motion: { data: { t, x } } }, c) {
+  let [best, most] = [0, -1];
+  const last = frame.data.t.at(-1);
+  for (let k = 0; k < t.length && t[k] <= last; k += 1) {
+    const away = Math.abs(x[k] - displacementAt(frame, t[k]));
+    if (away > most) [best, most] = [k, away];
+  }
+  pen.font = FONT;
+  pen.fillStyle = c.muted;
+  pen.textAlign = "left";
+  pen.textBaseline = "bottom";
+  pen.fillText(name, plane.X(t[best]) + 5, plane.Y(x[best]));
+}
+
+/** Write the remarks of a story, each with a line to its place on the curve. */
+function remarks(pen, plane, box, studio) {
+  const c = colours();
+  const frame = studio.frames.motion;
+  pen.font = FONT;
+  pen.setLineDash([]);
+  pen.lineWidth = 1;
+  pen.textAlign = "left";
+  pen.textBaseline = "middle";
+  for (const [time, text] of studio.remarks?.() ?? []) {
+    const [x, y] = [plane.X(time), plane.Y(displacementAt(frame, time))];
+    const wide = pen.measureText(text).width;
+    const left = x + 18 + wide < box.x + box.w ? x + 16 : x - 16 - wide;
+    const at = Math.min(Math.max(y - 16, box.y + 10), box.y + box.h - 10);
+    pen.strokeStyle = c.ink;
+    line(pen, x, y, left > x ? left - 2 : left + wide + 2, at);
+    pen.globalAlpha = 0.85;
+    pen.fillStyle = c.panel;
+    pen.fillRect(left - 2, at - 8, wide + 4, 16);
+    pen.globalAlpha = 1;
+    pen.fillStyle = c.ink;
+    pen.fillText(text, left, at);
   }
 }
 
@@ -175,7 +222,7 @@ function curveView(body, studio, kind) {
       series: [{ scale: "t" }, ...series.map((entry) => ({ scale: entry.scale, stroke: entry.colour, width: widthOf(entry), dash: entry.dash, points: { show: false } }))],
       hooks: {
         drawAxes: [(u) => { if (studio.frames.motion) scaled(u, kind.under); }],
-        draw: [(u) => { if (studio.frames.motion) scaled(u, (pen, plane, box) => { if (!right) key(pen, box, series); }); }],
+        draw: [(u) => { if (studio.frames.motion) scaled(u, (pen, plane, box) => { if (right) kind.over(pen, plane, box); else key(pen, box, series); }); }],
         setCursor: [(u) => { if (u.cursor.event && u.cursor.left >= 0) studio.setCursor(u.posToVal(u.cursor.left, "t"), holder); }],
         setSelect: [(u) => { if (u.select.width > 4) studio.zoom([u.posToVal(u.select.left, "t"), u.posToVal(u.select.left + u.select.width, "t")]); }],
       },
@@ -234,6 +281,7 @@ function curveView(body, studio, kind) {
       curve(pen, own, t, entry.values(frame));
     }
     key(pen, plane.box, series);
+    if (driven.length) kind.over(pen, plane, plane.box);
     pen.restore();
     pen.setLineDash([]);
   }
@@ -242,7 +290,8 @@ function curveView(body, studio, kind) {
     const frame = studio.frames.motion;
     return frame && { "time [s]": frame.data.t, ...Object.fromEntries(kind.series().map((entry) => [`${entry.name} [${entry.si}]`, entry.values(frame)])) };
   };
-  return { update: (what) => what === "motion" && draw(), draw, cursor, paint, table };
+  // Remarks need the dots, which come after the curves.
+  return { update: (what) => (what === "motion" || (what === "dots" && studio.remarks)) && draw(), draw, cursor, paint, table };
 }
 
 /** Write the scale of the drive on the right, as far as it is met. */

@@ -1,9 +1,11 @@
 // The frequency-time map: colours of displacement, and a cursor that sets the rate.
 import { axes, line, refusal } from "./axes.js";
+import { printed } from "./bars.js";
 import { worded } from "./captions.js";
 import { surface } from "./pen.js";
 import { colours, FONT, SMALL } from "./theme.js";
 import { digits, shown, timeUnit, unitOf } from "./units.js";
+import { prints } from "./words.js";
 
 // Cividis (J. R. Nunez, C. R. Anderton, R. S. Renslow, PLoS ONE 13 (2018) e0199239), every fourth colour.
 const CIVIDIS = "00224e00255400285b002b62002e6a0030700533711235701a386f213b6e273e6e2d416d32436d36466c3b496c3f4c6c434e6c47516c4b546c4f576c535a6d565c6d5a5f6e5e626e61656f656870686a716c6d726f70737273747676767979777d7c78807f788482798885788c8878908b78938e789791779b94769f9775a39a74a79d73aba072afa471b4a76fb8aa6ebcae6cc0b16ac4b468c8b866cdbb63d1bf61d5c25edac65bdec958e2cd54e7d150ebd44bf0d846f5dc41f9e03afee434";
@@ -13,6 +15,7 @@ const GAP = 65535;
 const MARGIN = { left: 54, right: 12, top: 26, bottom: 32 };
 const LOST = [192, 57, 43];
 const MARK = 4; // columns of the mark of a lost dot
+const SLIP = { w: 210, h: 62, away: 26 }; // pixels of the slip of paper, and from the finger to it
 
 const little = (r, g, b) => ((255 << 24) | (b << 16) | (g << 8) | r) >>> 0;
 const borderOf = ({ low, high, front }) => (front === null ? GAP : Math.round(Math.min(Math.max(((front - low) / (high - low)) * (GAP - 1), 1), GAP)));
@@ -67,6 +70,7 @@ export function mapView(body, studio) {
   let colourKey = "";
   let plane = null;
   let lost = { list: [], first: null };
+  let finger = null; // where the map is dragged
 
   function render(frame) {
     const [rows, columns] = frame.data.codes.shape;
@@ -122,7 +126,32 @@ export function mapView(body, studio) {
     pen.strokeStyle = c.muted;
     pen.strokeRect(box.x, box.y, box.w, box.h);
     if (frame.failed) failures(pen, box, c, frame);
+    if (finger) slip(pen, width, c);
     pen.restore();
+  }
+
+  /** A slip of paper at the finger: the text as it is printed at the rate that is dragged to. */
+  function slip(pen, width, c) {
+    const { line: text, rate } = studio.store.state;
+    const frame = studio.frames.line;
+    const word = prints(studio.described) && text.trim() && frame && !frame.reason ? frame : null;
+    const [w, h] = [Math.min(SLIP.w, width - 8), word ? SLIP.h : 20];
+    const x = Math.min(Math.max(finger.x - w / 2, 4), width - w - 4);
+    const y = finger.y - SLIP.away - h > 0 ? finger.y - SLIP.away - h : finger.y + SLIP.away;
+    pen.fillStyle = c.panel;
+    pen.strokeStyle = c.ink;
+    pen.lineWidth = 1;
+    pen.fillRect(x, y, w, h);
+    pen.strokeRect(x, y, w, h);
+    pen.save();
+    pen.translate(x, y);
+    if (word) printed(pen, w, h - 12, word, true);
+    pen.restore();
+    pen.font = SMALL;
+    pen.fillStyle = c.ink;
+    pen.textAlign = "center";
+    pen.textBaseline = "bottom";
+    pen.fillText(word ? `${shown(rate, "Hz")}: ${word.good} of ${word.wanted} dots good` : shown(rate, "Hz"), x + w / 2, y + h - 3);
   }
 
   /** The scale of colours above the map: backstop, front of the pack and platen, or what there is. */
@@ -189,6 +218,7 @@ export function mapView(body, studio) {
   const choose = (event) => {
     if (!plane) return;
     const bounds = canvas.getBoundingClientRect();
+    finger = { x: event.clientX - bounds.left, y: event.clientY - bounds.top };
     const rate = plane.y(Math.min(Math.max(event.clientY - bounds.top, plane.box.y), plane.box.y + plane.box.h));
     studio.store.set({ rate: Number(rate.toPrecision(5)) }, "rate");
   };
@@ -197,6 +227,7 @@ export function mapView(body, studio) {
     if (event.buttons & 1) choose(event);
     read(event);
   });
+  for (const kind of ["pointerup", "pointercancel"]) canvas.addEventListener(kind, () => { finger = null; area.draw(); });
   canvas.addEventListener("pointerleave", () => { tip.textContent = ""; });
   canvas.addEventListener("keydown", (event) => {
     const step = { ArrowUp: 1, ArrowDown: -1, PageUp: 10, PageDown: -10 }[event.key];
@@ -245,6 +276,7 @@ export function mapView(body, studio) {
     update: (what) => {
       if (what === "map" && !studio.frames.map.reason) render(studio.frames.map);
       // Of the state only the rate is seen here; the map itself follows.
+      if (what === "line" && finger) area.draw();
       if (what === "map" || (what === "state" && studio.store.state.rate !== told)) refresh();
     },
     draw: () => { if (studio.frames.map && !studio.frames.map.reason) render(studio.frames.map); refresh(); },

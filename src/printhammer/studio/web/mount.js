@@ -28,9 +28,11 @@ const QUICK = ["motion", "forces", "phase"];
  */
 export function mount(element, send, address = { read: () => "", write: () => {}, address: () => "" }) {
   const studio = {
-    element, store: new Store({ ...START }), frames: {}, buffers: {}, ghosts: [], overlay: null, cursor: 0, cursorFrom: null, window: null,
+    element, store: new Store({ ...START }), frames: {}, buffers: {}, pinned: [], companion: null, remarks: null, overlay: null, cursor: 0, cursorFrom: null, window: null,
     described: null, offered: [], limits: {}, shapes: {}, drivers: [], decays: [], views: {}, serial: Math.floor(Math.random() * 2 ** 40), sentAt: new Map(), busy: false, stale: false,
   };
+  // Runs that stay behind the one that is set: those that are pinned, and that of a story.
+  Object.defineProperty(studio, "ghosts", { get: () => [...studio.pinned, ...(studio.companion ? [studio.companion] : [])] });
   let follow = () => {};
   let writing = 0;
   let begun = false;

@@ -68,7 +68,7 @@ export function pinRow(studio) {
     }
     if (pinsOf() !== pins) return;
     for (const key of [...motions.keys()]) if (!pins.some((pin) => keyOf(pin) === key)) motions.delete(key);
-    studio.ghosts = pins.map((pin) => ({ ...pin, motion: motions.get(keyOf(pin)) })).filter((ghost) => ghost.motion);
+    studio.pinned = pins.map((pin) => ({ ...pin, motion: motions.get(keyOf(pin)) })).filter((ghost) => ghost.motion);
     redraw();
     tell();
   }

@@ -20,7 +20,7 @@ const TEXTS = {
   forces: ({ motion }, time, _studio, wide) => {
     const unit = unitOf("N");
     const number = (force) => Number((force * unit.factor).toPrecision(3));
-    const parts = ["magnet", "spring", "pack", "backstop", "damping", "drag"].filter((name) => `F ${name}` in motion.data).map((name) => [name, small(valueAt(motion, motion.data[`F ${name}`], time), 100)]).filter(([, force]) => force).sort((one, other) => Math.abs(other[1]) - Math.abs(one[1]));
+    const parts = ["drive", "magnet", "spring", "pack", "backstop", "damping", "drag"].filter((name) => `F ${name}` in motion.data).map((name) => [name, small(valueAt(motion, motion.data[`F ${name}`], time), 100)]).filter(([, force]) => force).sort((one, other) => Math.abs(other[1]) - Math.abs(one[1]));
     return `${parts.slice(0, wide ? 6 : 1).map(([name, force]) => `${name} ${number(force)}, `).join("")}total ${number(small(valueAt(motion, motion.data["F total"], time), 100))} ${unit.name}`;
   },
   phase: ({ motion }, time) => `${shown(displacementAt(motion, time), "m")}, ${shown(valueAt(motion, motion.data.v, time), "m/s", 3)}`,

@@ -1,12 +1,14 @@
 // The actuator to scale along its stroke, with the armature moving: play, slow motion, scrub.
-import { line } from "./axes.js";
+import { extent, line } from "./axes.js";
 import { displacementAt, valueAt } from "./curves.js";
 import { surface } from "./pen.js";
 import { voltageAt } from "./readout.js";
 import { colours, FONT } from "./theme.js";
 import { shown, unitOf } from "./units.js";
+import { has, moverOf, stopOf } from "./words.js";
 
-const SPEEDS = [["1/100", 0.01], ["1/300", 1 / 300], ["1/1000", 1e-3], ["1/3000", 1 / 3000]];
+const SPEEDS = [["1", 1], ["1/3", 1 / 3], ["1/10", 0.1], ["1/30", 1 / 30], ["1/100", 0.01], ["1/300", 1 / 300], ["1/1000", 1e-3], ["1/3000", 1 / 3000]];
+const LASTS = 3.5; // s, about, that a run is played
 
 export function sketchView(body, studio) {
   const area = surface(body.appendChild(Object.assign(document.createElement("div"), { className: "drawing" })), paint, "The actuator, to scale along its stroke");
@@ -15,7 +17,12 @@ export function sketchView(body, studio) {
     <input type="range" class="scrub" min="0" max="1000" value="0" step="1" aria-label="Time">
     <select class="speed" aria-label="Slow motion">${SPEEDS.map(([name, factor]) => `<option value="${factor}">${name}</option>`).join("")}</select>`;
   const [play, scrub, speed] = bar.children;
-  speed.value = String(SPEEDS[1][1]);
+  let suited = null; // the device to which the speed is suited
+  const suit = () => {
+    const [low, high] = span();
+    const away = ([, factor]) => Math.abs(Math.log((high - low) / factor / LASTS));
+    speed.value = String(SPEEDS.reduce((best, each) => (away(each) < away(best) ? each : best))[1]);
+  };
   let timer = 0;
   let last = 0;
 
@@ -42,6 +49,13 @@ export function sketchView(body, studio) {
     opening = false;
     toggle();
     once = true;
+  }
+  /** Play once through the times that are shown, at a speed that suits them, unless motion is not wanted. */
+  function playOnce() {
+    suit();
+    if (timer) toggle();
+    studio.setCursor(span()[0]);
+    if (!matchMedia("(prefers-reduced-motion: reduce)").matches) begin();
   }
   function halt(event) {
     // The key and the button of the play itself do that.
@@ -74,12 +88,14 @@ export function sketchView(body, studio) {
     if (!frame) return;
     const c = colours();
     const { backstop, front, platen } = frame.places;
-    const known = [backstop, front, platen, ...frame.data.x.subarray(0, 1)].filter((place) => place !== null);
+    const mover = moverOf(studio.described);
+    const isArmature = mover === "armature";
+    const known = [backstop, front, platen, ...(isArmature ? frame.data.x.subarray(0, 1) : extent(frame.data.x))].filter((place) => place !== null);
     const low = Math.min(...known);
     // Without a platen the pack has no end.
     const high = platen === null && front !== null ? front + 0.6 * (front - low) : Math.max(...known);
     const way = high - low || 1e-4;
-    const [left, right] = [0.34 * width, 0.9 * width];
+    const [left, right] = isArmature ? [0.34 * width, 0.9 * width] : [0.16 * width, 0.8 * width];
     const X = (x) => left + ((x - low) / way) * (right - left);
     // Between the readings above and the ruler below there is room for the platen and its name.
     const [top, bottom] = [20, height - 34];
@@ -106,12 +122,19 @@ export function sketchView(body, studio) {
       pen.fillText("pack", X(front) + thick / 2, middle + 1.2 * tall + 13);
     }
     const tip = X(x);
-    // Shank and head of the armature, the face at the displacement.
     pen.fillStyle = c.x;
-    pen.fillRect(tip - 0.1 * width, middle - 0.16 * tall, 0.1 * width, 0.32 * tall);
-    pen.fillRect(tip - 0.19 * width, middle - 0.6 * tall, 0.09 * width, 1.2 * tall);
-    if (backstop !== null) block(pen, X(backstop) - 0.26 * width, middle - 0.75 * tall, 0.07 * width, 1.5 * tall, c.backstop, "backstop", c);
-    if (studio.described?.constants.some((constant) => constant.section === "magnet")) coil(pen, X(low) - 0.15 * width, middle - 1.1 * tall, 0.1 * width, current, frame, c);
+    if (isArmature) {
+      // Shank and head of the armature, the face at the displacement.
+      pen.fillRect(tip - 0.1 * width, middle - 0.16 * tall, 0.1 * width, 0.32 * tall);
+      pen.fillRect(tip - 0.19 * width, middle - 0.6 * tall, 0.09 * width, 1.2 * tall);
+    } else if (mover === "ball") {
+      const radius = Math.min(0.5 * tall, 0.05 * width);
+      pen.beginPath();
+      pen.arc(tip + radius, middle, radius, 0, 2 * Math.PI);
+      pen.fill();
+    } else pen.fillRect(tip - (backstop === null ? 0.04 * width : 0), middle - 0.5 * tall, 0.08 * width, tall);
+    if (backstop !== null) block(pen, X(backstop) - (isArmature ? 0.26 : 0.05) * width, middle - 0.75 * tall, (isArmature ? 0.07 : 0.05) * width, 1.5 * tall, c.backstop, stopOf(studio.described), c);
+    if (has(studio.described, "magnet")) coil(pen, X(low) - 0.15 * width, middle - 1.1 * tall, 0.1 * width, current, frame, c);
     ruler(pen, X, low, high, height, c);
     pen.fillStyle = c.ink;
     pen.textAlign = "left";
@@ -128,10 +151,11 @@ export function sketchView(body, studio) {
   return {
     update: (what) => {
       if (what !== "motion") return;
+      if (suited !== studio.described.name) { suited = studio.described.name; suit(); }
       cursor();
       if (opening) begin();
     },
-    draw: area.draw, cursor, paint, toggle,
+    draw: area.draw, cursor, paint, toggle, playOnce,
     table: () => studio.frames.motion && { "time [s]": studio.frames.motion.data.t, "displacement [m]": studio.frames.motion.data.x },
   };
 }

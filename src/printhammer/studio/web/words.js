@@ -14,12 +14,12 @@ export const has = (described, section) => described.constants.some((constant) =
 
 /** Return what moves: an armature where there is a magnet or a pack, else the ball or the mass of a textbook. */
 export function moverOf(described) {
-  if (!described || described.places.front !== null || has(described, "magnet")) return "armature";
+  if (!described?.places || described.places.front !== null || has(described, "magnet")) return "armature";
   return /\bball\b/i.test(described.title) ? "ball" : "mass";
 }
 
 /** Return what a mover rests on or strikes at the low end of its way. */
-export const stopOf = (described) => (moverOf(described) === "armature" ? "backstop" : moverOf(described) === "ball" ? "table" : "stop");
+export const stopOf = (described) => ({ armature: "backstop", ball: "table", mass: "stop" })[moverOf(described)];
 
 /** Return the title of a view of a device. */
 export function titleOf(name, described, short = false) {

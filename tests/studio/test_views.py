@@ -1,0 +1,121 @@
+"""The page in a browser: its header, its stories, the map under the finger, views that suit the device."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.studio.browser import Page
+
+from printhammer.studio.live import live_page
+from printhammer.studio.states.shelf import Shelf
+
+pytestmark = pytest.mark.slow
+
+STUDIO = "window.studio.studio"
+SETTLED = f"{STUDIO}?.frames.map?.detail === 'full' && !{STUDIO}.busy && !document.querySelector('.outdated')"
+SHOWN = "[...document.querySelectorAll('.panel')].filter((each) => each.checkVisibility())"
+
+
+class Three(Shelf):
+    """A shelf with a print hammer, a textbook ball and a relay."""
+
+    names = ("hendriks-1983", "bouncing-ball", "relay-5v")  # type: ignore[assignment]
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("views") / "page.html"
+    path.write_text(live_page(Three()), "utf-8")
+    return path
+
+
+@pytest.fixture
+def page(written: Path, opened_browser: Any) -> Any:
+    opened = opened_browser()
+    opened.size(1440, 900)
+    opened.open(written.as_uri())
+    opened.wait(f"window.studio && {SETTLED}")
+    yield opened
+    assert opened.complaints == []
+    opened.call("Page.close")
+
+
+def choose(page: Page, name: str) -> None:
+    page.run(f"{STUDIO}.choose({name!r}); 1")
+    page.wait(f"{STUDIO}.described.name === {name!r} && {SETTLED}")
+
+
+def test_one_header_row_and_controls_in_front_of_one_fold(page: Page) -> None:
+    tops = page.run("[...document.querySelector('.bar').children].map((each) => each.offsetTop)")
+    assert max(tops) - min(tops) < 10
+    rows = page.run("[...document.querySelectorAll('.front [data-key]')].map((each) => each.dataset.key)")
+    assert rows[:4] == ["rate", "pulses", "platen distance", "forms thickness"]
+    assert not page.run("document.querySelector('.fold').open")
+    label = page.run("document.querySelector('[for=control-backstop-stiffness]').textContent")
+    assert label == "Hertz stiffness k"
+    page.run("document.querySelector('.more summary').click()")
+    assert page.run("document.querySelector('.more .pin').checkVisibility()")
+    page.mouse("mousePressed", 700, 500)
+    page.mouse("mouseReleased", 700, 500)
+    assert not page.run("document.querySelector('.more').open")
+
+
+def test_figure_6_shows_both_curves_and_every_story_its_view(page: Page) -> None:
+    heroes = []
+    for k in range(6):
+        page.run(f"document.querySelectorAll('.story')[{k}].click()")
+        page.wait(SETTLED)
+        heroes.append(page.run("document.querySelector('.with-hero > .panel:not([hidden])').classList[1]"))
+        remarks = page.run(f"{STUDIO}.remarks()")
+        assert all(0 <= time < 1e-2 for time, _ in remarks)
+        assert len(remarks) >= (k != 4)
+        if k != 1:
+            assert page.run(f"{STUDIO}.ghosts.length") == 0
+            continue
+        for other, said in (("700 µs", "lost"), ("660 µs", "prints again")):
+            page.wait(f"{STUDIO}.ghosts.length === 1 && {STUDIO}.ghosts[0].name === {other!r}")
+            page.wait(f"{STUDIO}.remarks().some(([, text]) => text.includes({said!r}))")
+            page.run("document.querySelector('.notice .switch[aria-pressed=false]').click()")
+            page.wait(SETTLED)
+    assert heroes == ["view-forces", "view-map", "view-phase", "view-map", "view-strobe", "view-map"]
+    page.run(f"{STUDIO}.store.set({{ rate: 1000 }}); 1")
+    assert page.run(f"{STUDIO}.remarks()") == []
+    page.run("document.querySelector('.notice .shut').click()")
+    assert page.run(f"{STUDIO}.window === null && {STUDIO}.remarks === null")
+
+
+def test_the_word_is_printed_anew_under_the_finger(page: Page) -> None:
+    texts = "window.texts = []; { const { fillText } = CanvasRenderingContext2D.prototype;"
+    texts += " CanvasRenderingContext2D.prototype.fillText = function note(text, ...rest)"
+    texts += " { window.texts.push(text); return fillText.call(this, text, ...rest); }; } 1"
+    page.run(texts)
+    box = page.box(".view-map canvas")
+    x, (top, bottom) = box["x"] + 300, (box["y"] + 60, box["y"] + 400)
+    page.mouse("mousePressed", x, bottom)
+    rates = []
+    for k in range(5):
+        page.mouse("mouseMoved", x, bottom + (top - bottom) * k / 4)
+        page.wait(f"!{STUDIO}.busy && {STUDIO}.frames.line.serial === {STUDIO}.frames.motion.serial")
+        rates.append(page.run(f"{STUDIO}.store.state.rate"))
+    good = page.run(f"{STUDIO}.frames.line.good")
+    page.wait(f"window.texts.some((text) => / Hz: {good} of 107 dots good/.test(text))")
+    page.mouse("mouseReleased", x, top)
+    assert rates == sorted(rates)
+    assert rates[-1] > rates[0] + 500
+
+
+def test_views_suit_the_device(page: Page) -> None:
+    choose(page, "bouncing-ball")
+    titles = page.run(f"{SHOWN}.map((each) => each.ariaLabel)")
+    assert sorted(titles) == ["Ball", "Frequency-time map", "Motion"]
+    shown = "[...document.querySelectorAll('.tabs button')].filter((each) => each.checkVisibility())"
+    assert page.run(f"{shown}.map((each) => each.textContent)") == ["Map", "Forces", "Phase plane", "Strobe"]
+    forces = page.run(f"Object.keys({STUDIO}.views.forces.table())")
+    assert forces == ["time [s]", "total [N]", "drive [N]", "spring [N]"]
+    captions = page.run(f"{SHOWN}.map((each) => each.querySelector('.caption').textContent).join()")
+    for word in ("armature", "dot", "backstop", "paper"):
+        assert word not in captions
+    choose(page, "relay-5v")
+    assert "Closings" in page.run(f"{SHOWN}.map((each) => each.ariaLabel)")
+    assert page.run("document.querySelector('.view-energy').ariaLabel") == "Energy per closing"
+    assert page.run("document.querySelector('#control-line')") is None
