@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -20,9 +20,6 @@ from printhammer.drive.trains import Drive, PulseTrain
 from printhammer.maps.frequency import TAIL
 from printhammer.run.motion import Motion
 from printhammer.support.arrays import BoolArray, FloatArray
-
-if TYPE_CHECKING:
-    from printhammer.claims.definition import Claim
 
 # Rates computed at once; the search stops at the first batch with a lost dot; arbitrary
 _TOGETHER: Final = 64

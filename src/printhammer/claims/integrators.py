@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
+from printhammer.claims.context import Context
+from printhammer.claims.definition import Claim
 from printhammer.claims.judging import WHOLE, Measured, measures
 from printhammer.drive.trains import PulseTrain
 from printhammer.hammer.equilibrium import equilibria
 from printhammer.run.motion import Motion
-
-if TYPE_CHECKING:
-    from printhammer.claims.context import Context
-    from printhammer.claims.definition import Claim
 
 REFERENCE_TOLERANCE: Final = 1e-13  # Tolerance of the reference motion, well below the errors of 1983
 _CYCLE: Final = 10e-3  # Duration of the single-pulse cycle, s: the motion has settled

@@ -7,7 +7,7 @@ Buzz printing, Fig. 7: a train that prints while the armature stays off the back
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -26,9 +26,6 @@ from printhammer.printing.dots.buzz import (
 )
 from printhammer.printing.dots.settling import rebounds, touches
 from printhammer.support.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from printhammer.claims.definition import Claim
 
 
 @measures("single_pulse_stroke", "pack", "waveform")

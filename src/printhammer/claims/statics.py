@@ -5,7 +5,7 @@ The claim about elastomer backstops is included.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -17,9 +17,6 @@ from printhammer.hammer.equilibrium import equilibria, holding_margin, positive_
 from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.static_force import StaticForce
 from printhammer.run.motion import Motion
-
-if TYPE_CHECKING:
-    from printhammer.claims.definition import Claim
 
 
 @measures("geometry", "backstop", "pack", "platen")

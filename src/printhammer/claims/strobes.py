@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
+from printhammer.claims.context import Context
 from printhammer.claims.definition import Claim, claims
 from printhammer.claims.judging import WHOLE, Measured, measures, rank_correlation
 from printhammer.claims.verdicts import panel_name, printed_verdicts
 from printhammer.support.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from printhammer.claims.context import Context
 
 _ORBIT_TIME: Final = 4e-3  # Duration of the single-pulse orbit, s: from the first return until it has settled
 _ORBIT_POINTS: Final = 200_001  # Points of the orbit, dense compared with the distances measured

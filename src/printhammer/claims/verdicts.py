@@ -5,17 +5,15 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from printhammer.chaos import Strobe, Verdict, strobes
 from printhammer.chaos.strobe.scan import scan
 from printhammer.chaos.strobe.verdict import LAST
+from printhammer.claims.context import Context
 from printhammer.claims.definition import Claim, claims
 from printhammer.claims.judging import WHOLE, Measured, measures
 from printhammer.hammer.hammer import Hammer
-
-if TYPE_CHECKING:
-    from printhammer.claims.context import Context
 
 _CHANGE: Final = 1e-5  # Relative change of all constants, far below any tolerance of production; arbitrary
 _TIGHTER: Final = 0.1  # Factor of the tolerance; arbitrary

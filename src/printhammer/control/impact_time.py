@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+from typing import Any, Final, SupportsIndex
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.printing.rates.variability import Variability
 from printhammer.results import Result, column, coordinate, part, scalar
+from printhammer.results.result import Entries
 from printhammer.results.summary import (
     Cells,
     Grid,
@@ -27,9 +28,6 @@ from printhammer.results.summary import (
 from printhammer.run.simulate import simulate
 from printhammer.support.arguments import checked
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from printhammer.results.result import Entries
 
 LEVELS: Final = (0.001, 0.003, 0.01)
 """Default standard deviations of a sample, as fractions of the peak current or of 10 V."""

@@ -23,15 +23,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from printhammer.drive.tables import ROWS, fill_table, largest_value
-
-if TYPE_CHECKING:
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 POLYNOMIAL: Final = 0
 EXPONENTIAL: Final = 1

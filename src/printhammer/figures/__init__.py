@@ -15,11 +15,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.figures.elements.save import FORMATS, save
+from printhammer.hammer.hammer import Hammer
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from printhammer.hammer.hammer import Hammer
 
 __all__ = ["FIGURES", "FORMATS", "PaperFigure", "save"]
 

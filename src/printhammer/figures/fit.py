@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from itertools import cycle
 from textwrap import fill
-from typing import TYPE_CHECKING, Final, cast
+from typing import Final, cast
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from printhammer.errors import InputError
 from printhammer.figures.elements import style
@@ -15,10 +17,6 @@ from printhammer.figures.elements.scales import Name, Scale, label, scale
 from printhammer.figures.elements.style import foot, new_figure, styled
 from printhammer.identify.result import Fit
 from printhammer.support.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _COLOURS: Final = (style.BLUE, style.GREEN, style.YELLOW, style.INK, "#56b4e9", "#cc79a7", style.MUTED)
 _KINDS: Final = {

@@ -10,10 +10,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+from typing import Any, Final, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.collections import EllipseCollection
+from matplotlib.figure import Figure
 
 from printhammer.errors import InputError
 from printhammer.figures.elements import style
@@ -22,11 +25,6 @@ from printhammer.figures.elements.scales import Scale
 from printhammer.figures.elements.style import sign, styled
 from printhammer.printing.page.page import Page
 from printhammer.support.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.collections import EllipseCollection
-    from matplotlib.figure import Figure
 
 PAPER: Final = (252, 250, 243)
 INK: Final = (24, 24, 38)

@@ -8,9 +8,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import ALONG_X, ALONG_Y, beside, dashed, dots, heading
@@ -21,10 +23,6 @@ from printhammer.printing.rates.quality import Quality
 from printhammer.printing.rates.safe_rate import SafeRate
 from printhammer.printing.rates.tolerance import ToleranceYield
 from printhammer.support.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _MOST_SLOTS: Final = 64  # Largest number of slots shown; arbitrary
 _US: Final = 1e6  # Microseconds in a second

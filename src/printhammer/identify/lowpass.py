@@ -8,7 +8,6 @@ tau). The solution is assembled from the polynomial pieces of u, without samplin
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -17,9 +16,7 @@ from printhammer.drive.input import read_number
 from printhammer.drive.segments import EXPONENTIAL, POLYNOMIAL
 from printhammer.errors import InputError
 from printhammer.support.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from printhammer.support.tables.readings import Readings
+from printhammer.support.tables.readings import Readings
 
 
 def time_constant(bandwidth: float | None) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import Any, Final, Self
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.uncertainty import UNCERTAINTY, Uncertainty
 from printhammer.results import Column, Declared, Result, column, coordinate, part, scalar
+from printhammer.results.result import Entries
 from printhammer.results.summary import (
     Cells,
     Facts,
@@ -23,9 +24,6 @@ from printhammer.results.summary import (
 )
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 from printhammer.units import from_si
-
-if TYPE_CHECKING:
-    from printhammer.results.result import Entries
 
 CONFIDENCE: Final = 0.95
 """Confidence level of the intervals."""

@@ -11,16 +11,14 @@ import math
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from printhammer.claims import Claim, JudgedClaim
 from printhammer.claims.definition import SIDES
 from printhammer.hammer.hammer import Hammer
 from printhammer.report.quantities import band_text, split_name, value_text
+from printhammer.report.reconstruction.results import Family, Results, Search
 from printhammer.results import Declared, part
-
-if TYPE_CHECKING:
-    from printhammer.report.reconstruction.results import Family, Results, Search
 
 
 class Drawing(Declared):

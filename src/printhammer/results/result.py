@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    Entries = dict[str, tuple[Column, Any]]
+Entries = dict[str, tuple[Column, Any]]
 
 RESULTS: dict[str, type[Result]] = {}
 """Result classes that have been imported, by name."""

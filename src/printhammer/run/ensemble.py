@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+from typing import Any, Final, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +22,7 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.kernel.model.laws import Laws
 from printhammer.kernel.model.modes import MODE_NAMES, OK, STATUS_NAMES
 from printhammer.results import Result, column, part
+from printhammer.results.result import Entries
 from printhammer.run.contacts import DotTable, ExtraDots
 from printhammer.run.ensemble_group import MOST_COLUMNS, Fired, Group, Job
 from printhammer.run.motion import Motion
@@ -29,9 +30,6 @@ from printhammer.run.problem import MAX_STEPS, TOLERANCE, check_tolerance, laws_
 from printhammer.run.start import AT_REST, FORMS, check_branch, initial_state
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 from printhammer.support.threads import PIECES_A_THREAD, Progress, in_threads, thread_count
-
-if TYPE_CHECKING:
-    from printhammer.results.result import Entries
 
 __all__ = [
     "DISPLAY_TOLERANCE",

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,7 @@ from printhammer.drive.trains import Drive
 from printhammer.drive.waveforms.base import Supply
 from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.static_force import StaticForce
+from printhammer.kernel.compile.lanes import LaneKinds
 from printhammer.kernel.compile.specialise import Kernel
 from printhammer.kernel.lanes import layout as lane_layout
 from printhammer.kernel.model.dots import DOT_WIDTH
@@ -41,9 +42,6 @@ from printhammer.run.problem import (
 )
 from printhammer.run.supply import take_supply
 from printhammer.support.arrays import FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from printhammer.kernel.compile.lanes import LaneKinds
 
 _NODES: Final = 2048  # Initial number of rows for nodes; arbitrary, enlarged on demand
 _CONTACTS: Final = 256  # Initial number of rows for contacts; arbitrary, likewise

@@ -20,6 +20,7 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.results import Column, Result, Rows, derived, provenance
 from printhammer.results.declare import columns_of
 from printhammer.results.files import write_csv, write_parquet
+from printhammer.results.result import Entries
 from printhammer.results.summary import (
     Cells,
     FactRow,
@@ -40,8 +41,6 @@ from printhammer.support.files import write_file
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
-
-    from printhammer.results.result import Entries
 
 FORCES: Final = ("magnet", "spring", "pack", "backstop", "damping", "drag", "drive", "total")
 """Names of the forces: equations (3) to (7), damping of the armature (if the hammer has any), a drive that is

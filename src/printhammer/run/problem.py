@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
+from typing import Any, Final, Literal, TypeVar
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from printhammer.drive.trains import Drive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.static_force import StaticForce
+from printhammer.kernel.compile.modules import WebModule
 from printhammer.kernel.compile.specialise import Kernel
 from printhammer.kernel.model import layout
 from printhammer.kernel.model.laws import Laws
@@ -27,9 +28,6 @@ from printhammer.run.plain.posing import FAR, allowances, typical_scales
 from printhammer.run.start import AT_REST, Beyond
 from printhammer.run.supply import take_supply, typical_current
 from printhammer.support.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from printhammer.kernel.compile.modules import WebModule
 
 T = TypeVar("T")
 

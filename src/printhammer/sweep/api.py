@@ -16,13 +16,11 @@ from printhammer.results.store import Store, open_store
 from printhammer.support.threads import thread_count
 from printhammer.sweep.plan import make_plan
 from printhammer.sweep.spec import read_spec
-from printhammer.sweep.work import Index, run_local
+from printhammer.sweep.work import Index, Results, run_local
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
-
-    from printhammer.sweep.work import Results
 
 Progress = Callable[[float, int, int], None]
 """Progress callback, called with the numbers of members done, done before this run, and in total."""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from contextlib import suppress
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 
@@ -17,10 +17,7 @@ from printhammer.hammer.names import FORCE, PERIOD, RATE, TIMING, in_unit_of_dri
 from printhammer.results import Declared, part
 from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import Quantity, expected, quantities, shown
-from printhammer.sweep.tables import read_quantities, read_quantity
-
-if TYPE_CHECKING:
-    from printhammer.sweep.tables import AxisTable
+from printhammer.sweep.tables import AxisTable, read_quantities, read_quantity
 
 Target = Literal["hammer", "waveform", "drive", "at", "state"]
 

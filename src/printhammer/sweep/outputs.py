@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -12,10 +12,7 @@ from printhammer.errors import InputError, nearest
 from printhammer.results import Declared, part
 from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import shown
-from printhammer.sweep.tables import read_quantity
-
-if TYPE_CHECKING:
-    from printhammer.sweep.tables import OutputsTable
+from printhammer.sweep.tables import OutputsTable, read_quantity
 
 STATUSES: Final = (
     "ok",

@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -26,9 +26,7 @@ from printhammer.results.summary import (
 from printhammer.support.arrays import FloatArray
 from printhammer.sweep.members import Maker
 from printhammer.sweep.outputs import FIRING, TIME, Output
-
-if TYPE_CHECKING:
-    from printhammer.sweep.spec import Spec
+from printhammer.sweep.spec import Spec
 
 
 def latin_hypercube(members: int, seed: int, axes: int) -> FloatArray:

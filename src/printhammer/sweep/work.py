@@ -6,7 +6,7 @@ import math
 import threading
 from collections.abc import Callable, Collection, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from printhammer.run.ensemble import DotTable, Ensemble
 from printhammer.run.motion import Motion
 from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.threads import in_threads, thread_count
-from printhammer.sweep.members import Base, Maker
+from printhammer.sweep.members import Base, Maker, Members
 from printhammer.sweep.outputs import (
     DISPLACEMENT,
     DOTS,
@@ -26,12 +26,9 @@ from printhammer.sweep.outputs import (
     OF_MOTION,
     STATUSES,
     STROBES,
+    Outputs,
 )
-
-if TYPE_CHECKING:
-    from printhammer.sweep.members import Members
-    from printhammer.sweep.outputs import Outputs
-    from printhammer.sweep.plan import Plan
+from printhammer.sweep.plan import Plan
 
 Results = dict[str, Any]
 """Arrays by name, of shape (members of the block, ...)."""

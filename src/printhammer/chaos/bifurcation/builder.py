@@ -20,7 +20,7 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -38,13 +38,10 @@ from printhammer.chaos.bifurcation.columns import (
     state_or_rest,
 )
 from printhammer.chaos.strobe.resting import exact_cycle, rests_of
-from printhammer.chaos.strobe.train import FINER, LONG_CYCLE, exponents_onward, is_memoryless
+from printhammer.chaos.strobe.train import FINER, LONG_CYCLE, State, exponents_onward, is_memoryless
 from printhammer.run.effort import Effort
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from printhammer.chaos.strobe.train import State
 
 STRAND: Final = 16
 """Number of successive parameter values in a strand."""

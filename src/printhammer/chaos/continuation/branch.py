@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, get_args
 import numpy as np
 import numpy.typing as npt
 
-from printhammer.chaos.continuation.branch_points import BIRTH
+from printhammer.chaos.continuation.arclength import Curve, Stop
+from printhammer.chaos.continuation.branch_points import BIRTH, BranchPoint
 from printhammer.chaos.continuation.crossings import CROSSINGS, Crossing
 from printhammer.chaos.continuation.family import Passage, Surface, Touch
+from printhammer.chaos.orbits.orbit import Orbit
 from printhammer.chaos.orbits.search import orbit
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
@@ -34,10 +36,6 @@ from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from printhammer.chaos.continuation.arclength import Curve, Stop
-    from printhammer.chaos.continuation.branch_points import BranchPoint
-    from printhammer.chaos.orbits.orbit import Orbit
 
 EventKind = Literal["fold", "period doubling", "Neimark-Sacker", Crossing, "grazing", "section"]
 KINDS: Final[tuple[str, ...]] = get_args(EventKind)

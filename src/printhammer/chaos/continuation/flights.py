@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
-from printhammer.chaos.continuation.family import has_rigid_backstop
+from printhammer.chaos.continuation.family import Surface, has_rigid_backstop
 from printhammer.chaos.strobe.map import turns
 from printhammer.derivatives.states import follow
 from printhammer.errors import InputError
@@ -22,9 +22,6 @@ from printhammer.run.contacts import touches_of
 from printhammer.run.problem import Problem
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from printhammer.chaos.continuation.family import Surface
 
 _CURRENT: Final = "with a voltage drive, the current at a touch belongs to the state"
 _CLOSE: Final = 0.01

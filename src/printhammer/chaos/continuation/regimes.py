@@ -19,6 +19,7 @@ from printhammer.chaos.continuation.arclength import Steps
 from printhammer.chaos.continuation.branch import MOST, Branch, BranchEvent, branches_table
 from printhammer.chaos.continuation.crossings import CROSSINGS
 from printhammer.chaos.continuation.tracer import PRECISION, Tracer, read_bounds
+from printhammer.chaos.orbits.orbit import Orbit
 from printhammer.chaos.orbits.search import orbits
 from printhammer.chaos.strobe.map import MAP_EFFORT
 from printhammer.drive.base import Overlap
@@ -40,8 +41,6 @@ from printhammer.support.arrays import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from printhammer.chaos.orbits.orbit import Orbit
 
 SEEDS: Final = 6
 """Default number of rates at which periodic orbits are searched for."""

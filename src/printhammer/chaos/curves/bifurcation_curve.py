@@ -10,16 +10,18 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+from typing import Any, Final, SupportsIndex
 
 import numpy as np
 import numpy.typing as npt
 
-from printhammer.chaos.continuation.arclength import Steps
+from printhammer.chaos.continuation.arclength import Steps, Stop
+from printhammer.chaos.continuation.branch import Branch, BranchEvent
 from printhammer.chaos.continuation.tracer import read_bounds
+from printhammer.chaos.curves.codimension import CodimensionTwo
 from printhammer.chaos.curves.normal_forms import MOST_PERIODS, grazing_sides, root_coefficient
 from printhammer.chaos.curves.starts import start_of
-from printhammer.chaos.curves.systems import GRAZING, Plane, check_two
+from printhammer.chaos.curves.systems import GRAZING, CurvePoint, Plane, check_two
 from printhammer.chaos.curves.tracing import PRECISION, CurveTracer, Traced
 from printhammer.chaos.strobe.train import States, Train, run_trains
 from printhammer.drive.input import read_count, read_number
@@ -34,12 +36,6 @@ from printhammer.results.summary import (
 from printhammer.run.effort import Effort
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from printhammer.chaos.continuation.arclength import Stop
-    from printhammer.chaos.continuation.branch import Branch, BranchEvent
-    from printhammer.chaos.curves.codimension import CodimensionTwo
-    from printhammer.chaos.curves.systems import CurvePoint
 
 SAME: Final = 1e-3
 """Distance of a multiplier from the unit circle within which it counts as lying on the circle."""

@@ -21,21 +21,18 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from printhammer.chaos.continuation.branch_points import doubling_test, fold_test, zero_between
-from printhammer.chaos.curves.systems import GrazingSystem, curve_point_of
+from printhammer.chaos.continuation.family import Surface
+from printhammer.chaos.continuation.fixed_points import Corrector, Node
+from printhammer.chaos.curves.systems import CurvePoint, GrazingSystem, Plane, curve_point_of
 from printhammer.errors import InputError
 from printhammer.results import Declared, part
 from printhammer.support.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from printhammer.chaos.continuation.family import Surface
-    from printhammer.chaos.continuation.fixed_points import Corrector, Node
-    from printhammer.chaos.curves.systems import CurvePoint, Plane
 
 RESONANCES: Final = 3
 """Largest number n of orbit periods per touch for which a grazing orbit is tested for a resonance."""

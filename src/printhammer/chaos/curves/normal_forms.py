@@ -19,16 +19,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
+from printhammer.chaos.curves.systems import CurvePoint, Plane
 from printhammer.chaos.strobe.map import image_of, quiet_section
 from printhammer.errors import InputError
 from printhammer.support.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from printhammer.chaos.curves.systems import CurvePoint, Plane
 
 MOST_PERIODS: Final = 4
 """Largest number of periods per touch for which the orbits at a grazing are tested."""

@@ -12,12 +12,12 @@ missed.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
+from typing import Any, Final, SupportsIndex, Unpack
 
 import numpy as np
 
 from printhammer.chaos.continuation.arclength import Steps
-from printhammer.chaos.continuation.branch import Branch
+from printhammer.chaos.continuation.branch import Branch, BranchEvent
 from printhammer.chaos.continuation.continuation import continuation
 from printhammer.chaos.continuation.tracer import read_bounds
 from printhammer.chaos.curves.bifurcation_curve import (
@@ -41,9 +41,6 @@ from printhammer.results.summary import (
 from printhammer.run.effort import DEFAULT, Effort, computation
 from printhammer.run.regime import FiredAtFixedTolerance, Firing, Regime
 from printhammer.support.arrays import FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from printhammer.chaos.continuation.branch import BranchEvent
 
 GRID: Final = (48, 32)
 """Default numbers of values of the two parameters at which trains from rest are classified."""

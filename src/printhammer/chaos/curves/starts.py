@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
+from printhammer.chaos.continuation.arclength import Stop
 from printhammer.chaos.continuation.branch import KINDS as EVENTS
 from printhammer.chaos.continuation.branch import Branch, BranchEvent
 from printhammer.chaos.curves.systems import KINDS
@@ -16,9 +17,6 @@ from printhammer.errors import InputError
 from printhammer.results import Reopened, reopen
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from printhammer.chaos.continuation.arclength import Stop
 
 FIRST: Final = "first"
 LAST: Final = "last"

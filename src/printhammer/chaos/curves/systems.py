@@ -36,26 +36,21 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from printhammer.chaos.continuation.branch_points import doubling_test, fold_test, torus_test
-from printhammer.chaos.continuation.family import cyclic
-from printhammer.chaos.continuation.fixed_points import MapValue
+from printhammer.chaos.continuation.family import Surface, cyclic
+from printhammer.chaos.continuation.fixed_points import MapValue, Node
 from printhammer.chaos.continuation.flights import Flight, fly
-from printhammer.chaos.strobe.map import image_of
+from printhammer.chaos.strobe.map import Image, image_of
 from printhammer.errors import InputError
 from printhammer.hammer.names import PERIOD, RATE
 from printhammer.results import Declared, part
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from printhammer.chaos.continuation.family import Surface
-    from printhammer.chaos.continuation.fixed_points import Node
-    from printhammer.chaos.strobe.map import Image
 
 TESTS: Final[dict[str, Callable[[FloatArray], float]]] = {
     "fold": fold_test,

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
-from printhammer.chaos.continuation.arclength import Steps, Stop, follow
+from printhammer.chaos.continuation.arclength import Steps, Stop, Watch, follow
 from printhammer.chaos.continuation.branch_points import zero_between
 from printhammer.chaos.continuation.family import has_rigid_backstop
 from printhammer.chaos.continuation.fixed_points import Corrector, Node
@@ -21,6 +21,7 @@ from printhammer.chaos.curves.codimension import (
     resonance_test,
 )
 from printhammer.chaos.curves.normal_forms import doubling_coefficient
+from printhammer.chaos.curves.starts import Start
 from printhammer.chaos.curves.systems import (
     GRAZING,
     TESTS,
@@ -35,10 +36,6 @@ from printhammer.chaos.strobe.map import quiet_section
 from printhammer.errors import InputError
 from printhammer.support.arrays import FloatArray
 from printhammer.support.threads import mapped
-
-if TYPE_CHECKING:
-    from printhammer.chaos.continuation.arclength import Watch
-    from printhammer.chaos.curves.starts import Start
 
 PRECISION: Final = 1e-12
 """Scaled correction of Newton's method below which a point lies on the curve."""

@@ -49,8 +49,6 @@ from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 if TYPE_CHECKING:
     import pandas as pd
 
-    from printhammer.chaos.exponents.lyapunov import Lyapunov
-
 
 class LyapunovChart(Result, rows="period"):
     """Lyapunov exponents against the period of the train; every array has one row per train."""

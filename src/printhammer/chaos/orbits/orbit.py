@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from printhammer.chaos.orbits.newton import Closing
 from printhammer.chaos.strobe.map import margin_of
 from printhammer.derivatives.states import follow
 from printhammer.results import Column, Result, Rows, column, derived, part
@@ -25,8 +26,6 @@ from printhammer.support.arrays import FloatArray, IntArray
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from printhammer.chaos.orbits.newton import Closing
 
 STABLE: Final = "stable"
 SADDLE: Final = "saddle"

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, SupportsIndex, Unpack
+from typing import Final, SupportsIndex, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
+from printhammer.chaos.orbits.collection import Orbits
 from printhammer.chaos.orbits.newton import ExactMaps, close_orbits
 from printhammer.chaos.orbits.orbit import Orbit, no_orbit, orbit_of
 from printhammer.chaos.orbits.stages import LONE, Search, shortest
@@ -16,9 +17,6 @@ from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.run.effort import Effort, InThreads, computation
 from printhammer.run.regime import Fired, Regime
-
-if TYPE_CHECKING:
-    from printhammer.chaos.orbits.collection import Orbits
 
 LONGEST: Final = 8
 """Default largest orbit period to search for, in firings."""

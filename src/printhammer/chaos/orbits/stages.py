@@ -12,7 +12,7 @@ import itertools
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -40,9 +40,6 @@ from printhammer.run.effort import Effort
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from printhammer.chaos.orbits.orbit import Orbit
 
 SHARE: Final = 0.05
 """Range of drive periods over which a branch is followed, on either side, as a fraction of the period."""

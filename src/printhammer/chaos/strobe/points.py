@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
+from typing import Any, Final, SupportsIndex, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +32,7 @@ from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Result, column, coordinate, part, scalar
+from printhammer.results.result import Entries
 from printhammer.results.summary import (
     FactRow,
     Facts,
@@ -49,9 +50,6 @@ from printhammer.run.start import initial_state, read_state
 from printhammer.support.arguments import checked
 from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.threads import Progress
-
-if TYPE_CHECKING:
-    from printhammer.results.result import Entries
 
 POINTS = 200
 """Default number of strobe points, as in Fig. 11."""

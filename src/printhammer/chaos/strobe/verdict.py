@@ -11,16 +11,14 @@ the motion repeats a cycle longer than 64 firings. All other trains are undecide
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
+from printhammer.chaos.orbits.settled import Settled
 from printhammer.derivatives.states import Exponent
 from printhammer.results import Declared, part
 from printhammer.support.arrays import FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from printhammer.chaos.orbits.settled import Settled
 
 LARGEST_PERIOD: Final = 64
 """Largest period of a train that is searched for, in firings."""

@@ -14,7 +14,6 @@ from printhammer.cli.screen import render
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from printhammer.cli.runner import Job
     from printhammer.control.table.compensation import CompensationTable
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.page.pattern import Pattern

@@ -32,6 +32,7 @@ from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.safe_rate import from_rest
 from printhammer.results import Declared, Result, column, coordinate, part, scalar
 from printhammer.results.declare import Column
+from printhammer.results.result import Entries
 from printhammer.results.summary import (
     Cells,
     Grid,
@@ -46,8 +47,6 @@ from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from printhammer.results.result import Entries
 
 BURST: Final = "11101101"  # Pattern of the recorded run; arbitrary
 MOST_GAPS: Final = 500  # Largest number of gaps in a double-pulse test; arbitrary

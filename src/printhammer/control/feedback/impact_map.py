@@ -16,11 +16,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from printhammer.support.arrays import FloatArray, IntArray
+from printhammer.support.threads import Progress
+
 if TYPE_CHECKING:
     from printhammer.control.feedback.plant import Driver, Plant
     from printhammer.drive.waveforms.shapes import Switched
-    from printhammer.support.arrays import FloatArray, IntArray
-    from printhammer.support.threads import Progress
 
 AHEAD: Final = 1e-6  # Time before the touch at which the simulations of a map begin, s
 PUSHED, FREE = 0, 1

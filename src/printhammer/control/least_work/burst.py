@@ -37,6 +37,7 @@ from printhammer.results import Declared, Result, Rows, part, scalar
 from printhammer.results.declare import Column
 from printhammer.results.files import frame, plain
 from printhammer.results.provenance import provenance
+from printhammer.results.result import Entries
 from printhammer.results.summary import (
     Cells,
     Facts,
@@ -57,8 +58,6 @@ from printhammer.units import from_si
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from printhammer.results.result import Entries
 
 FORCE: Final = 0.9  # Default least force of an adequate dot, relative to the single pulse
 SPACING: Final = 0.6

@@ -7,12 +7,11 @@ differences, all of whose simulations form one ensemble.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 LOST: Final = 25.0  # Deviation assigned to a failed simulation, in tolerances
 _MISSED: Final = 0.05  # Accepted deviation from the arrival time, in units of `ARRIVAL`

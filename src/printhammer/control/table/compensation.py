@@ -50,6 +50,7 @@ from printhammer.results import Result, column, coordinate, part, scalar
 from printhammer.results.declare import Column
 from printhammer.results.files import csv_text, frame, plain
 from printhammer.results.provenance import versions
+from printhammer.results.result import Entries
 from printhammer.results.summary import (
     Cells,
     Grid,
@@ -61,8 +62,6 @@ from printhammer.support.files import read_text, write_file
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from printhammer.results.result import Entries
 
 _NEAR: Final = 1e-9  # Rounding tolerance of a rate, relative, and of a time, s
 _CELLS: Final = "rate history"

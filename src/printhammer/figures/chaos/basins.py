@@ -8,25 +8,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
+from printhammer.chaos.basins.basins import Basins
+from printhammer.chaos.basins.quench import QuenchMap
+from printhammer.chaos.orbits.manifolds import Manifolds
 from printhammer.figures.chaos.strobe import shown_period
 from printhammer.figures.elements.map_marks import edges
 from printhammer.figures.elements.marks import dashed, dots, heading, legend_above, legend_below, place_lines
 from printhammer.figures.elements.scales import Scale, label, scale
 from printhammer.figures.elements.style import BLUE, INK, MUTED, ORANGE, SMALL, new_panel, sign, styled
 from printhammer.figures.paper.motion import DELAYS
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
-
-    from printhammer.chaos.basins.basins import Basins
-    from printhammer.chaos.basins.quench import QuenchMap
-    from printhammer.chaos.orbits.manifolds import Manifolds
 
 COLOURS: Final = {"stable": BLUE, "unstable": ORANGE}
 _LIGHT: Final = {"stable": "white", "unstable": INK}

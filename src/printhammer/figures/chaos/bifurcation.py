@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from printhammer.chaos.bifurcation.diagram import Bifurcation, cells, hysteresis
 from printhammer.errors import InputError
@@ -15,10 +17,6 @@ from printhammer.figures.elements.scales import Scale, label, scale
 from printhammer.figures.elements.style import new_figure, sign, styled
 from printhammer.hammer.names import PERIOD
 from printhammer.support.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 SHADES: Final = {
     "period-1": style.BLUE,

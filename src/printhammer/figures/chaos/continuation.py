@@ -4,23 +4,20 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
+from printhammer.chaos.continuation.branch import Branch
 from printhammer.chaos.continuation.crossings import CROSSINGS
+from printhammer.chaos.continuation.regimes import Branches
 from printhammer.errors import InputError
 from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import legend_in_columns
 from printhammer.figures.elements.style import new_panel, sign, styled
 from printhammer.support.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from printhammer.chaos.continuation.branch import Branch
-    from printhammer.chaos.continuation.regimes import Branches
 
 # Colour of an orbit period, in firings
 _COLOURS: Final = {1: style.BLUE, 2: style.ORANGE, 3: style.GREEN, 4: style.YELLOW}

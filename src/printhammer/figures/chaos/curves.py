@@ -6,23 +6,20 @@ period.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
+from printhammer.chaos.curves.bifurcation_curve import BifurcationCurve
+from printhammer.chaos.curves.stability_chart import StabilityChart
 from printhammer.errors import InputError
 from printhammer.figures.chaos.continuation import axis_of
 from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import legend_in_columns
 from printhammer.figures.elements.style import new_panel, sign, styled
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.patches import Patch
-
-    from printhammer.chaos.curves.bifurcation_curve import BifurcationCurve
-    from printhammer.chaos.curves.stability_chart import StabilityChart
 
 CURVES: Final = {
     "fold": (style.BLUE, "-"),

@@ -10,9 +10,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from printhammer.chaos import (
     CorrelationDimension,
@@ -39,10 +41,6 @@ from printhammer.figures.elements.style import (
     styled,
 )
 from printhammer.support.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _COLOURS: Final = (style.BLUE, style.ORANGE)
 _SIGMAS: Final = 3.0

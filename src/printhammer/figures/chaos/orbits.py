@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from printhammer.chaos.orbits.collection import Orbits
 from printhammer.chaos.orbits.orbit import Orbit
@@ -27,10 +29,6 @@ from printhammer.figures.elements.style import new_figure, sign, styled
 from printhammer.run.motion import Motion
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 POINTS: Final = 600
 """Number of strobe points drawn below the orbits, after discarding a third as many firings."""

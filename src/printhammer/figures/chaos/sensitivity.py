@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from printhammer.derivatives.sensitivities import Sensitivities
 from printhammer.errors import InputError
@@ -14,10 +16,6 @@ from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import beside, heading, note
 from printhammer.figures.elements.style import new_figure, sign, styled
 from printhammer.support.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 SHOWN: Final = ("flight_time", "impact_speed", "peak_force", "net_loss")
 """Quantities drawn by default: flight time, impact speed, peak force and net loss."""

@@ -8,10 +8,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
+from printhammer.chaos import ImpactTrain, Section, Strobe
 from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import HALO, dashed, dots, freest, heading, note
 from printhammer.figures.elements.scales import Scale, label, scale
@@ -29,12 +32,6 @@ from printhammer.figures.elements.style import (
 )
 from printhammer.run.regime import Window
 from printhammer.units import from_si
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from printhammer.chaos import ImpactTrain, Section, Strobe
 
 _FEW: Final = 20
 """Smallest number of points for which an inset is drawn; arbitrary."""

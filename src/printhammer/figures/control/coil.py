@@ -8,9 +8,11 @@
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from printhammer.control.dead_time import DeadTime
 from printhammer.control.duty import ThermalDuty
@@ -20,10 +22,6 @@ from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import heading
 from printhammer.figures.elements.scales import scale
 from printhammer.figures.elements.style import new_figure, new_panel, sign, styled
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 @styled

@@ -6,10 +6,15 @@ rate.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
+from printhammer.control.feedback.comparison import Feedback
+from printhammer.control.least_work.burst import LeastWork
+from printhammer.control.least_work.rates import LeastWorkRates
 from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import beside, dashed, dots, heading, legend_above
 from printhammer.figures.elements.scales import Scale, label, scale
@@ -18,14 +23,6 @@ from printhammer.figures.elements.timeline import between_surfaces, current_betw
 from printhammer.run.energy import coil_power
 from printhammer.support.arrays import FloatArray
 from printhammer.units import from_si
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from printhammer.control.feedback.comparison import Feedback
-    from printhammer.control.least_work.burst import LeastWork
-    from printhammer.control.least_work.rates import LeastWorkRates
 
 _COLOURS: Final = (style.ORANGE, style.YELLOW, style.GREEN)
 _MARKS: Final = ("s", "^", "D")

@@ -5,9 +5,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from printhammer.control.learning.learn import Learning
 from printhammer.control.table.compensation import CompensationTable
@@ -21,10 +23,6 @@ from printhammer.printing.dots.strategy import LEAD_IN
 from printhammer.printing.rates.quality import PITCH
 from printhammer.support.arrays import FloatArray
 from printhammer.units import from_si
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _FEW: Final = 4  # Number of rates from which curves replace maps; arbitrary
 _LINES: Final = (style.BLUE, style.ORANGE, style.GREEN, style.YELLOW)

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
+from printhammer.run.motion import Motion
 from printhammer.support.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.run.motion import Motion
 
 SETTLED: Final = 0.01
 """Distance from the final position, relative to the range of motion, that counts as settled; arbitrary."""

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 import numpy.typing as npt
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 
 from printhammer.errors import InputError
 from printhammer.figures.elements.marks import ALONG_Y, beside, legend_above
@@ -15,13 +20,6 @@ from printhammer.figures.elements.style import HAIR, INK, MUTED, ORANGE, SMALL, 
 from printhammer.hammer.hammer import Hammer
 from printhammer.maps.layout import failed_rates, places_of
 from printhammer.support.arrays import FloatArray
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.collections import QuadMesh
-    from matplotlib.colors import Normalize
-    from matplotlib.figure import Figure
 
 COLOURS: Final = "viridis"
 """Name of the colour map: perceptually uniform and suited to the colour-blind (Smith, van der Walt, 2015)."""

@@ -6,10 +6,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.text import Text
 
 from printhammer.figures.elements.curves import places
 from printhammer.figures.elements.scales import Scale, label, scale
@@ -28,11 +31,6 @@ from printhammer.figures.elements.style import (
 from printhammer.hammer.hammer import Hammer
 from printhammer.run.motion import Motion
 from printhammer.support.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.text import Text
 
 CURVE: Final = "curve:"
 """Prefix of the label of every line that labels and insets must not cover."""

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final, Literal
+from typing import Final, Literal
+
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.axes._secondary_axes import SecondaryAxis
 
 from printhammer.results import Declared, part
 from printhammer.support.arrays import FloatArray
 from printhammer.units import from_si
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-    from matplotlib.axes import Axes
-    from matplotlib.axes._secondary_axes import SecondaryAxis
 
 Name = Literal["displacement", "velocity", "force", "time", "current"]
 

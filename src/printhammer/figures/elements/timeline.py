@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from printhammer.figures.elements import marks, style
 from printhammer.figures.elements.curves import places, times_of
@@ -11,10 +14,6 @@ from printhammer.figures.elements.scales import label, scale
 from printhammer.figures.elements.style import new_figure, sign, styled, with_strip
 from printhammer.hammer.hammer import Hammer
 from printhammer.run.motion import Motion
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _COLOURS: Final = (style.BLUE, style.ORANGE, style.GREEN)
 _HEADROOM: Final = 0.08  # Room above the motion, as a fraction of its range; arbitrary

@@ -9,10 +9,13 @@ Figure 9: displacement in colours, against time and firing rate, in bursts of ni
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from printhammer.figures.elements import map_marks
@@ -23,11 +26,6 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.maps.frequency import rms_difference
 from printhammer.maps.layout import places_of
 from printhammer.support.arrays import FloatArray
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 @styled

@@ -11,7 +11,9 @@ prints while the armature stays clear of the backstop.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
+
+from matplotlib.figure import Figure
 
 from printhammer.errors import InputError
 from printhammer.figures.elements.curves import fired, shown_until
@@ -23,9 +25,6 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.buzz import BuzzSearch, BuzzTrain
 from printhammer.run.motion import Motion
 from printhammer.units import from_si, parse
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def single_pulse(hammer: Hammer, *, duration: float | str | None = None) -> Figure:

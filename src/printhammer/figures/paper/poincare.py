@@ -5,8 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from string import ascii_lowercase
-from typing import TYPE_CHECKING, Final, Literal
+from typing import Final, Literal
 
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from printhammer.chaos import Strobe
 from printhammer.errors import InputError
 from printhammer.figures.chaos.strobe import RING, panel, scales_of, shown_period
 from printhammer.figures.elements.curves import waveform_of
@@ -15,12 +19,6 @@ from printhammer.figures.elements.scales import Scale, label
 from printhammer.figures.elements.style import INK, SMALL, new_figure, sign, styled
 from printhammer.hammer.hammer import Hammer
 from printhammer.run.scheme_runs import Reading, Scheme
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from printhammer.chaos import Strobe
 
 PERIODS: Final = tuple(hundredths / 1e5 for hundredths in range(135, 75, -5))
 """Strobe times of the panels of Fig. 11, s: from 1.35 ms down to 0.80 ms."""

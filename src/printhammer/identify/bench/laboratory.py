@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -27,11 +27,9 @@ from printhammer.identify.bench.sensor import (
     wrong_rows,
 )
 from printhammer.results import Column, Result, part, scalar
+from printhammer.results.result import Entries
 from printhammer.support.arguments import checked
 from printhammer.support.arrays import FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from printhammer.results.result import Entries
 
 KINDS: Final = tuple(BENCHES)
 """Kinds of measurements that can be simulated."""

@@ -6,17 +6,15 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Self
+from typing import Any, ClassVar, Final, Self
 
 from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 
 from printhammer.errors import InputError
 from printhammer.parts.base import MagnetPart
+from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import folder_of
 from printhammer.support.tables.readings import read_table
-
-if TYPE_CHECKING:
-    from printhammer.support.arrays import FloatArray
 
 UNITS: Final = {"force": "N", "linkage": "Wb"}
 """SI unit of each quantity that a table may hold."""

@@ -26,14 +26,12 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from printhammer.parts.base import register
 from printhammer.parts.magnet._cells import cell_of
 from printhammer.parts.magnet._grid import Grid, GridMagnet, bicubic, cell_at_zero
-
-if TYPE_CHECKING:
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 
 def magnet_force(c: Any, x: float, current: float) -> float:

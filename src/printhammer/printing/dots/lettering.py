@@ -20,15 +20,13 @@ from functools import cache, lru_cache
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
+from PIL.ImageFont import FreeTypeFont
 
 from printhammer.errors import InputError
 from printhammer.support.arrays import BoolArray
-
-if TYPE_CHECKING:
-    from PIL.ImageFont import FreeTypeFont
 
 NAME: Final = "nine-wire"
 WIRES: Final = 9  # Number of wires of the built-in font

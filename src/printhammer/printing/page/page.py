@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, fields
-from typing import TYPE_CHECKING, Any, Final, Unpack
+from typing import Any, Final, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -35,6 +35,7 @@ from printhammer.printing.dots.strategy import OpenLoop, Strategy, name_of, open
 from printhammer.printing.dots.trial import Case, Trial, attempt
 from printhammer.printing.page.pattern import Pattern
 from printhammer.results import Column, Declared, Result, column, derived, part, scalar
+from printhammer.results.result import Entries
 from printhammer.results.summary import (
     FactRow,
     Facts,
@@ -43,9 +44,6 @@ from printhammer.results.summary import (
 )
 from printhammer.run.effort import DISPLAY, Effort, Keywords, computation
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArray
-
-if TYPE_CHECKING:
-    from printhammer.results.result import Entries
 
 DENSITY: Final = 1.0
 """Optical density of the single-pulse dot, an assumption: a tenth of the light is reflected."""
