@@ -33,21 +33,10 @@ from printhammer.hammer.names import (
 )
 from printhammer.results import Declared, part, scalar
 from printhammer.run.effort import AtFixedTolerance, Keywords
+from printhammer.run.plain.posing import PAPER_V, PAPER_X, is_the_paper, part_of_window
 from printhammer.run.problem import scales_of
 from printhammer.support.arrays import BoolArray, FloatArray
 from printhammer.support.constants import Quantity, quantities
-
-PAPER_X: Final = (38.1e-6, 88.9e-6)
-"""Displacements of the window of Fig. 11 of Hendriks (1983), m: 0.0015 to 0.0035 in."""
-
-PAPER_V: Final = (-0.635, 0.635)
-"""Velocities of the window of Fig. 11, m/s: -25 to +25 in/s."""
-
-PAPER_BACKSTOP: Final = 50.8e-6  # Position of the paper's backstop, m: 0.002 in
-PAPER_FRONT: Final = 203.2e-6  # Front of the paper's pack, m: 0.008 in
-
-_SAME: Final = 1e-3  # Relative difference within which positions are those of the paper
-_PART: Final = 1.0 / 6.0  # Half-width of the paper's window relative to the way from backstop to pack
 
 
 class Window(Declared):
@@ -80,14 +69,11 @@ def window_of(hammer: Hammer, drive: Drive) -> Window:
     the origin, lies a quarter of the width from the left.
     """
     place, front = hammer.position, hammer.front
-    if (
-        place is not None
-        and front is not None
-        and math.isclose(place, PAPER_BACKSTOP, rel_tol=_SAME)
-        and math.isclose(front, PAPER_FRONT, rel_tol=_SAME)
-    ):
+    place = math.nan if place is None else place
+    front = math.nan if front is None else front
+    if is_the_paper(place, front):
         return PAPER_WINDOW
-    part = _PART if place is not None and front is not None else 1.0
+    part = part_of_window(place, front)
     way, speed = (part * scale for scale in scales_of(hammer, drive, (hammer.origin, 0.0)))
     return Window((hammer.origin - 0.5 * way, hammer.origin + 1.5 * way), (-speed, speed))
 

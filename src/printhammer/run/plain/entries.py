@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any, Final
 from printhammer.drive import tables
 from printhammer.hammer.hammer import Hammer
 from printhammer.kernel.model.laws import Laws
-from printhammer.kernel.readout import codes, contacts, curves, energy, line, peaks, section
+from printhammer.kernel.readout import codes, contacts, curves, energy, line, newton, peaks, section
 from printhammer.parts import MagnetPart, Part
 from printhammer.parts.coil import Winding
-from printhammer.run.plain import page
+from printhammer.run.plain import page, posing
 
 if TYPE_CHECKING:
     from printhammer.kernel.compile.modules import Module, WebModule
@@ -70,6 +70,12 @@ _ENTRIES: Final[dict[str, tuple[Any, ...]]] = {
     "distances": (section.write_distances, ("f2", "i1", "f1", "f1"), 2),
     "classify": (section.class_of, ("i", "i", "f", "f", "b", "i"), 1),
     "settled": (section.settled_period, ("f2", "f1", "i", "b"), 1),
+    "half_widths": (posing.write_half_widths, ("f", "f", "f", "f", "f1")),
+    "is_planar": (newton.is_planar, ("f1",), 1),
+    "guess": (newton.write_guess, ("f2", "f1", "i", "i", "f2", "f2"), 1),
+    "image": (newton.write_image, ("f1", "f2", "f", "f2", "f", "f1", "f1"), 1, True),
+    "improve": (newton.improve, ("f2", "b", "f1", "f2", "f2", "f1"), 1),
+    "has_settled": (newton.has_settled, ("f2", "f1", "f2", "f1", "i", "f1"), 1),
 }
 """Functions by name, with the types of their arguments (as in `printhammer.kernel.compile.calls.Signature`),
 the number of integers that they return, whether they use names of the kernel, and whether they use functions

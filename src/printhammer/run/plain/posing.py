@@ -40,6 +40,48 @@ LAST: Final = 1.0
 """Upper limit of a window, s."""
 
 
+PAPER_X: Final = (38.1e-6, 88.9e-6)
+"""Displacements of the window of Fig. 11 of Hendriks (1983), m: 0.0015 to 0.0035 in."""
+
+PAPER_V: Final = (-0.635, 0.635)
+"""Velocities of the window of Fig. 11, m/s: -25 to +25 in/s."""
+
+PAPER_BACKSTOP: Final = 50.8e-6
+"""Position of the paper's backstop, m: 0.002 in."""
+
+PAPER_FRONT: Final = 203.2e-6
+"""Front of the paper's pack, m: 0.008 in."""
+
+SAME: Final = 1e-3
+"""Relative difference within which positions are those of the paper."""
+
+PART: Final = 1.0 / 6.0
+"""Half-width of the paper's window, relative to the way from backstop to pack."""
+
+
+def is_the_paper(position: float, front: float) -> bool:
+    """Whether backstop and pack have the positions of the paper, m; NaN for a missing one."""
+    near = abs(position - PAPER_BACKSTOP) <= SAME * max(abs(position), PAPER_BACKSTOP)
+    return near and abs(front - PAPER_FRONT) <= SAME * max(abs(front), PAPER_FRONT)
+
+
+def part_of_window(position: float, front: float) -> float:
+    """Return the half-widths of the strobe window as a fraction of the scales of a hammer."""
+    return 1.0 if math.isnan(position) or math.isnan(front) else PART
+
+
+def write_half_widths(way: float, speed: float, position: float, front: float, out: Any) -> None:
+    """Write the half-widths of the strobe window, m and m/s, see `printhammer.run.regime.window_of`.
+
+    `way` and `speed` are the scales of a hammer that starts at its origin, m and m/s; `position` and `front`
+    are those of backstop and pack, m, NaN without one.
+    """
+    part = part_of_window(position, front)
+    out[0], out[1] = part * way, part * speed
+    if is_the_paper(position, front):
+        out[0], out[1] = 0.5 * (PAPER_X[1] - PAPER_X[0]), 0.5 * (PAPER_V[1] - PAPER_V[0])
+
+
 class Coil(NamedTuple):
     """Functions and constants of a coil that a voltage drives."""
 

@@ -11,8 +11,14 @@ export function crewOf(script, shelf) {
     worker.postMessage({ limits: { ...shelf.limits, ...shelf.sentences } });
     worker.onmessage = ({ data }) => {
       const { order } = own;
+      if (data.going || data.frame) {
+        // On the way: a frame of what is done so far, or only a sign of life.
+        order.onward(data);
+        if (!order.wanted()) worker.postMessage({ drop: data.number });
+        return;
+      }
       own.order = null;
-      order.done(data);
+      order.done(data.frames === null ? null : data);
       next();
     };
     worker.onerror = (event) => {
@@ -51,10 +57,10 @@ export function crewOf(script, shelf) {
   }
   return {
     count,
-    /** Order a work; `done` gets { frames } or { reason }, or null where it is not wanted any more when its turn comes. */
-    send(team, work, state, more, wanted, done) {
+    /** Order a work; `done` gets { frames } or { reason }, or null where it is not wanted any more; `onward` what comes on the way. */
+    send(team, work, state, more, wanted, done, onward = () => {}) {
       number += 1;
-      teams[team].orders.push({ name: state.hammer, message: { number, work, state, ...more }, wanted, done });
+      teams[team].orders.push({ name: state.hammer, message: { number, work, state, ...more }, wanted, done, onward });
       next();
     },
   };

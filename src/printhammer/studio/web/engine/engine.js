@@ -10,6 +10,10 @@ const WORKS = { strobe: "section", line: "line" };
 const QUESTIONS = ["curves", "dots", "exponent", "verdict"];
 const BEFORE = "this still belongs to what was set before";
 const NOT_YET = "being computed";
+const PROGRESS = 1000; // ms after which long work is told of
+const DOING = { line: "printing the line", strobe: "following the endless train" };
+const JUDGED = [1001, 2000]; // firings by which an endless train is classified
+const SCREENED = 200; // firings for the exponent at one rate of a search
 const NOTHING = { map: { detail: "none" }, strobe: { verdict: null } };
 
 /** Start the engine; `receive` takes its frames. Returns what takes the text of a message. */
@@ -20,6 +24,7 @@ export function engineOf(shelf, script, receive, page) {
   const [shown, whole] = [{}, {}]; // the keys of what views show, and of what is complete
   const seen = {}; // the numbers of the states that views show
   const keyOf = (state, names) => JSON.stringify(names.map((name) => state[name]));
+  const section = () => ({ counts: shelf.limits.POINTS_OF_SECTION, judged: JUDGED });
   const hasPack = ({ hammer }) => shelf.hammers[hammer].described.places.front !== null;
   const isWanted = (state, view) => state.views.includes(view) && (view !== "line" || (state.line.trim() && hasPack(state)));
   const refuse = (serial, reason) => receive({ kind: "refusal", serial, reason: reason.slice(0, shelf.limits.LONGEST_REASON), data: {} });
@@ -48,24 +53,35 @@ export function engineOf(shelf, script, receive, page) {
       receive({ ...dots, serial });
       const isBehind = (view) => isWanted(state, view) && whole[view] !== keyOf(state, KEYS[view]);
       if (isBehind("map")) draw(serial, state);
-      if (isBehind("line")) follow(serial, state, "line", [{}]);
-      if (isBehind("strobe")) follow(serial, state, "strobe", shelf.limits.POINTS_OF_SECTION.map((points) => ({ points })));
+      if (isBehind("line")) follow(serial, state, "line");
+      if (isBehind("strobe")) follow(serial, state, "strobe", section());
     });
   }
 
-  /** Order a view that is behind: once, or step by step, until the state is replaced. */
-  async function follow(serial, state, view, steps) {
-    for (const [number, more] of steps.entries()) {
-      const answer = await new Promise((done) => { crew.send("map", WORKS[view], state, more, () => latest === serial, done); });
-      // What was begun is shown while a slider moves on, unless something newer is.
-      if (!answer || serial < (seen[view] ?? 0) || (number && latest !== serial)) return;
+  /** Order a view that is behind; show it whenever there is more of it, until the state is replaced. */
+  async function follow(serial, state, view, more = {}) {
+    const begun = performance.now();
+    let told = begun;
+    const show = (frame) => {
+      if (serial < (seen[view] ?? 0)) return;
       seen[view] = serial;
       shown[view] = keyOf(state, KEYS[view]);
       whole[view] = null; // what was complete is no longer shown
-      receive(answer.reason ? { kind: view, serial, reason: answer.reason, ...NOTHING[view], data: {} } : { ...answer.frames[0], ...(view === "strobe" ? { last: steps.at(-1).points } : {}), serial });
-      if (answer.reason) return;
-    }
-    whole[view] = shown[view];
+      receive({ ...frame, serial });
+    };
+    const progress = (what) => receive({ kind: "progress", serial, role: "detail", what, seconds: (performance.now() - begun) / 1000, data: {} });
+    const onward = ({ frame }) => {
+      if (frame) show(frame);
+      if (latest !== serial || performance.now() < told + PROGRESS) return;
+      told = performance.now();
+      progress(DOING[view]);
+    };
+    const answer = await new Promise((done) => { crew.send("map", WORKS[view], state, more, () => latest === serial, done, onward); });
+    if (told > begun) progress("");
+    if (!answer) return;
+    if (answer.reason) show({ kind: view, reason: answer.reason, ...NOTHING[view], data: {} });
+    else for (const frame of answer.frames) show(frame);
+    if (!answer.reason && seen[view] === serial) whole[view] = shown[view];
   }
 
   /** Draw the map of a state: coarse at once, then whole, unless the state is replaced meanwhile. */
@@ -104,11 +120,23 @@ export function engineOf(shelf, script, receive, page) {
   };
 
   function ask(kind, serial, state) {
-    if (kind === "exponent" || kind === "verdict") throw new Refusal(shelf.sentences.strobe);
+    if (kind === "exponent" || kind === "verdict") { judge(kind, serial, state); return; }
     crew.send("curves", "curves", state, {}, () => true, ({ reason, frames }) => {
       if (reason) refuse(serial, reason);
       else receive({ ...frames[kind === "curves" ? 0 : 1], serial, outdated: {} });
     });
+  }
+
+  /** Answer what the exponent or the class of the endless train of a state is. */
+  function judge(kind, serial, state) {
+    const isVerdict = kind === "verdict";
+    let last = null;
+    const done = ({ reason }) => {
+      if (isVerdict && reason) refuse(serial, reason);
+      else receive(isVerdict ? { ...last, serial } : { kind: "exponent", serial, exponent: last?.exponent ?? null, reason: reason ?? "", data: {} });
+    };
+    const more = isVerdict ? section() : { counts: [SCREENED], judged: null };
+    crew.send("map", "section", state, more, () => true, done, ({ frame }) => { last = frame ?? last; });
   }
 
   return (text) => {

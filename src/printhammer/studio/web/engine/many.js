@@ -1,5 +1,5 @@
-// Many runs of a state: pieces of its map, its strobe section.
-import { firingsOf, pose, STATUS } from "./problem.js";
+// Many runs of a state: pieces of its map, its printed line.
+import { pose } from "./problem.js";
 
 const ROW = 6; // columns of a row of dots
 const CONTACTS = 0; // column of the contacts of a firing
@@ -84,16 +84,4 @@ function nextFloat(value) {
   new Float32Array(bits.buffer)[0] = float[0];
   bits[0] += float[0] >= 0 ? 1 : -1;
   return new Float32Array(bits.buffer)[0] || 1e-45;
-}
-
-/** The states at the firings of an endless train. */
-export function section(kernel, hammer, state, limits, points) {
-  return kernel.temporarily(() => {
-    const posed = pose(kernel, hammer, state, limits);
-    const times = firingsOf(kernel, { ...state, pattern: "", pulses: points + 1 });
-    const kept = many(kernel, posed, kernel.copy("f", times), [times.length], [times.at(-1)], { strobes: times, most: limits.MOST_SECTION_STEPS * Math.ceil(points / 25), control: posed.exact });
-    const width = kept.strobes.shape[1];
-    const column = (k) => Float32Array.from({ length: points }, (_, row) => kept.strobes.values[row * width + k]);
-    return { kind: "strobe", status: STATUS[Number(kept.status.values[0])], rate: state.rate, verdict: null, exponent: null, unjudged: true, last: points, reason: "", data: { x: column(0), v: column(1) } };
-  });
 }

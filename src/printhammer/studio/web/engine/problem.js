@@ -5,10 +5,11 @@ const FLIGHTS = { nodes: 2048, contacts: 256, each: 40, most: 1e6 }; // sizes of
 export const STATUS = ["ok", "range left", "runaway", "step limit", "step underflow"];
 const ARRAYS = ["body", "damping", "spring", "pack", "backstop", "coil", "magnet"];
 const KINDS = ["current", "force", "voltage"];
-const ABOUT = { count: 14, largest: 2, replaces: 3, shown: 13 }; // numbers about a pulse
+const ABOUT = { count: 14, support: 0, largest: 2, replaces: 3, shown: 13 }; // numbers about a pulse
 const [PIECES, PIECE] = [8, 6]; // rows and columns of the table of a pulse
 const [GRID, POINTS] = [8192, 24576]; // working space of the search for the rest position
 const SHOWN = 160; // points of the picture of a pulse
+const CURRENT_SCALE = 78; // index of the typical current among the constants
 const SINGLE = 500000; // steps of the single pulse that decides on the window of a run
 
 /** Return the firing times of a state, s. */
@@ -69,7 +70,12 @@ export function pose(kernel, hammer, state, limits) {
   };
   const scaled = scalesOf(kernel, hammer, { ...posed, ends: kernel.copy("f", ends) });
   Object.assign(posed, scaled(state.pattern ? NaN : 1 / state.rate, limits.DISPLAY_TOLERANCE));
-  posed.exact = [...posed.scales, ...scaled(NaN, limits.TOLERANCE).control.slice(2)];
+  posed.controlAt = (tolerance) => [...posed.scales, ...scaled(NaN, tolerance).control.slice(2)];
+  posed.exact = posed.controlAt(limits.TOLERANCE);
+  posed.atOrigin = () => scaled(1 / state.rate, limits.TOLERANCE, posed.places.backstop ?? 0).scales;
+  posed.currentScale = posed.constants.values[CURRENT_SCALE];
+  // How many earlier pulses still act at a firing of an endless train.
+  posed.memory = state.overlap === "replace" ? 1 : Math.ceil(about[ABOUT.support] * state.rate) + 1;
   return posed;
 }
 
@@ -108,11 +114,11 @@ function kept(device) {
   return { ...device, ...Object.fromEntries(copies) };
 }
 
-/** Return a function of the period of a train, s, and a tolerance, which gives the control and the bounds of a run. */
+/** Return a function of the period of a train, s, a tolerance and a start, m, which gives the control and the bounds of a run. */
 function scalesOf(kernel, hammer, { constants, ends, peak, rest }) {
-  return (period, tolerance) => {
+  return (period, tolerance, start = rest) => {
     const out = kernel.array("f", 8);
-    kernel.call("scales", constants, ends, KINDS.indexOf(hammer.quantity), peak, period, kernel.copy("f", [rest, 0]), tolerance, out);
+    kernel.call("scales", constants, ends, KINDS.indexOf(hammer.quantity), peak, period, kernel.copy("f", [start, 0]), tolerance, out);
     const list = [...out.values];
     return { control: list.slice(0, 4), bounds: list.slice(4), scales: list.slice(0, 2) };
   };

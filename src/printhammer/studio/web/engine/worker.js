@@ -1,9 +1,10 @@
 // A worker: it has the kernels of the hammers it was sent, and answers one order after the other.
 import { Kernel } from "./call.js";
 import { line } from "./line.js";
-import { codes, piece, section } from "./many.js";
+import { codes, piece } from "./many.js";
 import { curves } from "./pictures.js";
 import { Refusal } from "./read.js";
+import { section } from "./strobe.js";
 
 const kernels = new Map();
 let limits = {};
@@ -13,21 +14,43 @@ const WORKS = {
   piece: (kernel, hammer, { state, part }) => [piece(kernel, hammer, state, limits, part)],
   codes: (kernel, _hammer, { part }) => [codes(kernel, part)],
   line: (kernel, hammer, { state }) => [line(kernel, hammer, state, limits)],
-  section: (kernel, hammer, { state, points }) => [section(kernel, hammer, state, limits, points)],
+  section: (kernel, hammer, { state, counts, judged }) => section(kernel, hammer, state, limits, { counts, judged }),
 };
 
-onmessage = ({ data }) => {
+const LOOK = 30; // ms of work between two looks at whether it is still wanted
+let dropped = 0;
+
+const arraysOf = (frame) => Object.values({ ...frame.data, ...(frame.x ? { x: frame.x } : {}) });
+const post = (message, frames) => postMessage(message, [...new Set(frames.flatMap(arraysOf).map((array) => array.buffer))]);
+
+/** Work step by step: send the frames on the way, and stop where the work is not wanted any more. */
+async function inSteps(steps, number) {
+  let looked = performance.now();
+  for (const { frame } of steps) {
+    if (frame) post({ number, frame }, [frame]);
+    if (performance.now() < looked + LOOK) continue;
+    postMessage({ number, going: true });
+    await new Promise((next) => { setTimeout(next); });
+    looked = performance.now();
+    if (dropped === number) return null;
+  }
+  return [];
+}
+
+onmessage = async ({ data }) => {
   if (data.limits) { limits = data.limits; return; }
   if (data.module) {
     kernels.set(data.name, { kernel: new Kernel(data.module), hammer: data.hammer });
     return;
   }
+  if (data.drop) { dropped = data.drop; return; }
+  const { number } = data;
   const { kernel, hammer } = kernels.get(data.state.hammer);
   try {
-    const frames = WORKS[data.work](kernel, hammer, data);
-    const buffers = frames.flatMap((frame) => Object.values({ ...frame.data, ...(frame.x ? { x: frame.x } : {}) }).map((array) => array.buffer));
-    postMessage({ number: data.number, frames }, [...new Set(buffers)]);
+    const work = WORKS[data.work](kernel, hammer, data);
+    const frames = Array.isArray(work) ? work : await inSteps(work, number);
+    post({ number, frames }, frames ?? []);
   } catch (error) {
-    postMessage({ number: data.number, reason: error instanceof Refusal ? error.message : `this could not be computed, ${error}` });
+    postMessage({ number, reason: error instanceof Refusal ? error.message : `this could not be computed, ${error}` });
   }
 };

@@ -1,0 +1,89 @@
+"""The worker of the page in Node: states in, frames out, as a browser would compute them."""
+
+import json
+import subprocess
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from printhammer.studio.bundle import merged
+from printhammer.studio.live import content_of
+from printhammer.studio.states.shelf import Shelf
+
+HOST = """
+const { readFileSync } = require("node:fs");
+const { createInterface } = require("node:readline");
+const { gunzipSync } = require("node:zlib");
+const content = JSON.parse(readFileSync(process.env.CONTENT, "utf-8"));
+const plain = (_key, value) => (ArrayBuffer.isView(value) ? Array.from(value, Number) : value);
+globalThis.postMessage = (message) => {
+  if (!message.going) console.log(JSON.stringify(message, plain));
+};
+globalThis.onmessage = null;
+"""
+
+SERVE = """
+onmessage({ data: { limits: { ...content.limits, ...content.sentences } } });
+for (const name of content.names) {
+  const hammer = content.hammers[name];
+  const bytes = gunzipSync(Buffer.from(content.modules[hammer.module], "base64"));
+  onmessage({ data: { name, module: new WebAssembly.Module(bytes), hammer } });
+}
+createInterface({ input: process.stdin }).on("line", (line) => onmessage({ data: JSON.parse(line) }));
+"""
+
+
+class Engine:
+    """The worker of a page with the hammers of a shelf."""
+
+    def __init__(self, shelf: Shelf, folder: Path) -> None:
+        content = folder / "content.json"
+        from printhammer.studio.frames import plain
+
+        content.write_text(json.dumps(plain(content_of(shelf))), "utf-8")
+        script = folder / "worker.js"
+        script.write_text(HOST + merged("engine/worker.js") + SERVE, "utf-8")
+        self._process = subprocess.Popen(
+            ["node", str(script)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env={"CONTENT": str(content)},
+        )
+        self._number = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.close()
+        self._process.stdout.close()
+        assert self._process.wait(30) == 0
+
+    def work(self, name: str, state: dict[str, Any], **more: Any) -> list[dict[str, Any]]:
+        """Return the frames of a work for a state, those on the way included; their `data` as arrays.
+
+        A refusal is one frame with the key `refusal`.
+        """
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._number += 1
+        message = {"number": self._number, "work": name, "state": state, **more}
+        print(json.dumps(message), file=self._process.stdin, flush=True)
+        frames = []
+        while True:
+            reply = json.loads(self._process.stdout.readline())
+            if "reason" in reply:
+                return [{"refusal": reply["reason"]}]
+            frames += [reply["frame"]] if "frame" in reply else reply["frames"]
+            if "frames" in reply:
+                break
+        for frame in frames:
+            frame["data"] = {
+                key: np.array([np.nan if value is None else value for value in values])
+                for key, values in frame["data"].items()
+            }
+        return frames

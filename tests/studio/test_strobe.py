@@ -1,0 +1,59 @@
+"""The endless train of a page: its points, exponent and class are those of the library."""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.studio.node import Engine
+from tests.studio.test_live import NAME, OneHammer
+
+import printhammer as ph
+from printhammer.studio.states.state import START
+
+COUNTS, JUDGED = [25, 50, 100, 150, 200], [1001, 2000]
+
+
+@pytest.fixture(scope="module")
+def engine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Engine]:
+    with Engine(OneHammer(), tmp_path_factory.mktemp("engine")) as made:
+        yield made
+
+
+def judged(engine: Engine, rate: float, **changed: Any) -> list[dict[str, Any]]:
+    state = {**START, "hammer": NAME, "rate": rate, **changed}
+    return engine.work("section", state, counts=COUNTS, judged=JUDGED)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rate", [900.0, 1000.0, 1350.0])
+def test_the_class_of_a_motion_is_that_of_the_library(engine: Engine, rate: float) -> None:
+    frames = judged(engine, rate)
+    assert [len(frame["data"]["x"]) for frame in frames] == [*COUNTS, COUNTS[-1]]
+    section = ph.strobe(ph.load(NAME), rate=rate, points=COUNTS[-1])
+    expected = section.verdict
+    assert expected is not None
+    verdict = frames[-1]["verdict"]
+    assert (verdict["verdict"], verdict["nearest_period"]) == (expected.name, expected.nearest)
+    within = 4.0 * (verdict["standard_error"] + expected.standard_error)
+    assert verdict["exponent_per_firing"] == pytest.approx(expected.exponent, abs=within)
+    early = slice(0, 20)
+    np.testing.assert_allclose(frames[-1]["data"]["x"][early], section.x[early], rtol=1e-6)
+    assert [frame["exponent"] is None for frame in frames] == [True, True, True, False, False, True]
+
+
+@pytest.mark.slow
+def test_near_a_doubling_the_class_rests_on_newtons_method(engine: Engine) -> None:
+    # States two firings apart agree, those one firing apart nearly.
+    verdict = judged(engine, 1.0 / 1.0482e-3)[-1]["verdict"]
+    assert verdict["verdict"] == "period-1"
+    assert verdict["multiplier"] == pytest.approx(math.exp(verdict["exponent_per_firing"]), abs=1e-5)
+    assert "Newton's method" in verdict["phrases"][1]
+
+
+@pytest.mark.slow
+def test_a_train_that_leaves_the_range_is_refused(engine: Engine) -> None:
+    pulse = {"shape": "half-sine", "amplitude": -90.0, "width": 4e-4, "quantity": "current"}
+    (refused,) = judged(engine, 1000.0, waveform=pulse)
+    assert "the first 25 strobe points" in refused["refusal"]
