@@ -93,7 +93,7 @@ HEADING = "displacement [um],force [N]\n"
         ("displacement [gee],force [N]\n1,2\n", ("gee", "not known")),
         ("displacement [um]\n1\n", ("'force' is missing",)),
         ("displacement [um],force [N],forse [N]\n1,2,3\n", ("'forse [N]' is not known",)),
-        ("displacement [um],force [N],Force [N]\n1,2,3\n", ("'force' is given twice",)),
+        ("displacement [um],force [N],Force [N]\n1,2,3\n", ("'force' occurs twice",)),
         ("displacement [um],force [N],branch [1]\n1,2,loading\n", ("words have no unit",)),
         ("displacement [um],force [N],branch\n1,2,up\n", ("line 2", "'up'", "loading or unloading")),
         (HEADING + "1,2\n1,x\n", ("line 3", "'force'", "'x'", "number")),

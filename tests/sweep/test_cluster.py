@@ -133,7 +133,7 @@ def test_a_scheduler_that_goes_is_told_and_what_is_done_stays(
             _, errors = process.communicate()
     assert process.returncode == 2, errors
     assert errors.strip().splitlines()[-1] == (
-        "printhammer: the dask scheduler is gone, what is done is kept"
+        "printhammer: the scheduler has stopped; completed blocks are kept"
     )
     assert "Traceback" not in errors
     ph.sweep(spec, out)

@@ -106,7 +106,7 @@ def test_a_file_that_cannot_grow_is_told_and_what_is_done_stays(
 
     failed = subprocess.run(command(spec, out), capture_output=True, text=True, check=False, preexec_fn=limit)
     assert failed.returncode == 2
-    assert failed.stderr.strip().splitlines()[-1].endswith("(File too large), what is done is kept")
+    assert failed.stderr.strip().splitlines()[-1].endswith("(File too large); its blocks are kept")
     assert "Traceback" not in failed.stderr
     assert blocks_done(out) == done
     finished(spec, out)

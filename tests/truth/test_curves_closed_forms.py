@@ -135,7 +135,7 @@ def test_the_chart_of_the_ball() -> None:
         exact = [limit(curve.kind, e) for e in curve.second]
         np.testing.assert_allclose(curve.first / WEIGHT, exact, rtol=SHARP)
     for bad, options, sentence in (
-        (branch, {"first": ("mass", 1.0, 2.0)}, "expected no first parameter and no firing in addition"),
+        (branch, {"first": ("mass", 1.0, 2.0)}, "expected no first parameter and no firing options with it"),
         (branch.regime, {}, "first is missing"),
         (branch, {"bounds": (0.85, 0.9)}, "expected a range around the hammer's own"),
         (branch, {"second": "drive.amplitude"}, "expected another constant than that of the branch"),

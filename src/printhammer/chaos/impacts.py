@@ -372,7 +372,9 @@ def impact_train(
     if isinstance(touches, Regime | Hammer):
         touches = section(touches, **firing)
     elif firing:
-        raise InputError("times are given", key="times", expected=f"no {' or '.join(firing)} beside them")
+        raise InputError(
+            "touches = times", key="times", expected=f"no {' or '.join(firing)} with an array of times"
+        )
     source = touches if isinstance(touches, Section) else None
     times = _times(touches.t if isinstance(touches, Section) else touches, source)
     intervals = np.diff(times)

@@ -321,7 +321,7 @@ def _reference(hammer: Hammer, waveform: Waveform, tolerance: float) -> tuple[_F
             return fired, LONGEST * fired.time
         span *= 2.0
     raise InputError(
-        f"{hammer.path}: expected a hammer whose own pulse reaches what it strikes",
+        f"{hammer.path}: expected a hammer whose own pulse reaches the pack",
         file=hammer.path,
         key="waveform",
     )

@@ -266,7 +266,7 @@ def thermal_duty(
         raise InputError(
             "thermal_capacity is missing",
             key="thermal_capacity",
-            expected="that of the winding beside body_capacity",
+            expected="the heat capacity of the winding in addition to body_capacity",
         )
     coil = ThermalCoil(
         read_positive(thermal_resistance, "K/W", "thermal_resistance"),

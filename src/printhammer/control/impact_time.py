@@ -206,7 +206,7 @@ def impact_time(
             f"dots = {many} and units = {others}",
             key="dots",
             value=many,
-            expected=f"2 to {_MOST_DOTS} dots, and from 2 units to as many",
+            expected=f"2 to {_MOST_DOTS} dots, and 2 or more units, at most one per dot",
         )
     if not levels.size:
         scale = 10.0 if volts else _largest_current(hammer)

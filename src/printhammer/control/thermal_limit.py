@@ -92,7 +92,7 @@ def thermal_limit(
         raise InputError(
             f"{cold.size} ambient temperatures, {rates.size} rates and {rails.size} voltages",
             key="rates",
-            expected="as many of each",
+            expected="equal numbers of each",
         )
     _kinds, group = np.unique(rails, return_inverse=True)
     if not any(np.unique(cold[group == each]).size > 1 for each in group):

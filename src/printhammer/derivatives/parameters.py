@@ -196,7 +196,7 @@ def _table_change(made: Callable[[float], Waveform], value: float, scale: float,
         segments = made(moved).segments()
         if len(segments) != len(kinds) or (segments[:, 1] != kinds).any():
             raise InputError(
-                f"constant = {name!r}: the waveform has other segments beside {value!r}",
+                f"constant = {name!r}: the segments of the waveform change near {value!r}",
                 key="constant",
                 value=name,
             )
@@ -219,7 +219,7 @@ def _difference(function: Callable[[float], FloatArray], value: float, scale: fl
         change = np.asarray(change) / (12.0 * _SPACING)
         return np.where(np.isfinite(change), change, 0.0)
     raise InputError(
-        f"constant = {name!r} has the value {value!r}, at which nothing is differentiable with it",
+        f"constant = {name!r} is {value!r}, where the motion is not differentiable with respect to it",
         key="constant",
         value=name,
     )

@@ -195,7 +195,7 @@ class PulseTrains(Sequence[PulseTrain]):
     def _check(self) -> None:
         """Check the firing times; raise the same InputError as a single train with invalid times."""
         if not len(self):
-            raise InputError("no train is given", key="train", expected="at least one")
+            raise InputError("trains: the list is empty", key="train", expected="at least one")
         times, starts = self._firings.values, self._firings.starts
         counts = self._firings.counts
         with np.errstate(invalid="ignore"):

@@ -133,10 +133,10 @@ def _drive(data: dict[str, Any], standard: Waveform | None, folder: Path) -> Dri
     arguments = _arguments(_table(data[kind], kind), kind)
     for key, others in (("waveform", ("sine", "sequence")), ("waveforms", set(_KEYS) - {"sequence"})):
         if key in data and kind in others:
-            raise InputError(f"{key} beside [{kind}]", expected="no such key", key=key)
+            raise InputError(f"{key} together with [{kind}]", expected="no such key", key=key)
     if kind == "sine":
         if data.get("overlap", "add") != "add":
-            raise InputError("overlap beside [sine]", expected="no such key", key="overlap")
+            raise InputError("overlap together with [sine]", expected="no such key", key="overlap")
         _required(arguments, ("amplitude", "frequency"), kind)
         return _named(kind, SineForce, arguments)
     overlap = data.get("overlap", "add")
@@ -269,7 +269,7 @@ def _waveforms(names: Any, data: dict[str, Any], folder: Path) -> list[Waveform]
                 or "a table [waveforms.NAME] for each name"
             )
             raise InputError(
-                f"sequence.waveforms: {shown(name)} is no waveform of the file",
+                f"sequence.waveforms: {shown(name)} does not name a waveform of the file",
                 key="sequence.waveforms",
                 expected=known,
             )

@@ -61,7 +61,7 @@ class PulseSequence(Drive):
         if times.size != len(fired):
             raise InputError(
                 f"{times.size} firing times",
-                expected=f"as many as the waveforms, {len(fired)}",
+                expected=f"one per waveform, {len(fired)}",
                 key="firing times",
             )
         super().__init__(fired[0], times, overlap, None)

@@ -103,14 +103,12 @@ class PulseTrain(_Pulsed):
             raise InputError.of("waveform", None, "a waveform")
         ways = [name for name, value in (("rate", rate), ("period", period), ("at", at)) if value is not None]
         if len(ways) > 1:
-            raise InputError(
-                f"{ways[0]} and {ways[1]} are given", key=ways[1], expected="one of rate, period and at"
-            )
+            raise InputError(f"{ways[0]} and {ways[1]}", key=ways[1], expected="one of rate, period and at")
         first = read_start(start)
         self._spacing: tuple[str, float] | None = None
         if at is not None:
             if pulses is not None:
-                raise InputError.of("pulses", pulses, "left out where the firing times are given")
+                raise InputError.of("pulses", pulses, "no number of pulses together with firing times")
             super().__init__(waveform, read_times(at) + first, overlap, None)
             return
         count = read_count((PULSES if ways else 1) if pulses is None else pulses, "pulses")
@@ -119,7 +117,7 @@ class PulseTrain(_Pulsed):
                 f"pulses = {count}",
                 key="pulses",
                 value=count,
-                expected="a rate, a period or firing times beside it",
+                expected="a rate, a period or firing times in addition",
             )
         steps, self._spacing, spacing = even_times(rate, period, count) if ways else (np.zeros(1), None, None)
         super().__init__(waveform, first + steps, overlap, spacing)

@@ -353,7 +353,7 @@ def _start(hammer: Hammer, names: list[str], trace: Trace) -> tuple[Hammer, Floa
     top = int(np.argmax(current))
     if not (current[top] > 0.0 and trace.waveform.peak > 0.0):
         raise InputError(
-            f"{trace.table.path}: there is no current or no voltage",
+            f"{trace.table.path}: the record lacks a current or a voltage",
             file=trace.table.path,
             key="current",
             expected="a record of both",

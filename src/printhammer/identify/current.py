@@ -91,7 +91,7 @@ def probe_current(
     run = simulate(hammer, PulseTrain(waveform), duration=float(fine[-1]), state=state, points=2)
     if not run.ok:
         raise InputError(
-            f"{hammer.path}: the current did not reach its end: {run.message}",
+            f"{hammer.path}: the simulation of the current ended early: {run.message}",
             file=hammer.path,
             key="current",
         )

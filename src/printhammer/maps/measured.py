@@ -97,7 +97,7 @@ def checked(
     if twice.size:
         first, second = (places[order[twice[0] + k]] for k in (0, 1))
         raise InputError(
-            f"{what}: {second}: time {at[twice[0]]:.9g} s at {rate:.9g} Hz is given before, in {first}",
+            f"{what}: {second}: time {at[twice[0]]:.9g} s at {rate:.9g} Hz occurs before, in {first}",
             file=what,
             key="time",
             expected="one displacement for each time",
@@ -268,7 +268,7 @@ def _stored_records(path: Path) -> list[RateRecord]:
         where = f"row {row + 1}"
         if not known.any() or float(rate) in records:
             raise InputError(
-                f"{what}: {where}: rate {rate:.9g} Hz has no times or is given twice",
+                f"{what}: {where}: rate {rate:.9g} Hz has no times or occurs twice",
                 file=what,
                 key=where,
                 expected="one record for each rate",
@@ -301,7 +301,7 @@ def _opened(path: Path) -> Any:
 def _variable(stored: xr.Dataset, what: str, name: str) -> FloatArray:
     if name not in stored.variables:
         there = ", ".join(map(str, stored.variables)) or "nothing"
-        raise InputError(f"{what}: expected the variable {name}, there is {there}", file=what, key=name)
+        raise InputError(f"{what}: expected the variable {name}; the file has {there}", file=what, key=name)
     unit = stored[name].attrs.get("units")
     if not isinstance(unit, str):
         raise InputError(

@@ -154,7 +154,7 @@ class Store:
         for name, asked in self._layout.identity.items():
             if there.get(name) != asked:
                 raise InputError(
-                    f"{self.path}: the store was made with {name.replace('_', ' ')} {there.get(name)}",
+                    f"{self.path}: the store was written with {name.replace('_', ' ')} {there.get(name)}",
                     file=self.path,
                     key=name,
                     expected=f"{asked}, or another folder for the results",
@@ -201,7 +201,7 @@ class Store:
 
     def _refusal(self, error: OSError) -> InputError:
         return InputError(
-            f"{self.path}: the store cannot be written ({error.strerror or error}), what is done is kept",
+            f"{self.path}: the store cannot be written ({error.strerror or error}); its blocks are kept",
             file=self.path,
         )
 

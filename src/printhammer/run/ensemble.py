@@ -203,7 +203,7 @@ class Ensemble:
         self.size = max(counts.values()) if min(counts.values()) > 0 else 0
         for name, count in counts.items():
             if count not in (1, self.size):
-                raise InputError(f"{name}: {count} are given", key=name, expected=f"1 or {self.size}")
+                raise InputError(f"{name}: {count} entries", key=name, expected=f"1 or {self.size}")
         wrong = ~(np.isfinite(moments) & (moments > 0.0))
         if wrong.any():
             raise InputError.of("ends", float(moments[wrong][0]), "positive numbers", unit="s")

@@ -164,14 +164,14 @@ class Regime(Declared):
             named_beside = [name for name, value in zip(named, values, strict=True) if value is not None]
             if named_beside:
                 raise InputError(
-                    "a regime is given", key="regime", expected=f"no {' or '.join(named_beside)} beside it"
+                    "hammer = a regime", key="regime", expected=f"no {' or '.join(named_beside)} with it"
                 )
             return hammer if phase is None else replace(hammer, phase=part)
         overlap = "add" if overlap is None else overlap
         if drive is not None:
             if period is not None or rate is not None or waveform is not None:
                 raise InputError(
-                    "drive is given", key="drive", expected="no period, rate or waveform beside it"
+                    "drive = a drive", key="drive", expected="no period, rate or waveform with it"
                 )
             if drive.period is None or math.isfinite(drive.waveform.support):
                 raise InputError.of("drive", drive, "a continuous periodic force")
@@ -421,7 +421,7 @@ def regimes_of(
     count = max(len(many), len(fired)) if many and fired else 0
     for name, number in (("hammers", len(many)), ("periods" if drives is None else "drives", len(fired))):
         if number not in (1, count):
-            raise InputError(f"{name}: {number} are given", key=name, expected=f"1 or {count}")
+            raise InputError(f"{name}: {number} entries", key=name, expected=f"1 or {count}")
     return [
         Regime.of(
             many[i % len(many)],

@@ -63,7 +63,7 @@ def winding_of(hammer: Hammer) -> Winding:
             f"{hammer.path}: the magnet law {hammer.magnet.law!r} links no flux",
             file=hammer.path,
             key="magnet",
-            expected="one that does or coil.back_emf = false",
+            expected="a law with a flux linkage, or coil.back_emf = false",
         )
     return coil
 

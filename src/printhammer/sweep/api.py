@@ -72,7 +72,7 @@ def sweep(
     if table is not None:
         out = table.with_suffix(".zarr")
         if table.exists() and not Path(out).exists():
-            raise InputError.of("out", str(table), "a file that does not exist yet, or whose store does")
+            raise InputError.of("out", str(table), "a new file, or a file whose store exists")
     need_for(out, ".zarr")
     plan = make_plan(read_spec(spec))
     with ExitStack() as stack:

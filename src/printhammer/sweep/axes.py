@@ -127,7 +127,7 @@ def _resolved(
     known += [name for name in hammer.constants if fired or not name.startswith("waveform.")]
     hint = nearest(key, known, "one such as 'pack.stiffness', 'drive.rate' or 'state.x'")
     raise InputError(
-        f"{where}.key = {shown(key)} names no constant of {hammer.name} or its drive",
+        f"{where}.key = {shown(key)} does not name a constant of {hammer.name} or its drive",
         key=f"{where}.key",
         value=key,
         expected=hint,
@@ -156,7 +156,7 @@ def _values(table: AxisTable, here: str, si: str, grid: bool, geometric: bool) -
         if not grid:
             raise InputError(f"{here}: values of a Latin hypercube", key=here, expected="low and high")
         if any(value is not None for value in (*ends, table.count)) or geometric:
-            raise InputError(f"{here}: values are given", key=here, expected="no range beside them")
+            raise InputError(f"{here}: values", key=here, expected="no range together with values")
         values = read_quantities(table.values, si, f"{here}.values")
         if len(set(values)) < len(values):
             raise InputError(f"{here}.values: expected different values", key=f"{here}.values")

@@ -66,7 +66,7 @@ def run_dask(
             write(index, tasks.alone(plan.rows(plan.blocks.members(index))))
             tell(0.0)
     except _GoneError:
-        raise InputError("the dask scheduler is gone, what is done is kept", key="scheduler") from None
+        raise InputError("the scheduler has stopped; completed blocks are kept", key="scheduler") from None
     finally:
         tasks.cancel()
 
@@ -188,7 +188,7 @@ class _Tasks:
         self._idle = 0.0 if self._threads() else self._idle + _INTERVAL
         if self._idle >= NO_WORKERS:
             raise InputError(
-                f"the cluster has had no worker for {NO_WORKERS:g} s, what is done is kept", key="worker"
+                f"the cluster has had no worker for {NO_WORKERS:g} s; completed blocks are kept", key="worker"
             )
 
 
@@ -206,9 +206,7 @@ def _task(base: Base, outputs: Outputs, rows: FloatArray, wanted: dict[str, str]
 
 
 def _unable(error: BaseException) -> str:
-    return (
-        f"a worker of the cluster cannot do the work ({type(error).__name__}: {error}), what is done is kept"
-    )
+    return f"a worker of the cluster failed ({type(error).__name__}: {error}); completed blocks are kept"
 
 
 @contextmanager

@@ -168,7 +168,7 @@ def read_outputs(table: OutputsTable, firings: int) -> Outputs:
     arrays += _chosen(table.scalars, scalars, "scalars")
     if len(arrays) == len(ALWAYS):
         raise InputError(
-            "outputs: nothing is requested",
+            "outputs: the list is empty",
             key="outputs",
             expected="dots, strobes, final, displacement or scalars",
         )

@@ -150,7 +150,9 @@ def _replaced(hammer: Hammer, constants: Mapping[str, Any]) -> Hammer:
     for key, value in constants.items():
         note = quantity_of(hammer, key)
         if note is None:
-            raise InputError(f"constants: {shown(key)} names no constant of {hammer.name}", key="constants")
+            raise InputError(
+                f"constants: {shown(key)} does not name a constant of {hammer.name}", key="constants"
+            )
         changes[key] = read_quantity(value, note.si, f"constants.{key}")
     return hammer.replace(changes, source="constants of a sweep") if changes else hammer
 
@@ -180,22 +182,22 @@ def _checked_drive(base: Base, own: Mapping[str, Any] | None) -> Base:
     for axis in base.axes:
         if kinds == ["sequence"] and axis.key.startswith("waveform."):
             raise InputError(
-                f"the axis {axis.key!r} changes what [drive.sequence] does not fire",
+                f"the axis {axis.key!r} names a waveform that [drive.sequence] does not fire",
                 key=axis.key,
                 expected="one of its waveforms, such as 'waveforms.NAME.amplitude'",
             )
         if axis.target == "drive" and axis.field in timing:
             raise InputError(
-                f"drive.{kinds[0]}.{axis.field} is given beside the axis {axis.key!r}",
+                f"drive.{kinds[0]}.{axis.field} is set twice, also by the axis {axis.key!r}",
                 key=f"drive.{kinds[0]}.{axis.field}",
             )
         if axis.target == "at":
             at = timing.get("at")
             if not isinstance(at, list) or int(axis.field) >= len(at):
                 raise InputError(
-                    f"the axis {axis.key!r} names no firing",
+                    f"the axis {axis.key!r} does not name a firing",
                     key=axis.key,
-                    expected="drive.times.at with as many",
+                    expected="drive.times.at with enough firings",
                 )
     if base.duration is None and kinds == ["sine"]:
         raise InputError("duration is missing, and the drive does not end", key="duration")

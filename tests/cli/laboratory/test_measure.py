@@ -76,7 +76,7 @@ def test_places_and_currents_of_ones_own(cli: Callable, here: Path) -> None:
         (("magnet", "--out", "a.csv", "--noise", "3"), "noise '3'"),
         (("magnet", "--out", "a.csv", "--noise", "mass=3 g"), "the quantity 'mass'"),
         (("magnet", "--out", "a.csv", "--noise", "force=3 g"), "the unit 'g' is a mass"),
-        (("magnet", "--out", "a.csv", "--noise", "3 N", "--noise", "force=2 N"), "force is given twice"),
+        (("magnet", "--out", "a.csv", "--noise", "3 N", "--noise", "force=2 N"), "force occurs twice"),
         (("magnet", "--out", "a.csv", "--bandwidth", "1 kHz"), "expected this option with motion or current"),
         (("magnet", "--out", "a.csv", "--peaks", "30 um"), "expected this option with pack only"),
         (

@@ -34,4 +34,4 @@ def test_a_name_without_a_waveform_is_bad_input(cli, tmp_path: Path) -> None:
     outcome = cli("run", "hendriks-1983", "--drive", str(path))
     assert outcome.status == 2
     assert "\n" not in outcome.err
-    assert "sequence.waveforms: 'soft' is no waveform of the file" in outcome.err
+    assert "sequence.waveforms: 'soft' does not name a waveform of the file" in outcome.err

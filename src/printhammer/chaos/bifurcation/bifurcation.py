@@ -194,7 +194,7 @@ def _parameter(
     if name in (PERIOD, RATE):
         if firing.get("period") is not None or firing.get("rate") is not None:
             raise InputError(
-                f"period and rate: expected none of them beside the values of {name!r}", key="period"
+                f"period and rate: expected neither together with values of {name!r}", key="period"
             )
         if isinstance(hammer, Hammer) and firing.get("drive") is None:
             first = float(grid[0])

@@ -359,7 +359,7 @@ class Bifurcation(Result, rows="direction column"):
             return 0
         if direction not in self.directions:
             known = " and ".join(self.directions)
-            raise InputError.of("direction", direction, f"what the diagram has: {known}")
+            raise InputError.of("direction", direction, f"a direction of the diagram: {known}")
         return self.directions.index(direction)
 
     def _group(self, row: int, order: Sequence[int]) -> list[Window]:

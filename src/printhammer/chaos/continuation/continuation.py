@@ -81,7 +81,7 @@ def continuation(
         fired = [value for name, value in firing.items() if name not in ("phase", "overlap")]
         if any(value is not None for value in (*fired, state, firings)):
             raise InputError(
-                "an orbit is given",
+                "start = an orbit",
                 key="orbit",
                 expected="no period, rate, waveform, drive, firings or state",
             )

@@ -182,7 +182,7 @@ def stability_chart(
     if isinstance(branch, Branch):
         if first is not None or firing:
             raise InputError(
-                "a branch is given", key="first", expected="no first parameter and no firing in addition"
+                "branch = a branch", key="first", expected="no first parameter and no firing options with it"
             )
     elif first is None:
         raise InputError(

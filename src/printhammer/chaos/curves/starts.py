@@ -67,20 +67,20 @@ def start_of(
     """
     if isinstance(source, Branch):
         if regime is not None:
-            raise InputError("a branch is given", key="regime", expected="no regime in addition")
+            raise InputError("source = a branch", key="regime", expected="no regime in addition")
         return _of_branch(source, event)
     if not isinstance(source, Reopened | str | Path):
         raise InputError.of("source", source, "a branch of orbits, or a file with a branch or a curve")
     opened = source if isinstance(source, Reopened) else reopen(source)
     if regime is None:
         raise InputError(
-            f"{opened.path}: expected a regime beside the file, the hammer and how it is fired",
+            f"{opened.path}: expected a regime (hammer and drive) in addition to the file",
             file=opened.path,
             key="regime",
         )
     if isinstance(event, BranchEvent):
         raise InputError(
-            f"{opened.path}: expected the number or kind of an event beside a file",
+            f"{opened.path}: expected the index or kind of an event in addition to a file",
             file=opened.path,
             key="event",
         )
@@ -133,7 +133,7 @@ def _number(kinds: Sequence[str], located: list[bool], event: int | str | None, 
         if located[number] and (kind == event or (event is None and kind in KINDS)):
             return number
     raise InputError(
-        f"event = {event or _LIST}: {whose} has none, its events are: {known}",
+        f"event = {event or _LIST}: no such event; the events of {whose} are: {known}",
         key="event",
         value=event or _LIST,
     )

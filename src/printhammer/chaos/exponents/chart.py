@@ -257,11 +257,11 @@ def finite_time(
     if not wanted or sorted(set(wanted)) != wanted:
         raise InputError.of("lengths", lengths, "numbers of firings, ascending")
     if not known.ok:
-        raise InputError(f"the run ended early ({known.status})", key="train", expected="a run that did not")
+        raise InputError(f"the run ended early ({known.status})", key="train", expected="a complete run")
     growth = known.factors[:, 0]
     if len(growth) < FEWEST * wanted[-1]:
         raise InputError(
-            f"lengths: of {len(growth)} firings there are fewer than {FEWEST} stretches of {wanted[-1]}",
+            f"lengths: {len(growth)} firings contain fewer than {FEWEST} stretches of {wanted[-1]}",
             key="lengths",
             expected=f"at most {len(growth) // FEWEST}",
         )

@@ -120,7 +120,7 @@ def correlation_dimension(
     rows, units = rows_of(points_of(states, {}), scales, MOST)
     apart, tolerance = read_count(theiler, "theiler"), read_positive(flat, "1", "flat")
     if len(rows) < FEWEST:
-        raise InputError(f"states: {len(rows)} are given", key="states", expected=f"{FEWEST} to {MOST}")
+        raise InputError(f"states: {len(rows)} states", key="states", expected=f"{FEWEST} to {MOST}")
     if apart > len(rows) // 4:
         raise InputError.of(
             "theiler", apart, f"at most a quarter of the number of states, {len(rows)}", written=str(apart)

@@ -131,7 +131,7 @@ def recurrence(
     if apart >= count:
         raise InputError.of("theiler", apart, f"less than the number of states, {count}", written=str(apart))
     if threshold is not None and rate is not None:
-        raise InputError("threshold and rate are given", key="threshold", expected="one of them")
+        raise InputError("threshold and rate", key="threshold", expected="one of them")
     scaled = rows / units
     distances = _distances(scaled)
     if threshold is None:
@@ -203,7 +203,7 @@ def rows_of(
         units = states.window.half_widths[[0, 1, 0]]
         if not np.isfinite(rows).all():
             raise InputError(
-                f"states: the run ended early ({states.status})", key="states", expected="a run that did not"
+                f"states: the run ended early ({states.status})", key="states", expected="a complete run"
             )
     else:
         rows = read_array(states, "states", "numbers, one row per state")
@@ -214,7 +214,7 @@ def rows_of(
             )
         units = np.ones(rows.shape[1])
     if not 2 <= len(rows) <= most:
-        raise InputError(f"states: {len(rows)} are given", key="states", expected=f"2 to {most}")
+        raise InputError(f"states: {len(rows)} states", key="states", expected=f"2 to {most}")
     if not np.isfinite(rows).all():
         raise InputError("states: not all are finite", key="states", expected="finite numbers")
     if scales is not None:

@@ -238,7 +238,7 @@ def strobes(
     size = max(len(many), 0 if rows is None else len(rows)) if many and rows != [] else 0
     for name, entries in (("hammers and periods", many), ("states", rows)):
         if entries is not None and len(entries) not in (1, size):
-            raise InputError(f"{name}: {len(entries)} are given", key=name, expected=f"1 or {size}")
+            raise InputError(f"{name}: {len(entries)} entries", key=name, expected=f"1 or {size}")
     begun: list[Any] = [None] if rows is None else [tuple(row) for row in rows]
     trains = [Train.of(many[i % len(many)], fired, begun[i % len(begun)]) for i in range(size)]
     chosen = np.arange(skipped + 1, skipped + count + 1)
@@ -259,7 +259,9 @@ def points_of(series: Any, firing: Firing) -> Any:
     if isinstance(series, Hammer | Regime):
         return strobe(series, points=_SETTLED, transient=_SETTLED, verdict=False, **firing)
     if firing:
-        raise InputError("points are given", key="points", expected=f"no {' or '.join(firing)} beside them")
+        raise InputError(
+            "points = strobe points", key="points", expected=f"no {' or '.join(firing)} with strobe points"
+        )
     return series
 
 

@@ -99,7 +99,7 @@ def _number_of(figure: str | None, outputs: list[Path], measured: Path | None) -
         raise InputError(f"--figure {figure}: expected a picture among the files of --out", key="--figure")
     if measured is not None:
         raise InputError(
-            f"--figure {figure} is given beside --measured {measured}",
+            f"--figure {figure} with --measured {measured}",
             key="--figure",
             expected="only one of these options",
         )

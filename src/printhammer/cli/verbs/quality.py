@@ -223,7 +223,7 @@ def _check_options(task: str, options: set[str]) -> None:
     if odd:
         where = " or ".join(named(name) for name, takes in _TAKES.items() if odd[0] in takes)
         flag = odd[0].replace("_", "-")
-        raise InputError(f"--{flag} is given, but belongs to {where}, not to {named(task)}", key=f"--{flag}")
+        raise InputError(f"--{flag} is set, but belongs to {where}, not to {named(task)}", key=f"--{flag}")
 
 
 def _spreads(hammer: Hammer, texts: list[str]) -> dict[str, Any]:
@@ -235,7 +235,7 @@ def _spreads(hammer: Hammer, texts: list[str]) -> dict[str, Any]:
     common = [written for written in texts if "=" not in written]
     if len(common) > 1:
         raise InputError(
-            f"--spread {common[1]}: expected one spread for all constants, but {common[0]} is given as well",
+            f"--spread {common[1]}: expected one spread for all constants, but {common[0]} is set as well",
             key="--spread",
         )
     spreads = spreads_of(hammer, opt.read_share(common[0], "--spread")) if common else {}
@@ -380,7 +380,7 @@ def _pattern(
 
     if path is not None:
         if text is not None:
-            raise InputError("TEXT and --pattern: both are given", key="--pattern", expected="one of them")
+            raise InputError("TEXT and --pattern: both are set", key="--pattern", expected="one of them")
         for name, value in (("--font", font), ("--columns", columns)):
             if value is not None:
                 raise InputError(
@@ -391,7 +391,7 @@ def _pattern(
                 )
         return Pattern.load(path, wires)
     if text is None:
-        raise InputError("TEXT and --pattern: neither is given", key="--pattern", expected="one of them")
+        raise InputError("TEXT and --pattern: both are missing", key="--pattern", expected="one of them")
     return Pattern.from_text(
         text.replace("\\n", "\n"),
         WIRES if wires is None else wires,

@@ -32,7 +32,7 @@ def tuned_along(
     axis, values = _read(along)
     if "rate" not in options or "rates" in options:
         raise InputError(
-            "--along is given without --rate",
+            "--along without --rate",
             key="--along",
             expected=f"one rate, such as --rate {rate_text(hammer, 1300.0)!r}",
         )
@@ -133,7 +133,7 @@ def tune(
             expected="no report with --no-judge",
         )
     if "rate" in passed and "rates" in passed:
-        raise InputError("--rate and --rates are given", key="--rate", expected="one of them")
+        raise InputError("--rate and --rates", key="--rate", expected="one of them")
     if variability:
         from printhammer.printing.rates.variability import Variability
 

@@ -247,7 +247,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         if self.serial and serial not in (self.serial, ANY_UNIT):
             unit = "no serial" if serial is None else f"serial = {serial!r}"
             raise InputError(
-                f"{unit} is given: the table was learned on unit {self.serial!r}",
+                f"serial = {unit}: the table was learned on unit {self.serial!r}",
                 key="unit",
                 value=unit,
                 expected=f"this serial, or {ANY_UNIT!r} to drive another unit with it",

@@ -83,7 +83,7 @@ def _of_csv(text: str) -> tuple[Head, Rows]:
         if not mark:
             raise InputError(f"{shown(line)}: expected '# key = value'", key="line", value=line)
         if key.strip() in head:
-            raise InputError(f"{key.strip()} is given twice", key=key.strip(), expected="once")
+            raise InputError(f"{key.strip()} occurs twice", key=key.strip(), expected="once")
         try:
             head[key.strip()] = json.loads(value)
         except ValueError:
@@ -208,9 +208,7 @@ def _built(head: Head, rows: Rows) -> dict[str, Any]:
         history = _history(row["gaps"], gaps, reach, f"row {number}: ")
         place = int(np.searchsorted(rates, row["rate"])), number_of(history, reach)
         if filled[place]:
-            raise InputError(
-                f"row {number}: the history {history_text(history)} is given twice", key="history"
-            )
+            raise InputError(f"row {number}: the history {history_text(history)} occurs twice", key="history")
         filled[place] = True
         for name, values in arrays.items():
             values[place] = np.nan if row[name] is None else row[name]
@@ -229,7 +227,7 @@ def _built(head: Head, rows: Rows) -> dict[str, Any]:
 
 def _history(texts: Any, gaps: int, reach: int, where: str) -> tuple[int, ...]:
     if not isinstance(texts, list) or len(texts) != gaps:
-        raise InputError.of(f"{where}gaps", texts, f"{gaps} of them", written=shown(texts))
+        raise InputError.of(f"{where}gaps", texts, f"{gaps} gaps", written=shown(texts))
     known = {gap_text(gap): gap for gap in range(REST, reach + 1)}
     for text in texts:
         if not isinstance(text, str) or text not in known:

@@ -201,7 +201,7 @@ def tune(
     pulse, widest = print_pulse(driven, largest)
     single = single_of(driven, pulse, effort.tolerance)
     if rate is not None and rates is not None:
-        raise InputError("rate and rates are given", key="rates", expected="one of them")
+        raise InputError("rate and rates", key="rates", expected="one of them")
     asked = [rate] if rate is not None else rates
     scale = search_scale(driven, pulse)
     grid = _all_rates(single, scale) if asked is None else _given_rates(asked)

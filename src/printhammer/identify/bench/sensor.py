@@ -73,7 +73,7 @@ class Channel(Declared):
     def __post_init__(self) -> None:
         if self.resolution.of == READING:
             raise InputError(
-                f"a resolution {READING} is given",
+                f"a resolution {READING}",
                 key="resolution",
                 expected="a resolution with a constant step",
             )
@@ -208,9 +208,7 @@ def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, st
         if settings.get(name) is not None:
             changes[name] = read(settings[name], name)
     if sensor.sampling_rate is None and any(changes.get(name) for name in ("sampling_rate", "bandwidth")):
-        raise InputError(
-            "a sampling rate or bandwidth is given", key="rate", expected="this setting for records only"
-        )
+        raise InputError("sampling rate or bandwidth", key="rate", expected="this setting for records only")
     return replace(sensor, **changes)
 
 
@@ -252,7 +250,7 @@ def by_quantity(texts: list[str], part: str, quantities: Mapping[str, str]) -> d
                 )
             if quantity in amounts:
                 raise InputError(
-                    f"{part} {text!r}: {quantity} is given twice",
+                    f"{part} {text!r}: {quantity} occurs twice",
                     key=part,
                     value=text,
                     expected="each quantity once",

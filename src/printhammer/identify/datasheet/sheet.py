@@ -250,7 +250,7 @@ def _assumed(document: Mapping[str, Any]) -> frozenset[str]:
         if key not in known:
             expected = nearest(str(key), known)
             raise InputError(
-                f"assumed: {shown(key)} is no key of this sheet", key="assumed", expected=expected
+                f"assumed: {shown(key)} is not a key of this sheet", key="assumed", expected=expected
             )
     return frozenset(assumed)
 
@@ -263,7 +263,7 @@ def _why(document: Mapping[str, Any]) -> dict[str, str]:
         raise InputError.of("why", why, "a table of keys and texts", written=shown(why))
     for key in why:
         if key not in _keys(document):
-            raise InputError(f"why.{key} is given", key=f"why.{key}", expected="a key of this sheet")
+            raise InputError(f"why.{key}: no such key", key=f"why.{key}", expected="a key of this sheet")
     return dict(why)
 
 
@@ -271,7 +271,7 @@ def _check(sheet: DataSheet) -> None:
     """Raise `InputError` if the entries of a data sheet contradict each other."""
     gaps = [gap.si for gap, _force in sheet.force]
     if len(set(gaps)) < len(gaps):
-        raise InputError("force: a gap is given twice", key="force", expected="one force per gap")
+        raise InputError("force: a gap occurs twice", key="force", expected="one force per gap")
     restitution = sheet.si("stop.restitution", 0.0)
     if restitution > 1.0:
         raise InputError.of("stop.restitution", restitution, "1 or less", written=f"{restitution:g}")

@@ -61,10 +61,10 @@ def refuse_degenerate(where: str, design: FloatArray, names: Sequence[str]) -> N
     blind = [name for name, size in zip(names, sizes, strict=True) if size == 0.0]
     if blind:
         raise InputError(
-            f"{where}: nothing in the records depends on {blind[0]}",
+            f"{where}: the records do not depend on {blind[0]}",
             file=where,
             key="free",
-            expected="this constant not to be free",
+            expected="this constant to be held",
         )
     values, vectors = singular(design / sizes)
     if values[0] * _DEGENERATE > values[-1]:

@@ -253,17 +253,17 @@ def _free_keys(
         return ("mass", _DAMPING) if touched and hertz else ("mass",)
     keys = (free,) if isinstance(free, str) else tuple(free)
     if not keys:
-        raise InputError("free: no constants are given", key="free", expected="at least one such as 'mass'")
+        raise InputError("free: the list is empty", key="free", expected="at least one such as 'mass'")
     where = " and ".join(shot.name for shot in shots)
     for number, key in enumerate(keys):
         if key in keys[:number]:
-            raise InputError(f"free: {key} is given twice", key="free", expected="each constant once")
+            raise InputError(f"free: {key} occurs twice", key="free", expected="each constant once")
         given_otherwise = hertz and key in (_DAMPING, "backstop.stiffness")
         if (key not in hammer.constants and not given_otherwise) or key == "platen":
             known = [name for name in hammer.constants if name != "platen"]
             moving = nearest(key, known, "one such as 'mass'")
             raise InputError(
-                f"free: {key!r} is no constant of {hammer.path} that affects the motion",
+                f"free: {key!r} is not a constant of {hammer.path} that affects the motion",
                 key="free",
                 expected=moving,
             )

@@ -139,7 +139,7 @@ class Stiffness:
         ):
             if len(pairs) not in counts:
                 wanted = "1 (a flat backstop) or 2" if len(counts) > 1 else "2, of armature and backstop"
-                raise InputError(f"{name}: {len(pairs)} given", key=name, expected=wanted)
+                raise InputError(f"{name}: {len(pairs)} values", key=name, expected=wanted)
             for value, _error in pairs:
                 inside = -1.0 < value <= 0.5 if name.startswith("Poisson") else value > 0.0
                 if not inside:

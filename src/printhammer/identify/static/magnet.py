@@ -189,7 +189,7 @@ def fit_magnet(
             f"{alone.path}: the position of the backstop is missing",
             file=alone.path,
             key="position",
-            expected="this position, if a table of the spring is given",
+            expected="this position together with a table of the spring",
         )
     data = _data(table, alone)
     x = data.abscissa

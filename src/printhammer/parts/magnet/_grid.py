@@ -54,7 +54,7 @@ def gather(rows: Iterable[tuple[float, float, float]], what: str, quantity: str)
             )
         if (x, current) in points:
             raise InputError(
-                f"{what}: the point {x:.9g} m, {current:.9g} A is given twice",
+                f"{what}: the point {x:.9g} m, {current:.9g} A occurs twice",
                 file=what,
                 key="point",
                 expected="once",

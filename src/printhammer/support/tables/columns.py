@@ -74,7 +74,7 @@ class Source:
         if is_unit_of(self.unit, si):
             if own:
                 raise InputError(
-                    f"{self.unit} stands for 1 {own}", value=self.unit, expected=f"{self.unit}/{own}"
+                    f"{self.unit} is not a unit per {own}", value=self.unit, expected=f"{self.unit}/{own}"
                 )
             return self.factor * factor_of(self.unit, si)
         above, _slash, below = self.unit.rpartition("/")
@@ -116,7 +116,7 @@ def read_columns(text: str, where: str = "--columns") -> Columns:
         name = name if name[0].isdigit() else name.lower()
         key = f"delay({name})" if match["late"] else name
         if key in seen:
-            raise InputError(f"{where}: {key} is given twice", key=key, file=where, expected="once")
+            raise InputError(f"{where}: {key} occurs twice", key=key, file=where, expected="once")
         seen.add(key)
         column, even = _COLUMN.fullmatch(value), _EVEN.fullmatch(value)
         if match["late"]:
@@ -171,7 +171,7 @@ def columns_beside(path: Path) -> Columns | None:
         entries += [written.format(name, value) for name, value in values.items()]
     if content or not entries:
         raise InputError(
-            f"{where}: {', '.join(content) or 'nothing'} is given",
+            f"{where}: {', '.join(content) or 'no table'}",
             file=where,
             key="columns",
             expected="[columns]",

@@ -268,7 +268,7 @@ def _by_heading(
     for place, (heading, name) in enumerate(zip(table.columns, known, strict=True)):
         if name in sources or name in words:
             raise InputError(
-                f"{where}: the column {name!r} is given twice",
+                f"{where}: the column {name!r} occurs twice",
                 file=where,
                 key=name,
                 expected="each column once",
@@ -418,7 +418,7 @@ def _in_time(
         moved[name] = np.interp(at, own, values[name])
     if not kept.any():
         raise InputError(
-            f"{where}: the delays leave no rows", file=where, key="delay", expected="shorter ones"
+            f"{where}: the delays leave no rows", file=where, key="delay", expected="shorter delays"
         )
     return {"time": at[kept], **{name: column[kept] for name, column in moved.items()}}, lines[kept]
 
