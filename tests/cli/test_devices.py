@@ -130,6 +130,18 @@ def test_the_noun_for_a_strike_is_no_physics() -> None:
         relay.replace("strike", "Two words")
 
 
+def test_words_and_units_of_the_studio_are_no_physics() -> None:
+    ball = ph.load("bouncing-ball")
+    assert (ball.mover, ball.struck, ball.shown_units) == ("ball", "", {"m": "mm", "s": "ms"})
+    assert hammers.crude().mover == "armature"
+    other = ball.replace("length_unit", "m").replace("struck", "floor").replace("mover", "drop")
+    assert (other.mover, other.struck, other.shown_units["m"]) == ("drop", "floor", "m")
+    assert other.fingerprint == ball.fingerprint
+    for key, value in (("mover", "A ball"), ("struck", "2"), ("length_unit", "km"), ("time_unit", "um")):
+        with refused(key):
+            ball.replace(key, value)
+
+
 def test_pulses_that_do_not_interact_need_no_table() -> None:
     """The relay is at rest to the last bit 34 ms after a pulse."""
     relay = ph.load("relay-5v")

@@ -121,13 +121,13 @@ def test_a_device_has_its_own_word_and_an_oscillator_loses_no_dot(modules: Path)
 
 NAMES = """
 const { titleOf, viewsOf, moverOf } = await import("./words.js");
-const device = (title, strike, front, rigid, ...sections) => ({
-  title, strike, rigid, places: { backstop: 0, front }, constants: sections.map((section) => ({ section })),
+const device = (mover, strike, front, rigid, ...sections) => ({
+  mover, strike, rigid, places: { backstop: 0, front }, constants: sections.map((section) => ({ section })),
 });
 const devices = [
-  device("A hammer", "dot", 1, false, "magnet", "pack"),
-  device("A relay", "closing", 1, true, "magnet", "pack"),
-  device("A ball that bounces", "dot", null, true), device("An oscillator", "dot", null, true),
+  device("armature", "dot", 1, false, "magnet", "pack"),
+  device("armature", "closing", 1, true, "magnet", "pack"),
+  device("ball", "dot", null, true), device("mass", "dot", null, true),
 ];
 console.log(JSON.stringify(devices.map((each) => ({
   views: viewsOf(each), mover: moverOf(each), titles: viewsOf(each).map((view) => titleOf(view, each)),

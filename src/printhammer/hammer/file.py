@@ -48,10 +48,22 @@ TEXTS: Final = {
     "title": "one-line description of the hammer",
     "note": "important remarks on the constants",
     "strike": "noun for the result of a pulse, as shown in summaries; 'dot' if missing",
+    "struck": "noun for the struck object, as shown by the studio; 'paper' or 'pack' if missing",
+    "mover": "noun for the moving part, as shown by the studio; 'armature' if missing",
+    "length_unit": "unit of lengths in the studio: um, mm or m; chosen by the stroke if missing",
+    "time_unit": "unit of times in the studio: us, ms or s; chosen by the pulse width if missing",
 }
 """Text entries of a hammer file and their meanings."""
 
 _NOUN: Final = re.compile("[a-z]+(-[a-z]+)*")
+_EXPECTED: Final = {
+    "strike": (_NOUN, "a noun in lower case whose plural ends in s, such as 'closing'"),
+    "struck": (_NOUN, "a noun in lower case, such as 'pole'"),
+    "mover": (_NOUN, "a noun in lower case, such as 'ball'"),
+    "length_unit": (re.compile("um|mm|m"), "um, mm or m"),
+    "time_unit": (re.compile("us|ms|s"), "us, ms or s"),
+}
+"""Patterns of optional text entries, and what they expect."""
 
 SELECTORS: Final = {**dict.fromkeys(ROLES, "law"), "waveform": "shape"}
 """Tables of a hammer file, each with the key that selects its law or shape."""
@@ -79,6 +91,10 @@ class Contents:
     title: str
     note: str
     strike: str
+    struck: str
+    mover: str
+    length_unit: str
+    time_unit: str
     body: Body
     parts: dict[str, Part]
     waveform: Waveform | None
@@ -161,13 +177,9 @@ def _build(
             raise InputError.of(name, texts[name], "text in quotes", written=shown(texts[name]))
     if not texts["name"].strip():
         raise InputError("name is missing", key="name", expected="a short name of the hammer")
-    if texts["strike"] and not _NOUN.fullmatch(texts["strike"]):
-        raise InputError.of(
-            "strike",
-            texts["strike"],
-            "a noun in lower case whose plural ends in s, such as 'closing'",
-            written=shown(texts["strike"]),
-        )
+    for name, (pattern, expected) in _EXPECTED.items():
+        if texts[name] and not pattern.fullmatch(texts[name]):
+            raise InputError.of(name, texts[name], expected, written=shown(texts[name]))
     constants: dict[str, Constant] = {}
     top = {key: document[key] for key in quantities(Body) if key in document}
     body = _read(Body, top, "", constants, folder, before, known)

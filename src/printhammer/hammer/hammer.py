@@ -152,6 +152,22 @@ class Hammer:
         return self._contents.strike or "dot"
 
     @property
+    def struck(self) -> str:
+        """Noun for the struck object, such as "pole" of a relay; may be empty."""
+        return self._contents.struck
+
+    @property
+    def mover(self) -> str:
+        """Noun for the moving part, such as "ball"; "armature" by default."""
+        return self._contents.mover or "armature"
+
+    @property
+    def shown_units(self) -> dict[str, str]:
+        """Units in which the file asks to show lengths and times, by SI unit."""
+        units = {"m": self._contents.length_unit, "s": self._contents.time_unit}
+        return {si: unit for si, unit in units.items() if unit}
+
+    @property
     def path(self) -> str:
         """Path of the hammer file, for messages; marked as modified if constants were replaced."""
         return self._where

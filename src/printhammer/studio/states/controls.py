@@ -35,6 +35,9 @@ SHOWN: Final = {
 }
 """Units in which a quantity is shown, by its SI unit: metric, inch-pound; otherwise the SI unit itself."""
 
+_INCHES: Final = {"um": "mil", "mm": "in", "m": "in"}
+"""Inch unit shown in place of a metric unit of length."""
+
 _SLOW: Final = 2e-3
 """Pulse width above which the page shows times in ms, s."""
 
@@ -97,7 +100,7 @@ def describe(hammer: Hammer) -> dict[str, Any]:
         `name`, `title`, `note`, `constants` (a list), `open` (coil constants that the file leaves open),
         `rail` (default rail driver, or None), `combined` (controls that move several constants),
         `waveform` (shape and constants, or None), `start` (entries of the opening state that differ from the
-        default), `places`, `strike`, `rigid` (whether the backstop acts in no time).
+        default), `places`, `strike`, `struck`, `mover`, `rigid` (whether the backstop acts in no time).
     """
     constants = []
     for key, constant in hammer.constants.items():
@@ -115,6 +118,8 @@ def describe(hammer: Hammer) -> dict[str, Any]:
         "start": opening_of(hammer),
         "places": {"backstop": hammer.position, "front": hammer.front, "platen": hammer.platen},
         "strike": hammer.strike,
+        "struck": hammer.struck,
+        "mover": hammer.mover,
         "rigid": hammer.backstop is not None and hammer.backstop.law == "rigid",
     }
 
@@ -252,7 +257,7 @@ def _large(hammer: Hammer) -> dict[str, tuple[str, str]]:
         units["s"] = ("ms", "ms")
     if places and by_voltage(hammer.waveform) and max(places) - min(places) > _WIDE:
         units["m"] = ("mm", "in")
-    return units
+    return units | {si: (unit, _INCHES.get(unit, unit)) for si, unit in hammer.shown_units.items()}
 
 
 def _signed(unit: str) -> str:

@@ -103,7 +103,7 @@ function burst(pen, width, height, { dots, quality }, motion, studio, explained)
   const reach = Math.min(pitch, middle * 1.5);
   pen.save();
   pen.beginPath();
-  pen.rect(left - 4, 0, width - left - right + 8, height);
+  pen.rect(left - 30, 0, width - left - right + 60, height);
   pen.clip();
   pen.font = FONT;
   pen.strokeStyle = c.faint;

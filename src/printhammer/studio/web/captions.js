@@ -146,7 +146,7 @@ export function worded(text, strike = "dot") {
 /** Return what a view tells of the frames that are there; nothing before there are any. */
 export function captionOf(name, studio) {
   const { frames, described } = studio;
-  const text = () => worded(TEXTS[name](frames, studio), described?.strike).replaceAll("backstop", stopOf(described));
+  const text = () => worded(TEXTS[name](frames, studio), described?.strike).replaceAll("backstop", stopOf(described)).replace(/\b(paper|pack)\b/g, (word) => described?.struck || word);
   // A number and its unit stay on one line.
   return frames.motion ? text().replace(/(\d) (?=[%µA-Za-z]{1,3}\b|%)/g, "$1\u00a0") : "";
 }

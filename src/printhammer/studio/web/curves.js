@@ -3,7 +3,7 @@ import uPlot from "./vendor/uPlot.js";
 import { axes, before, curve, extent, inside, key, line, MARGIN, ticks, widened } from "./axes.js";
 import { colours, FONT } from "./theme.js";
 import { digits, shown, timeUnit, unitOf } from "./units.js";
-import { has, stopOf } from "./words.js";
+import { has, packOf, stopOf } from "./words.js";
 
 const FORCES = ["total", "drive", "magnet", "spring", "damping", "drag", "backstop", "pack"];
 const SPACE = { 1: 14, 2: 60, 3: 30 }; // pixels between ticks, by side
@@ -22,7 +22,7 @@ export function motionView(body, studio) {
     ],
     scales: (frame) => ({ x: placesRange(frame), ...driveRanges(frame) }),
     under: (pen, plane, box) => {
-      places(pen, plane, box, studio.frames.motion, stopOf(studio.described));
+      places(pen, plane, box, studio.frames.motion, stopOf(studio.described), packOf(studio.described));
       ghosts(pen, plane, studio);
     },
     over: (pen, plane, box) => remarks(pen, plane, box, studio),
@@ -77,7 +77,7 @@ function within(frame, scale, value) {
   return value >= 1.01 * low - 1e-9 && value <= 1.01 * high;
 }
 
-function places(pen, plane, box, frame, stop) {
+function places(pen, plane, box, frame, stop, pack) {
   const c = colours();
   const { backstop, front, platen } = frame.places;
   pen.save();
@@ -86,7 +86,7 @@ function places(pen, plane, box, frame, stop) {
   pen.fillStyle = c.pack;
   if (front !== null) pen.fillRect(box.x, plane.Y(platen ?? front), box.w, Math.max(plane.Y(front) - plane.Y(platen ?? front), 1));
   pen.globalAlpha = 1;
-  for (const [name, place] of [[stop, backstop], ["pack", front], ["platen", platen]]) {
+  for (const [name, place] of [[stop, backstop], [pack, front], ["platen", platen]]) {
     if (place === null) continue;
     pen.strokeStyle = c.muted;
     pen.setLineDash([]);

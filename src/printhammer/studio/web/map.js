@@ -5,7 +5,7 @@ import { worded } from "./captions.js";
 import { surface } from "./pen.js";
 import { colours, FONT, SMALL } from "./theme.js";
 import { digits, shown, timeUnit, unitOf } from "./units.js";
-import { prints } from "./words.js";
+import { packOf, prints } from "./words.js";
 
 // Cividis (J. R. Nunez, C. R. Anderton, R. S. Renslow, PLoS ONE 13 (2018) e0199239), every fourth colour.
 const CIVIDIS = "00224e00255400285b002b62002e6a0030700533711235701a386f213b6e273e6e2d416d32436d36466c3b496c3f4c6c434e6c47516c4b546c4f576c535a6d565c6d5a5f6e5e626e61656f656870686a716c6d726f70737273747676767979777d7c78807f788482798885788c8878908b78938e789791779b94769f9775a39a74a79d73aba072afa471b4a76fb8aa6ebcae6cc0b16ac4b468c8b866cdbb63d1bf61d5c25edac65bdec958e2cd54e7d150ebd44bf0d846f5dc41f9e03afee434";
@@ -171,7 +171,7 @@ export function mapView(body, studio) {
     const write = (align, x, text) => { pen.textAlign = align; pen.fillText(text, x, top - 1); };
     write("left", box.x, digits(frame.low * unit.factor, 3));
     write("right", box.x + box.w, shown(frame.high, "m", 3));
-    if (border !== null && border > 0.2 && border < 0.75) write("center", box.x + border * box.w, `pack ${digits(frame.front * unit.factor, 3)}`);
+    if (border !== null && border > 0.2 && border < 0.75) write("center", box.x + border * box.w, `${packOf(studio.described)} ${digits(frame.front * unit.factor, 3)}`);
     pen.restore();
   }
 
@@ -245,7 +245,7 @@ export function mapView(body, studio) {
     if (!frame || !plane) return;
     const [time, rate] = [plane.x(event.clientX - bounds.left), plane.y(event.clientY - bounds.top)];
     const x = valueAt(time, rate);
-    tip.textContent = x === null ? "" : `${shown(rate, "Hz")}, ${shown(time, "s")}: ${shown(x, "m")}`;
+    tip.textContent = x === null || finger ? "" : `${shown(rate, "Hz")}, ${shown(time, "s")}: ${shown(x, "m")}`;
   }
 
   /** Return the displacement at a time and a rate, m, or null where the map does not know it. */

@@ -3,6 +3,7 @@ import { axes, before, broken, curve, dots, extent, inside, key, refusal, widene
 import { surface } from "./pen.js";
 import { colours, FONT } from "./theme.js";
 import { digits, unitOf } from "./units.js";
+import { packOf } from "./words.js";
 
 const SETTLING = 100; // firings in which a train settles, drawn apart
 
@@ -108,7 +109,7 @@ export function loopsView(body, studio) {
     pen.beginPath();
     pen.arc(plane.X(x[now]), plane.Y(Math.max(pack[now], backstop[now])), 4, 0, 2 * Math.PI);
     pen.stroke();
-    key(pen, plane.box, [{ name: "backstop", colour: c.backstop }, { name: "pack", colour: c.pack }]);
+    key(pen, plane.box, [...(place !== null && !studio.described.rigid ? [{ name: "backstop", colour: c.backstop }] : []), ...(front !== null ? [{ name: packOf(studio.described), colour: c.pack }] : [])]);
     pen.restore();
   }, () => {
     const frame = studio.frames.motion;

@@ -5,7 +5,7 @@ import { surface } from "./pen.js";
 import { voltageAt } from "./readout.js";
 import { colours, FONT } from "./theme.js";
 import { shown, unitOf } from "./units.js";
-import { has, moverOf, stopOf } from "./words.js";
+import { has, moverOf, packOf, stopOf } from "./words.js";
 
 const SPEEDS = [["1", 1], ["1/3", 1 / 3], ["1/10", 0.1], ["1/30", 1 / 30], ["1/100", 0.01], ["1/300", 1 / 300], ["1/1000", 1e-3], ["1/3000", 1 / 3000]];
 const LASTS = 3.5; // s, about, that a run is played
@@ -119,7 +119,7 @@ export function sketchView(body, studio) {
       pen.fillRect(X(touch), middle - 0.2 * tall, Math.max(thick - (X(touch) - X(front)), 1), 0.4 * tall);
       pen.globalAlpha = 1;
       pen.fillStyle = c.muted;
-      pen.fillText("pack", X(front) + thick / 2, middle + 1.2 * tall + 13);
+      pen.fillText(packOf(studio.described), X(front) + thick / 2, middle + 1.2 * tall + 13);
     }
     const tip = X(x);
     pen.fillStyle = c.x;

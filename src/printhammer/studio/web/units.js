@@ -1,6 +1,7 @@
 // Quantities as people write them: a number of few digits and its unit, metric or inch-pound.
 let known = {};
 let system = 0;
+const LONG = 1e-2; // s, from which a time is no longer told in µs
 
 /** Take the units that the server told, by SI unit: [metric, inch-pound], each a name and a factor. */
 export function setUnits(units) { known = units; }
@@ -9,8 +10,8 @@ export const getSystem = () => system;
 
 export function unitOf(si) { return known[si]?.[system] ?? { name: si === "1" ? "" : si, factor: 1 }; }
 
-/** Return the unit of a time axis: long ones are told in ms. */
-export function timeUnit(span) { return span > 3e-3 ? { name: "ms", factor: 1e3 } : unitOf("s"); }
+/** Return the unit of a time axis: long ones are told in ms, or in s. */
+export function timeUnit(span) { return span > 3 ? { name: "s", factor: 1 } : span > 3e-3 ? { name: "ms", factor: 1e3 } : unitOf("s"); }
 
 /** Return a number with some significant digits. */
 export function digits(value, count = 4) {
@@ -22,7 +23,7 @@ export function digits(value, count = 4) {
 }
 
 export function shown(value, si, count = 4) {
-  const unit = unitOf(si);
+  const unit = si === "s" && Math.abs(value) >= LONG && unitOf(si).factor > 1e3 ? timeUnit(Math.abs(value)) : unitOf(si);
   const number = value === null || value === undefined ? "–" : digits(value * unit.factor, count);
   return unit.name ? `${number} ${unit.name}` : number;
 }

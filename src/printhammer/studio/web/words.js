@@ -12,14 +12,14 @@ export const prints = (described) => described.places.front !== null && describe
 /** Whether a device has a law of a part. */
 export const has = (described, section) => described.constants.some((constant) => constant.section === section);
 
-/** Return what moves: an armature where there is a magnet or a pack, else the ball or the mass of a textbook. */
-export function moverOf(described) {
-  if (!described?.places || described.places.front !== null || has(described, "magnet")) return "armature";
-  return /\bball\b/i.test(described.title) ? "ball" : "mass";
-}
+/** Return what moves: an armature, or the ball, block or mass of a textbook. */
+export const moverOf = (described) => described?.mover ?? "armature";
 
 /** Return what a mover rests on or strikes at the low end of its way. */
-export const stopOf = (described) => ({ armature: "backstop", ball: "table", mass: "stop" })[moverOf(described)];
+export const stopOf = (described) => ({ armature: "backstop", ball: "table", block: "base" })[moverOf(described)] ?? "stop";
+
+/** Return the name of the pack in pictures. */
+export const packOf = (described) => described?.struck || "pack";
 
 /** Return the title of a view of a device. */
 export function titleOf(name, described, short = false) {
