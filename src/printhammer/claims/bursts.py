@@ -160,7 +160,7 @@ def _exceeds(drive: Drive, limit: float) -> bool:
 
 
 def hang_up_range(context: Context) -> tuple[float | None, list[Motion], float]:
-    """Return the lowest rate at which bursts hang up, the motions from there on, and the highest rate, Hz."""
+    """Return the lowest rate at which bursts hang up, Hz, the motions above it, and the highest rate, Hz."""
     settings = claims()["hang_up_at_high_rate"].settings
     step, pulses, limit = (settings[name] for name in ("rate_step_Hz", "pulses", "current_limit_A"))
     waveform = context.waveform

@@ -232,7 +232,7 @@ def two_pulses_700us(context: Context, claim: Claim) -> Measured:
 
 
 def second_coil_work(context: Context, interval: float) -> float:
-    """Compute the work of the coil on the armature from the second of two firings on, J."""
+    """Compute the work of the coil on the armature, J, after the second of two firings."""
     both, first = context.pulses([0.0, interval], interval + TAIL), context.pulses([0.0], interval)
     return both.energy.coil_work - first.energy.coil_work
 

@@ -101,7 +101,7 @@ def low_rate_fixed_point(context: Context, claim: Claim) -> Measured:
 
 @measures("cloud_grows", *WHOLE)
 def cloud_grows(context: Context, _claim: Claim) -> Measured:
-    """Measure the 95th percentile of the distance of strobe points from the rest state, against rate."""
+    """Measure the 95th percentile of the distance of strobe points from the rest state, against the rate."""
     rest = scaled(np.array([context.rest, 0.0]))
     radii = {
         name: float(np.percentile(np.linalg.norm(scaled(points) - rest, axis=1), 95.0))

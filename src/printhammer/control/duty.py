@@ -13,7 +13,7 @@ R')): for a given limit it decreases linearly with the ambient temperature, what
 Source: the lumped thermal network of any text on heat transfer. Validity: pulses that are short compared with
 the warming of the winding, so that their heat is averaged over time. Weakness: the winding has one
 temperature, whereas a real winding is hotter inside. The heat of a dot is that of a dot fired from rest; dots
-whose currents overlap heat the coil more, and the summary says from which rate on.
+whose currents overlap heat the coil more, and the summary states the lowest such rate.
 
 Coil heat per dot: the resistance of copper rises by 0.393 % per kelvin of its value at 20 degC. A pulse on a
 rail that is long compared with L / R draws less current through a warm winding and heats it less; a driver

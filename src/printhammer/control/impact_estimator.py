@@ -335,7 +335,7 @@ _MOST_BITS: Final = 24  # Largest resolution of a converter; arbitrary
 
 
 class Sampling(Declared):
-    """An A/D converter that samples the coil current or voltage from the firing on."""
+    """An A/D converter that samples the coil current or voltage, starting at the firing."""
 
     signal: Signal = part("sampled signal, current or voltage", default="current")
     noise: float = part("standard deviation of a sample, A or V", default=0.0)

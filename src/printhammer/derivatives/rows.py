@@ -60,7 +60,7 @@ def row_multipliers(
     ----------
     hammers, drives : sequences
         One hammer and one drive per row. A drive starts from rest and has at least four firings more than
-        `firing`; from the firing before `firing` on, all firings are identical and equally spaced.
+        `firing`; from the firing before `firing` onward, all firings are identical and equally spaced.
     effort : Effort
         Tolerance, at most `_TOLERANCE`, and threads.
     closed : bool, optional
@@ -103,7 +103,7 @@ def row_multipliers(
 
 
 def leading(jacobians: FloatArray) -> FloatArray:
-    """Compute the largest eigenvalue, by absolute value, of each 2 x 2 matrix, shape (rows,); NaN for NaN.
+    """Compute the eigenvalue of largest absolute value of each 2 x 2 matrix, shape (rows,); NaN is passed on.
 
     A real eigenvalue keeps its sign; a complex pair is represented by its absolute value.
     """

@@ -15,8 +15,8 @@ kind  value                               used by
 ====  ==================================  ================================
 
 The first row starts at 0, starts ascend strictly, and the last row ``[end, 0, 0, 0, 0, 0]`` marks the end of
-the support (possibly infinite); the value is zero before 0 and from the end on. Values are right-continuous
-at every start.
+the support (possibly infinite); the value is zero before 0, at the end and after it. Values are
+right-continuous at every start.
 """
 
 from __future__ import annotations

@@ -184,7 +184,7 @@ def segment_value(kind: float, p0: float, p1: float, p2: float, p3: float, s: fl
 def fill_values(table: Any, times: Any, values: Any) -> None:
     """Evaluate a segment table, shape (rows, 6), at ascending times since the firing, s; write the values.
 
-    Values are right-continuous; the value is 0 before 0 and from the end of the table on.
+    Values are right-continuous; the value is 0 before 0, at the end of the table and after it.
     """
     row = 0
     last = len(table) - 1

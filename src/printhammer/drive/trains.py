@@ -1,8 +1,8 @@
 """Drives: a waveform fired as a train, in bursts or at given times; or a sinusoidal force.
 
 A drive is a current through the coil or, for textbook hammers, a force on the armature. Pulses may overlap:
-with ``overlap="add"`` their values add up, with ``overlap="replace"`` only the latest pulse counts from its
-firing on. Numbers are SI; strings with a unit ("1.2 kHz") are accepted as well.
+with ``overlap="add"`` their values add up, with ``overlap="replace"`` only the latest pulse counts after its
+firing. Numbers are SI; strings with a unit ("1.2 kHz") are accepted as well.
 """
 
 from __future__ import annotations
@@ -202,7 +202,7 @@ class Burst(_Pulsed):
 
 
 class SineForce(Drive):
-    """A sinusoidal force on the armature from t = 0 on, amplitude sin(2 pi frequency t + phase).
+    """A sinusoidal force on the armature for t >= 0, amplitude sin(2 pi frequency t + phase).
 
     Parameters
     ----------

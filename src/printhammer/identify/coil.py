@@ -94,9 +94,9 @@ def fit_coil(
     Parameters
     ----------
     paths : sequence of path
-        Tables with the columns ``time``, ``current`` and optionally ``voltage``, which then drives the coil
-        from the first row on; the time of each of its edges is uncertain between two rows. Without it the
-        coil is switched on at time 0.
+        Tables with the columns ``time``, ``current`` and optionally ``voltage``, which then drives the coil,
+        starting with the first row; the time of each of its edges is uncertain between two rows. Without it
+        the coil is switched on at time 0.
     hammer : Hammer
         Hammer with the known constants and the initial guesses. A missing resistance or inductance is
         estimated from the first record.

@@ -103,21 +103,21 @@ def backstop_rebound(c: Any, v_in: float) -> float:
 
 
 def magnet_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants of a law without a function of its own: the numbers before the domain."""
+    """Write the packed constants for a law that does not pack them itself: the numbers before the domain."""
     for k in range(len(q) - 2):
         c[k] = q[k]
     return max(len(q) - 2, 0)
 
 
 def magnet_domain(q: Any, ends: Any) -> None:
-    """Write the range of displacements of a law without a function of its own, m: its last two numbers."""
+    """Write the displacement range, m, for a law that does not define it itself: its last two numbers."""
     ends[0], ends[1] = -math.inf, math.inf
     if len(q) > 1:
         ends[0], ends[1] = q[len(q) - 2], q[len(q) - 1]
 
 
 def _copy(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants of a law without a function of its own: its numbers."""
+    """Write the packed constants for a law that does not pack them itself: its numbers."""
     for k in range(len(q)):
         c[k] = q[k]
     return len(q)

@@ -110,7 +110,7 @@ class QuenchMap(Result):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Provenance of the map: hammer, first pulse as the waveform, added currents, and tolerance."""
+        """Provenance of the map: hammer, first pulse as the waveform, overlap rule "add", and tolerance."""
         return provenance(hammer=self.hammer, waveform=self.waveform, overlap="add", tolerance=self.tolerance)
 
     @property
@@ -164,7 +164,7 @@ class TwoPulses(Waveform):
 
     @property
     def peak(self) -> float:
-        """Largest absolute value over all widths of the map, so that all runs are scaled alike."""
+        """Largest absolute value of the pulses of the map, so that all runs have the same scales."""
         return self.largest
 
 

@@ -40,7 +40,7 @@ SEED: Final = 1983
 
 REGULAR: Final = 0.2
 CHAOTIC: Final = 0.8
-"""Limits of K: a series is regular up to `REGULAR`, and chaotic from `CHAOTIC` on.
+"""Limits of K: a series is regular up to `REGULAR`, and chaotic if K is at least `CHAOTIC`.
 
 K^2 is the fraction of the variance of M_c(n) that a straight line explains: at most a twentieth for a regular
 series, about two thirds or more for a chaotic series.

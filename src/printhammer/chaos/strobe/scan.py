@@ -11,8 +11,8 @@ periodic as soon as
 
 A remaining difference d then accumulates to at most d / (1 - 0.99), which is within the tolerance of the
 classification. All other trains are followed to firing 2000. Aperiodic trains are strange if the exponent
-over three hundred firings on the attractor, from the state at firing 1001 on, is positive by five standard
-errors, more than the classification requires; otherwise it is computed over firings 1001 to 2000.
+over three hundred firings on the attractor, from the state at firing 1001 onward, is positive by five
+standard errors, more than the classification requires; otherwise it is computed over firings 1001 to 2000.
 """
 
 from __future__ import annotations

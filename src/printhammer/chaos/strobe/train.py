@@ -80,7 +80,7 @@ _BEFORE: Final = 100
 
 
 class Train(Declared):
-    """Regime fired from an initial state on, without earlier firings."""
+    """Regime fired from an initial state, without earlier firings."""
 
     regime: Regime = part("hammer and periodic drive")
     drive: Drive = part("a sequence of pulses, or a continuous periodic force")

@@ -123,7 +123,7 @@ class FeedbackStrategy(Declared):
         self.controller.estimate(loops, flights)
 
     def _carry(self, legs: list[Leg], loops: list[Loop], since: FloatArray) -> tuple[Samples, Samples]:
-        """Advance runs through stages; return sensor samples of contacts and, from `since` on, flights."""
+        """Advance runs through stages; return sensor samples of contacts and, after `since`, of flights."""
         controller, sensor, ends = self.controller, self.sensor, legs[-1].ends
         starts = np.array([loop.time for loop in loops])
         # An empty time span for a run without a contact.

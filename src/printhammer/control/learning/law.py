@@ -375,7 +375,7 @@ class LearningLaw:
         return Verdict(gains, loops[chosen], float(np.fmax.reduce(growth)), float(good.mean()), every)
 
     def _leads(self, share: FloatArray, others: FloatArray) -> bool:
-        """Whether a drive leads all others on average, and trails on at most the fraction `doubt` of all."""
+        """Whether a drive leads all others on average, and trails on at most a fraction `doubt` of all."""
         harmless = np.quantile(share - others.max(axis=0), self.doubt) >= 0.0
         return bool(harmless and share.mean() - others.mean(axis=1).max() >= _GAIN)
 

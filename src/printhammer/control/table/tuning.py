@@ -293,7 +293,7 @@ def _given_rates(asked: Sequence[float | str]) -> FloatArray:
 
 
 def _bridge(draft: Draft) -> None:
-    """Tune short gaps of unusable rates again, in place, from the lowest on, until a gap stays unusable.
+    """Tune short gaps of unusable rates again, in place, from the lowest upward, until a gap stays unusable.
 
     The table ends below the first rate that stays poor, so a gap of a few rates would cost all rates above
     the gap.
@@ -380,7 +380,7 @@ def _periods(rates: FloatArray, reach: int, single: Single) -> FloatArray:
 
 
 def _usable(draft: Draft) -> int:
-    """Return the number of rates, from the lowest on, that are well within the limits."""
+    """Return the number of rates, from the lowest upward, that are well within the limits."""
     bad = np.flatnonzero(~(draft.worst <= _USABLE))
     if bad.size and bad[0] == 0:
         raise InputError(

@@ -126,7 +126,7 @@ Interpolation = Literal["pchip", "linear"]
 
 
 class Sampled(Waveform):
-    """Measured record: interpolated samples, zero before the first and from the last on.
+    """Measured record: interpolated samples, zero before the first sample and after the last.
 
     The file is a CSV with units in its heading, ``time [us],current [A]`` or ``time [us],force [N]``; times
     count from the firing, are not negative and increase. Between samples the curve is a shape-preserving

@@ -77,7 +77,7 @@ class Trapezoid(_Pulse):
 
 
 class Sine(_Pulse):
-    """Endless sine wave, amplitude sin(2 pi frequency tau + phase) from tau = 0 on, for a periodic drive."""
+    """Endless sine wave for a periodic drive, amplitude sin(2 pi frequency tau + phase) for tau >= 0."""
 
     shape: ClassVar[str] = "sine"
     code: ClassVar[int] = tables.SINE_SHAPE

@@ -52,7 +52,7 @@ def poincare(
     periods : sequence, optional
         Strobe times, s, or text with a unit.
     points : int, optional
-        Points in each panel, from the first firing on.
+        Points in each panel, counted from the first firing.
     printed : mapping, optional
         Classifications printed in the paper, such as "period-2", by strobe time, s; a panel shows its printed
         classification if the computed one differs.

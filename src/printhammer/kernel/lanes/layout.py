@@ -51,7 +51,7 @@ PLACES = {
 # exponentials and angular frequency of the sine.
 DRIVE_WIDTH = 9
 RATES_WIDTH = 3
-"""Number of rows of the waveform."""
+"""Number of rows for the rates of a member's waveform."""
 
 # Codes of the pools, one per mode.
 FREE_POOL = 0
@@ -123,7 +123,7 @@ FREE_STEP = 3
 PACK_STEP = 4
 CONTACT_STEP = 5
 UNIT = 6
-"""Column of the scale of s in the current backstop contact; 0 if the run began in this contact."""
+"""Column of the scale of the variable s in a backstop contact; 0 if the run began in this contact."""
 DOT = 7
 """Column of the row of dot data of the open pack contact; -1 if no pack contact is open."""
 END = 8

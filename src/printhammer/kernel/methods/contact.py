@@ -230,7 +230,7 @@ def contact_switch(
 def electric_in_contact(
     start: ContactState, t: float, hammer: Hammer, drive: Drive
 ) -> tuple[float, Electric]:
-    """Return the value of s at time `t` [s] in a backstop step, and the electric state at that time."""
+    """Return the regularised variable s at time `t` [s] in a backstop step, and the electric state there."""
     s = s_at(t, start[0], start[1], start[2], start[3], hammer, drive)
     step = whole_contact_step(start[0], start[1], start[2], start[3], s, hammer, drive, M.ANY_SCALES)
     rest = t - step[0]

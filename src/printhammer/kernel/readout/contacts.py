@@ -21,7 +21,7 @@ PEAK_TIME, DEPTH, FORCE = range(5, 8)
 """Columns of the time of the largest indentation [s], that indentation [m], and the largest force [N], NaN
 on a rigid backstop."""
 LOSS, FIRING, NUMBER, INITIAL = range(8, 12)
-"""Columns of the energy dissipated [J], the index of the firing (-1 without), the number of the contact among
+"""Columns of the energy dissipated [J], the index of the firing (-1 if none), the number of the contact among
 the pack contacts of its firing (-1 for a contact of no firing), and 1 if open at the start."""
 BEGIN, END = range(12, 14)
 """Columns of the first step within the contact and the step after the last."""
@@ -30,7 +30,7 @@ CONTACT_WIDTH = 14
 
 FIRED_AT, STRUCK, FLIGHT_TIME, IMPACT_SPEED, PEAK_FORCE, INDENTATION = range(6)
 """Columns of a dot: time of the firing [s], 1 if it made a dot, flight time [s], speed at touch [m/s],
-largest force [N] and indentation [m]. From the flight time on NaN for a lost dot."""
+largest force [N] and indentation [m]. For a lost dot, the columns from the flight time on are NaN."""
 CONTACT_TIME, LOADING_WORK, NET_LOSS, EXTRA_CONTACTS = range(6, 10)
 """Columns of the contact time [s] (NaN while open), the work up to the largest indentation [J], the energy
 dissipated in the pack [J], and the number of extra contacts."""
@@ -39,7 +39,7 @@ DOT_WIDTH = 10
 
 
 def nodes_before(t: float, nodes: Any, included: bool) -> int:
-    """Count the nodes before time `t` [s], with those at that time if `included`."""
+    """Count the nodes before time `t` [s]; if `included`, also the nodes at that time."""
     low, high = 0, nodes.shape[0]
     while low < high:
         middle = (low + high) // 2

@@ -111,7 +111,7 @@ def note_path(state: State, setup: Setup, nodes: Any) -> None:
 
 @inlined
 def note_node(mode: int, kept: float, state: State, setup: Setup, nodes: Any) -> None:
-    """Append a node to the record: the present state, and the mode and memory valid from here on."""
+    """Append a node to the record: the present state, and mode and memory until the next node."""
     state[C.USED] = add_node(
         nodes, int(state[C.USED]), state[C.TIME], state[C.POSITION_NOW], state[C.VELOCITY], mode, kept
     )

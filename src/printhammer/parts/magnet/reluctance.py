@@ -136,7 +136,7 @@ def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float
 
 _TURNS, _AREA, _CLOSED_AT, _RESIDUAL_GAP, _PERIMETER, _HEIGHT = range(6)
 _CORE, _SATURATION, _LEAKAGE, _REACH, _PULL = range(6, 11)
-"""Indices of the numbers of the part; the pull is 0 toward the paper and 1 toward the backstop."""
+"""Indices of constants in `numbers`; the pull is 0 toward the paper and 1 toward the backstop."""
 
 
 def magnet_packed(q: Any, origin: float, c: Any) -> int:

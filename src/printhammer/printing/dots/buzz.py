@@ -123,12 +123,12 @@ def find_buzz_train(
 
     The search is a grid search over one number, the period or the delay, refined around the three best
     values. Even trains come first, since they need no sensor: periods from half the flight time of a single
-    pulse up to its return to the backstop. If no even train both prints enough dots and stays clear from its
-    first dot on, delayed trains follow: delays from 0, at the departure from the pack, up to the return,
-    every 2 us or 400 delays, whichever is coarser. A delayed train is built firing by firing. A dot is waited
-    for three times as long as a single pulse takes from firing to departure. Trains are ranked by whether
-    they have enough dots, then whether they stay clear, then by the number of dots, then by the weakest dot.
-    The search is deterministic.
+    pulse up to its return to the backstop. If no even train both prints enough dots and stays clear after its
+    first dot, delayed trains follow: delays from 0, at the departure from the pack, up to the return, every 2
+    us or 400 delays, whichever is coarser. A delayed train is built firing by firing. A dot is waited for
+    three times as long as a single pulse takes from firing to departure. Trains are ranked by whether they
+    have enough dots, then whether they stay clear, then by the number of dots, then by the weakest dot. The
+    search is deterministic.
 
     Parameters
     ----------

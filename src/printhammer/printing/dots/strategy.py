@@ -72,8 +72,8 @@ def de_bruijn(order: int = SLOTS) -> BoolArray:
 def cycle_with_lead_in(order: int = SLOTS, lead_in: int = LEAD_IN) -> BoolArray:
     """Return one turn of the de Bruijn cycle, preceded by the last `lead_in` slots of the cycle.
 
-    The run begins at rest with the lead-in, so that every evaluated slot, from index `lead_in` on, has the
-    same last `lead_in` slots before it as in an endless cycle.
+    The run begins at rest with the lead-in, so that every evaluated slot, from index `lead_in` onward, has
+    the same last `lead_in` slots before it as in an endless cycle.
     """
     cycle = de_bruijn(order)
     return np.concatenate([np.resize(cycle[::-1], lead_in)[::-1], cycle])

@@ -310,8 +310,8 @@ def quality(
     pitch : float or str, optional
         Distance between neighbouring slots on the paper, m, or text with a unit.
     paper : Paper, optional
-        Variation of pack stiffness and front along the line; by default none. Each dot meets, from its firing
-        on, the pack at its slot. A strategy knows of the variation only through its sensor.
+        Variation of pack stiffness and front along the line; by default none. Each dot meets the pack at its
+        slot, from its firing until the next one. A strategy knows of the variation only through its sensor.
 
     Returns
     -------
