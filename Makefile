@@ -74,7 +74,7 @@ LOCK := build/lock-venv/bin/uv pip compile --quiet --universal --fork-strategy f
 	--generate-hashes --no-emit-index-url --no-emit-find-links --no-header --no-annotate
 
 # What lint, types and the fast tests need; the docs need sphinx, which nothing else does.
-TESTED := tables netcdf sweep cluster studies studio notebook pdf test lint
+TESTED := tables netcdf sweep cluster studies notebook pdf test lint
 
 lock: ## resolve the pinned requirements again (UPGRADE=--upgrade for the newest)
 	$(PYTHON) -m venv build/lock-venv

@@ -4,8 +4,8 @@
 
 A quarter of the sliders go to an end of their range; boxes get numbers, units, sums and nonsense. Printed are
 the longest time in which the page did nothing, the longest time until a state was seen, pictures that were
-older than what was set for more than a second without a mark, errors, and the memory of page and program in
-each fifth of the time.
+older than what was set for more than a second without a mark, errors, and the memory of the page in each
+fifth of the time.
 """
 
 from __future__ import annotations
@@ -72,7 +72,10 @@ def main() -> None:
     """Act, watch, and print what was seen."""
     sys.path.insert(0, str(Path(__file__).parents[1]))
     from tests.studio.browser import browser
-    from tests.studio.server import studio
+
+    from printhammer.hammer.hammer import load
+    from printhammer.studio import Shelf, live_page
+    from printhammer.studio.launch import keep_page
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("hammer", nargs="?", default="hendriks-1983")
@@ -82,10 +85,11 @@ def main() -> None:
     given = parser.parse_args()
     draw = random.Random(given.seed)
     done: list[str] = []
-    with browser() as tab, studio(given.hammer) as running:
+    address = keep_page(live_page(Shelf(load(given.hammer)))).as_uri()
+    with browser() as tab:
         page = tab()
         page.size(1440, 900, ratio=given.ratio)
-        page.open(running.address)
+        page.open(address)
         page.wait("window.studio?.studio?.frames.map")
         page.run(WATCH)
         begun = time.monotonic()
@@ -98,7 +102,7 @@ def main() -> None:
                 end = str(draw.random() < 0.25).lower()
                 done.append(page.run(f"window.act({draw.random()}, {value}, {end})"))
                 time.sleep(draw.choice([0.02, 0.1, 0.5, 1.0]))
-            told(page, running.process.pid, len(done))
+            told(page, len(done))
         seen: dict[str, Any] = page.run("({ ...watch, text: document.querySelector('.status').textContent })")
         print(f"longest pause of the page {seen['gap']:.0f} ms, until a state was seen {seen['late']:.0f} ms")
         print(f"stale without a mark: {seen['stale'][:5]}")
@@ -107,24 +111,11 @@ def main() -> None:
         print("the last actions:", *done[-5:], sep="\n  ")
 
 
-def told(page: Any, process: int, count: int) -> None:
-    """Print what page and program hold in memory."""
+def told(page: Any, count: int) -> None:
+    """Print the memory of the page."""
     page.call("HeapProfiler.collectGarbage")
     heap = page.run("performance.memory.usedJSHeapSize") / 1e6
-    print(f"{count} actions: page {heap:.0f} MB, program {resident(process) / 1e6:.0f} MB", flush=True)
-
-
-def resident(process: int) -> float:
-    """Return the memory of a process and those that it started, bytes."""
-    total = 0.0
-    for folder in Path("/proc").glob("[0-9]*"):
-        try:
-            status = dict(line.split(":", 1) for line in (folder / "status").read_text().splitlines())
-        except (OSError, ValueError):
-            continue
-        if process in (int(folder.name), int(status["PPid"])) and "VmRSS" in status:
-            total += 1024.0 * float(status["VmRSS"].split()[0])
-    return total
+    print(f"{count} actions: page {heap:.0f} MB", flush=True)
 
 
 if __name__ == "__main__":

@@ -34,7 +34,11 @@ def main() -> None:
     """Measure and print a table."""
     sys.path.insert(0, str(Path(__file__).parents[1]))
     from tests.studio.browser import browser
-    from tests.studio.server import studio
+
+    from printhammer.hammer.hammer import load
+    from printhammer.studio import Shelf, live_page
+    from printhammer.studio.coil import rail_of
+    from printhammer.studio.launch import keep_page
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("hammer", nargs="?", default="hendriks-1983")
@@ -44,9 +48,6 @@ def main() -> None:
     given = parser.parse_args()
     drives = {"": ("", CONTROLS)}
     if given.rail:
-        from printhammer.hammer.hammer import load
-        from printhammer.studio.states.coil import rail_of
-
         if (rail := rail_of(load(given.hammer))) is None:
             parser.error(f"{given.hammer} has no coil whose flux linkage is known")
         waveform = json.dumps({"shape": "rail", **rail})
@@ -54,31 +55,31 @@ def main() -> None:
     with browser() as tab:
         page = tab()
         page.size(1280, 720, ratio=given.ratio)
+        address = keep_page(live_page(Shelf(load(given.hammer)))).as_uri()
         begun = time.perf_counter()
-        with studio(given.hammer) as running:
-            page.open(running.address)
-            page.wait("window.studio?.studio?.frames.motion")
-            print(f"start of the program to the first picture: {time.perf_counter() - begun:.2f} s")
-            for name, (views, kinds) in GROUPS.items():
-                pairs = [(kind, link, each) for kind, (link, every) in drives.items() for each in every]
-                for drive, link, control in pairs:
-                    page.open("about:blank")
-                    told = "&".join(part for part in (f"views={views}" if views else "", link) if part)
-                    page.open(running.address + (f"#{told}" if told else ""))
-                    page.wait("window.studio?.studio?.frames.motion")
-                    time.sleep(2.5)
-                    page.run(LISTEN)
-                    page.run(f"document.querySelector('[data-key=\"{control}\"]').focus()")
-                    for k in range(given.times + 10):
-                        if k == 10:
-                            page.run("window.seen.length = 0")
-                        page.press("ArrowRight" if k % 20 < 10 else "ArrowLeft")
-                        time.sleep(0.25)
-                    seen = page.run("window.seen")
-                    for kind, detail in kinds:
-                        same = [each for each in seen if (each["kind"], each.get("detail")) == (kind, detail)]
-                        took = sorted(each["took"] for each in same if each["took"] is not None)
-                        show(f"{name}, {drive}{control}: {detail or 'curves'}", took)
+        page.open(address)
+        page.wait("window.studio?.studio?.frames.motion")
+        print(f"opening of the file to the first curve: {time.perf_counter() - begun:.2f} s")
+        for name, (views, kinds) in GROUPS.items():
+            pairs = [(kind, link, each) for kind, (link, every) in drives.items() for each in every]
+            for drive, link, control in pairs:
+                page.open("about:blank")
+                told = "&".join(part for part in (f"views={views}" if views else "", link) if part)
+                page.open(address + (f"#{told}" if told else ""))
+                page.wait("window.studio?.studio?.frames.motion")
+                time.sleep(2.5)
+                page.run(LISTEN)
+                page.run(f"document.querySelector('[data-key=\"{control}\"]').focus()")
+                for k in range(given.times + 10):
+                    if k == 10:
+                        page.run("window.seen.length = 0")
+                    page.press("ArrowRight" if k % 20 < 10 else "ArrowLeft")
+                    time.sleep(0.25)
+                seen = page.run("window.seen")
+                for kind, detail in kinds:
+                    same = [each for each in seen if (each["kind"], each.get("detail")) == (kind, detail)]
+                    took = sorted(each["took"] for each in same if each["took"] is not None)
+                    show(f"{name}, {drive}{control}: {detail or 'curves'}", took)
 
 
 def show(told: str, took: list[float]) -> None:

@@ -22,17 +22,20 @@ def main() -> None:
     sys.path.insert(0, str(ROOT))
     from PIL import Image
     from tests.studio.browser import browser
-    from tests.studio.server import studio
+
+    from printhammer.studio import Shelf, live_page
+    from printhammer.studio.launch import keep_page
 
     IMAGES.mkdir(parents=True, exist_ok=True)
-    with studio("hendriks-1983") as running, browser() as tab:
+    address = keep_page(live_page(Shelf())).as_uri()
+    with browser() as tab:
         page = tab()
 
         def rest(milliseconds: int = 1500) -> None:
             page.run(f"new Promise((done) => setTimeout(done, {milliseconds}))")
 
         page.size(1440, 900)
-        page.open(running.address + STATE)
+        page.open(address + STATE)
         page.wait(COMPLETE)
         # The opening, at a time at which the armature is on its way.
         page.run("window.studio.studio.setCursor(2.62e-3)")
@@ -49,7 +52,7 @@ def main() -> None:
             page.picture(IMAGES / f"story-{name}.png", ".stage")
         page.run("document.querySelector('.notice .shut').click()")
         page.open("about:blank")
-        page.open(running.address + STATE)
+        page.open(address + STATE)
         page.wait(COMPLETE)
         # A pinned run behind one with thicker forms.
         page.run("window.studio.studio.pin()")

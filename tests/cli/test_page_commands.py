@@ -18,7 +18,7 @@ WRITTEN = re.compile(r"(?:--out|--into|--dots|--contacts|>) ([\w./-]+)")
 # Commands that other tests run, or that do not end, by how they begin.
 ELSEWHERE = {
     "printhammer paper": "test_paper.py writes the whole report",
-    "printhammer studio": "ends with Ctrl-C only, in tests/studio",
+    "printhammer studio": "opens a browser; test_studio.py",
     "printhammer feedback": "takes minutes; the example of the help runs, in test_registry.py",
     "python -m ": "programs of the repository, which have tests of their own",
     "NUMBA_CACHE_DIR=": "compiles anew what test_warm.py compiles",

@@ -35,7 +35,7 @@ LONG = {"basins", "bifurcation", "continue", "curve", "orbits", "energy", "feedb
 # Examples that are part of other tests, or take minutes.
 ELSEWHERE = {
     "paper": "takes minutes; test_paper.py writes the whole report",
-    "studio": "ends with Ctrl-C only, in test_studio.py",
+    "studio": "opens a browser; test_studio.py",
     "fit coil": "reads a hammer on a voltage that no other verb writes; test_fit_coil.py",
     "warm": "test_warm.py runs it",
     "learn": "chooses among 400 hammers; test_learn.py, and its page, with fewer",

@@ -1,74 +1,69 @@
-"""The verb `studio`: it opens with a state, says where it is, and ends with Ctrl-C."""
+"""The verb `studio`: it writes the page and opens it; what it cannot use is refused."""
 
-import os
-import signal
-import subprocess
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+import json
+import webbrowser
+from collections.abc import Callable
 from pathlib import Path
-from urllib.request import urlopen
+from typing import Any
 
 import pytest
-from tests.studio.server import STATE, Studio, frames, say
+from tests.hammers import CRUDE
+from tests.studio.reading import without_modules
 
-from printhammer.studio.states.links import file_of
-from printhammer.studio.states.state import read_state
-
-
-@contextmanager
-def opened(*arguments: str, home: Path) -> Iterator[tuple["subprocess.Popen[str]", str]]:
-    """Run the verb without a browser; give its process and its address."""
-    command = (sys.executable, "-m", "printhammer", "studio", "--no-open", *arguments)
-    environment = {**os.environ, "XDG_STATE_HOME": str(home), "LOCALAPPDATA": str(home), "HOME": str(home)}
-    process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
-    )
-    assert process.stdout is not None
-    assert process.stderr is not None
-    try:
-        yield process, process.stdout.readline().strip().removeprefix("The studio is at ")
-    finally:
-        process.kill()
-        process.wait(20)
-        process.stdout.close()
-        process.stderr.close()
+import printhammer as ph
+from printhammer.studio import launch
 
 
-def test_it_opens_with_a_state_and_ends_with_ctrl_c(tmp_path: Path) -> None:
-    saved = tmp_path / "state.json"
-    saved.write_text(file_of(read_state({**STATE, "hammer": "hendriks-1983", "rate": 777.0})), "utf-8")
-    with opened("--state", str(saved), "--port", "0", home=tmp_path) as (process, address):
-        studio = Studio(address, "hendriks-1983", process)
-        with urlopen(address) as answer:
-            assert answer.status == 200
-        with studio.connect() as connection:
-            say(connection, "open", 1, state={})
-            heading, _ = frames(connection, "open")[-1]
-        assert heading["state"]["rate"] == 777.0
-        process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=20)
-        assert errors.strip() == "printhammer: interrupted"
-        assert process.returncode == 130
+@pytest.fixture
+def opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Pages that were opened in the browser; their folder is that of the test."""
+    without_modules(monkeypatch)
+    found: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", found.append)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(launch, "_cache", lambda: tmp_path / "cache")
+    return found
 
 
-def test_its_token_and_its_port_are_the_same_next_time_where_that_is_free(tmp_path: Path) -> None:
-    with opened(home=tmp_path) as (_, first), opened(home=tmp_path) as (_, second):
-        # The port is taken when the second one starts.
-        assert second
-    assert first.partition("token=")[2] == second.partition("token=")[2]
-    assert first != second
+def start_of(page: str) -> Any:
+    return json.loads(page.partition('id="start">')[2].partition("</script>")[0])
 
 
-@pytest.mark.parametrize(("content", "reason"), [("{", "expected a state file"), (None, "there is no")])
-def test_a_state_that_is_none_is_refused_in_one_sentence(
-    tmp_path: Path, content: str | None, reason: str
+def test_the_page_is_written_and_opened(opened: list[str], cli: Callable) -> None:
+    done = cli("studio", CRUDE, "--only", "--state", "rate=900&line=<b>")
+    assert done.status == 0
+    path = Path(done.out.strip().removeprefix("The studio is the page "))
+    assert opened == [path.as_uri()]
+    assert start_of(path.read_text("utf-8")) == {"text": "rate=900&line=<b>"}
+    assert cli("studio", CRUDE, "--only", "--no-open").status == 0
+    assert len(opened) == 1
+    assert len(list(path.parent.iterdir())) == 2
+
+
+def test_a_page_is_written_to_be_sent_around(opened: list[str], cli: Callable, tmp_path: Path) -> None:
+    state = tmp_path / "state.json"
+    text = ph.load(CRUDE).replace("name", "mine").to_toml()
+    content = {"kind": launch.KIND, "format": launch.FORMAT, "state": {"text": text, "rate": 777.0}}
+    state.write_text(json.dumps(content), "utf-8")
+    out = tmp_path / "page.html"
+    assert cli("studio", "tung-shaw-1988", "--only", "--state", state, "--out", out).status == 0
+    assert start_of(out.read_text("utf-8"))["state"] == {"text": "", "rate": 777.0, "hammer": "mine"}
+    assert opened == []
+    assert cli("studio", "--out", out).status == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("no-such",), "no-such"),
+        (("--state", "no-such.json"), "no-such.json: there is no"),
+        (("--state", str(CRUDE)), "expected a state file"),
+        (("--out", "page.png"), "--out page.png: expected a name"),
+        (("--port", "80"), "--port"),
+    ],
+)
+def test_what_it_cannot_use_is_refused(
+    opened: list[str], refused: Callable, words: tuple[str, ...], said: str
 ) -> None:
-    path = tmp_path / "state.json"
-    if content is not None:
-        path.write_text(content, "utf-8")
-    with opened("--state", str(path), home=tmp_path) as (process, _):
-        _, errors = process.communicate(timeout=60)
-    assert process.returncode == 2
-    assert "Traceback" not in errors
-    assert str(path) in errors.replace("\n", "")
+    refused("studio", *words, said=said)
+    assert opened == []

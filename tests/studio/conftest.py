@@ -5,9 +5,13 @@ from typing import Any
 
 import pytest
 from tests.studio.browser import Page, browser, chromium
-from tests.studio.server import Studio, studio
+
+from printhammer.hammer.hammer import load
+from printhammer.studio import Shelf, live_page
 
 NEEDS = "opened_browser"
+HAMMERS = ("hendriks-1983-1", "hendriks-1983", "bouncing-ball", "duffing-holmes")
+"""Hammers of the page of the tests, the first of which is shown."""
 left_out: list[str] = []
 
 
@@ -25,10 +29,12 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
         terminalreporter.write_line(f"{len(left_out)} tests in a browser left out: no Chromium found")
 
 
-@pytest.fixture(scope="module")
-def running() -> Iterator[Studio]:
-    with studio() as started:
-        yield started
+@pytest.fixture(scope="session")
+def address(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The page as a file, with a few hammers."""
+    path = tmp_path_factory.mktemp("studio") / "page.html"
+    path.write_text(live_page(Shelf(*map(load, HAMMERS), only=True)), "utf-8")
+    return path.as_uri()
 
 
 @pytest.fixture(scope="module")
@@ -38,10 +44,12 @@ def opened_browser() -> Iterator[Any]:
 
 
 @pytest.fixture
-def page(running: Studio, opened_browser: Any) -> Iterator[Page]:
+def page(address: str, opened_browser: Any) -> Iterator[Page]:
+    """The page with all views; nothing but the file itself is asked for."""
     opened = opened_browser()
     opened.size(1280, 720)
-    opened.open(running.address)
+    opened.open(address)
     opened.wait("window.studio?.studio?.frames.map?.detail === 'full'")
     yield opened
+    assert [place for place in opened.requests if not place.startswith(("blob:", "file:", "data:"))] == []
     opened.call("Page.close")

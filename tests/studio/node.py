@@ -9,7 +9,7 @@ import numpy as np
 
 from printhammer.studio.bundle import merged
 from printhammer.studio.live import content_of
-from printhammer.studio.states.shelf import Shelf
+from printhammer.studio.shelf import Shelf
 
 HOST = """
 const { readFileSync } = require("node:fs");
@@ -39,9 +39,7 @@ class Engine:
 
     def __init__(self, shelf: Shelf, folder: Path) -> None:
         content = folder / "content.json"
-        from printhammer.studio.frames import plain
-
-        content.write_text(json.dumps(plain(content_of(shelf))), "utf-8")
+        content.write_text(json.dumps(content_of(shelf)), "utf-8")
         script = folder / "worker.js"
         script.write_text(HOST + merged("engine/worker.js") + SERVE, "utf-8")
         self._process = subprocess.Popen(

@@ -1,22 +1,13 @@
 """The studio end to end, in a headless Chromium."""
 
-import base64
 import json
-import re
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
 import pytest
-from tests.hammers import CRUDE
 from tests.studio.browser import Page
-from tests.studio.server import Studio
 
 import printhammer as ph
-from printhammer.studio.bundle import module
-from printhammer.studio.messages import answer, read_message
-from printhammer.studio.pictures.engine import motion_frame
-from printhammer.studio.states.shelf import Shelf
 
 CTRL, SHIFT = 2, 8
 AXE = Path(__file__).parent / "vendor" / "axe.min.js"
@@ -49,93 +40,6 @@ def saved(page: Page, selector: str, value: str) -> str:
     """Choose an export and return the text that would be saved."""
     page.run(f"helpers.save({selector!r}, {value!r})")
     return page.wait("window.kept")
-
-
-@pytest.mark.slow
-def test_a_visit(page: Page, running: Studio) -> None:
-    """Open, look, drag, click the map, pin, undo, reload, drop, export; no complaint, no foreign request."""
-    page.run(HELPERS)
-    for view in VIEWS:
-        page.wait(f"window.studio.studio.frames[{FRAMES.get(view, 'dots')!r}]")
-        assert inked(page, view) > 3, view
-
-    # Drag a slider.
-    box = page.box("[data-key='forms thickness']")
-    middle = box["y"] + box["height"] / 2
-    page.drag(*((box["x"] + part * box["width"], middle) for part in (0.5, 0.55, 0.62, 0.7)))
-    settled(page, "state.constants['pack.thickness'] > 0")
-    constants = state(page)["constants"]
-    hammer = ph.load(CRUDE)
-    assert constants["pack.thickness"] > hammer.pack.thickness
-    assert constants["pack.thickness"] + constants["pack.front"] == pytest.approx(hammer.platen)
-    places = page.run("window.studio.studio.frames.motion.places")
-    assert places["front"] == pytest.approx(constants["pack.front"])
-
-    # Click the map: every view follows.
-    before = state(page)["rate"]
-    box = page.box(".view-map canvas")
-    page.drag((box["x"] + 0.5 * box["width"], box["y"] + 0.25 * box["height"]))
-    settled(page, f"state.rate !== {before}")
-    rate = state(page)["rate"]
-    assert 1400.0 < rate < 2000.0
-    fired = page.run("window.studio.studio.frames.motion.fired")
-    assert fired[1] - fired[0] == pytest.approx(1.0 / rate)
-    page.wait(f"window.studio.studio.frames.strobe?.rate === {rate}")
-
-    # Pin, then undo and redo.
-    page.run("document.querySelector('.pin').click()")
-    assert page.run("window.studio.studio.ghosts.length") == 1
-    page.run("document.querySelector('.grid').focus(); document.body.focus()")
-    page.run("document.querySelector('.undo').click()")
-    settled(page, f"state.rate === {before}")
-    page.run("document.querySelector('.undo').click()")
-    settled(page, "Object.keys(state.constants).length === 0")
-    page.run("document.querySelector('.redo').click()")
-    page.run("document.querySelector('.redo').click()")
-    settled(page, f"state.rate === {rate}")
-    kept = state(page)
-
-    # Reload from the address.
-    # The address of before the pin holds the same rate.
-    page.wait(f"location.hash.includes('rate={rate:g}') && location.hash.includes('pins=')")
-    page.call("Page.reload")
-    page.wait("window.studio?.studio?.frames.map?.detail === 'full'")
-    assert state(page) == kept
-    page.run(HELPERS)
-
-    # Drop a hammer, a measured curve, and something else.
-    drop(page, "other.toml", hammer.replace("mass", 1.1 * hammer.mass).to_toml())
-    settled(page, "state.text.length > 100")
-    drop(page, "measured.csv", "time [us],displacement [um]\n0,50\n200,180\n400,60\n")
-    page.wait("window.studio.studio.overlay?.name === 'measured.csv'")
-    drop(page, "letter.txt", "Dear Sir")
-    page.wait("document.querySelector('.status').classList.contains('bad')")
-    page.run("document.querySelector('.undo').click()")
-    settled(page, "state.text === ''")
-
-    # Everything leaves.
-    assert ph.Hammer.from_toml(saved(page, "select.out", "hammer, TOML")).pack.thickness == pytest.approx(
-        kept["constants"]["pack.thickness"]
-    )
-    assert "[train]" in saved(page, "select.out", "drive, TOML")
-    page.wait("window.studio.studio.frames.strobe?.data.x && window.studio.studio.frames.line?.data.x")
-    assert saved(page, ".view-line .leave", "CSV").startswith(
-        "wanted_x [m],wanted_y [m],x [m],y [m],darkness"
-    )
-    for view in VIEWS:
-        page.wait(f"window.studio.studio.views['{view}'].table()")
-        leave = f".view-{view} .leave"
-        assert saved(page, leave, "CSV").count("\n") >= 9, view
-        picture = saved(page, leave, "SVG")
-        assert picture.startswith("<svg"), view
-        assert picture.count("<path") > 3, view
-        assert "NaN" not in re.sub(r'href="data:[^"]*"', "", picture), view
-        assert "PNG" in saved(page, leave, "PNG")[:8], view
-
-    assert page.complaints == []
-    assert {
-        urlsplit(address).netloc for address in page.requests if not address.startswith(("data:", "blob:"))
-    } == {running.host}
 
 
 @pytest.mark.slow
@@ -230,46 +134,6 @@ def test_presets_patterns_shapes_and_units(page: Page) -> None:
     assert page.complaints == []
 
 
-def answered(data: bytes) -> str:
-    """Return a script that hands a frame to the widget."""
-    return f"helpers.take('{base64.b64encode(data).decode()}')"
-
-
-@pytest.mark.slow
-def test_the_widget_is_the_same_page(opened_browser: Any) -> None:
-    """The one module of the widget, mounted on an empty page, sends and takes the messages of the page."""
-    page = opened_browser()
-    page.open("about:blank")
-    page.run(HELPERS)
-    page.run(
-        "window.sent = []; window.model = { get: (name) => ({ height: '700px', state: 'rate=900' })[name],"
-        " set() {}, save_changes() {}, on(_kind, take) { window.take = take; }, off() {},"
-        " send: (message) => window.sent.push(JSON.parse(message.text)) }; 1"
-    )
-    page.run(f"window.text = {json.dumps(module())}; 1")
-    page.run(
-        "import(URL.createObjectURL(new Blob([window.text], { type: 'text/javascript' })))"
-        ".then((made) => made.default.render({ model: window.model, el: document.body })).then(() => 1)"
-    )
-    assert page.run("document.querySelectorAll('.panel').length") == len(VIEWS)
-    for number in range(2):
-        kind, serial, content = read_message(json.dumps(page.wait(f"window.sent[{number}]")))
-        page.run(answered(answer(kind, serial, content, Shelf())))
-    kind, serial, found = read_message(json.dumps(page.wait("window.sent[2]")))
-    assert (kind, found.rate) == ("state", 900.0)
-    data, _ = motion_frame(found, serial)
-    page.run(answered(data))
-    page.wait("document.querySelector('.status').textContent.includes('steps')")
-    # Keys of the studio are not for the notebook around it, where some of them cut cells.
-    page.run("window.heard = 0; document.addEventListener('keydown', () => { window.heard += 1; }); 1")
-    page.run("document.querySelector('.grid').focus()")
-    page.press("p", "KeyP")
-    page.wait("document.querySelector('.status').textContent.includes('pinned')")
-    assert page.run("window.heard") == 0
-    assert page.run("document.body.dataset.lmSuppressShortcuts") == "true"
-    assert page.complaints == []
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("dark", [False, True])
 def test_no_serious_finding_about_accessibility(page: Page, dark: bool) -> None:
@@ -286,40 +150,6 @@ def test_no_serious_finding_about_accessibility(page: Page, dark: bool) -> None:
 
 
 @pytest.mark.slow
-def test_strobe_points_arrive_with_an_exponent_and_then_the_verdict(page: Page) -> None:
-    page.run(
-        "window.painted = []; const { studio } = window.studio; window.before = studio.serial;"
-        " document.getElementById('studio').addEventListener('painted', ({ detail }) => {"
-        " const { strobe } = studio.frames;"
-        " if (detail.kind === 'strobe' && strobe.serial > window.before)"
-        " window.painted.push({ points: strobe.data.x.length, exponent: !!strobe.exponent,"
-        " verdict: !!strobe.verdict }); }); studio.store.set({ rate: 1310 }); 1"
-    )
-    page.wait("window.painted.some(({ verdict }) => verdict)")
-    painted = page.run("window.painted")
-    counts = [each["points"] for each in painted]
-    assert counts == sorted(counts)
-    assert len(set(counts)) >= 4
-    assert counts[0] < counts[-1]
-    assert any(each["exponent"] and not each["verdict"] for each in painted)
-    assert page.complaints == []
-
-
-@pytest.mark.slow
-def test_a_view_that_would_take_too_long_says_so_and_shows_nothing_old(page: Page) -> None:
-    page.run(HELPERS)
-    hammer = ph.load(CRUDE).replace("backstop.stiffness", 1e20)
-    drop(page, "stiff.toml", hammer.to_toml())
-    page.wait("window.studio.studio.frames.map?.reason && window.studio.studio.frames.strobe?.reason")
-    assert "steps" in page.run("window.studio.studio.frames.map.reason")
-    assert inked(page, "map") > 1
-    assert page.run("window.studio.studio.views.map.table()") is None
-    page.run("document.querySelector('.undo').click()")
-    page.wait("window.studio.studio.frames.map.detail === 'full'")
-    assert page.complaints == []
-
-
-@pytest.mark.slow
 def test_rates_that_failed_are_counted_in_the_map(page: Page) -> None:
     page.run(HELPERS)
     # So strong a current drives the armature away from where the law of the magnet holds.
@@ -329,20 +159,6 @@ def test_rates_that_failed_are_counted_in_the_map(page: Page) -> None:
     assert "512 of 512 runs failed" in saved(page, ".view-map .leave", "SVG")
     page.wait("document.querySelector('.status').classList.contains('bad')")
     assert page.complaints == []
-
-
-@pytest.mark.slow
-def test_two_tabs_are_independent(page: Page, running: Studio, opened_browser: Any) -> None:
-    other = opened_browser()
-    other.open(running.address + "#rate=700&pulses=2")
-    other.wait("window.studio?.studio?.frames.dots")
-    assert (state(page)["rate"], state(other)["rate"]) == (1200, 700)
-    assert len(page.run("window.studio.studio.frames.motion.fired")) == 9
-    assert len(other.run("window.studio.studio.frames.motion.fired")) == 2
-    other.call("Page.close")
-    page.run("document.querySelector('[data-key=\"rate\"]').focus()")
-    page.press("ArrowRight")
-    settled(page, "state.rate > 1200")
 
 
 @pytest.mark.slow

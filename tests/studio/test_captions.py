@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from printhammer.studio.files import page_files
+from printhammer.studio.bundle import page_files
 
 
 @pytest.fixture(scope="module")

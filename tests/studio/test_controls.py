@@ -4,15 +4,14 @@ from contextlib import nullcontext
 
 import pytest
 from tests.hammers import CRUDE, interpreted
-from tests.studio.server import STATE
 
+from printhammer.drive.trains import PulseTrain
+from printhammer.drive.waveforms.shapes import SHAPES
 from printhammer.hammer.hammer import Hammer, load, shipped
 from printhammer.hammer.names import range_of
-from printhammer.run.simulate import end_of_run
-from printhammer.studio import bounds
-from printhammer.studio.pictures.engine import limited_run
-from printhammer.studio.states import controls
-from printhammer.studio.states.state import read_state
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
+from printhammer.run.simulate import simulate
+from printhammer.studio import controls
 from printhammer.units import to_si
 
 HAMMERS = [*shipped(), str(CRUDE)]
@@ -77,10 +76,12 @@ def test_a_shipped_hammer_opens_with_something_that_strikes_its_backstop(name: s
     hammer = load(name)
     opening = controls.describe(hammer)["start"]
     assert ("waveform" in opening) == (hammer.waveform is None)
-    state = read_state({**STATE, "hammer": name, **opening})
+    wave, rate, pulses = hammer.waveform, opening.get("rate", 1200.0), opening.get("pulses", 9)
+    if fields := dict(opening.get("waveform", {})):
+        wave = SHAPES[fields.pop("shape")](**fields)
+    at = [slot / rate for slot, mark in enumerate(opening.get("pattern", "1" * pulses)) if mark == "1"]
     with interpreted() if name in RARE else nullcontext():
-        end = end_of_run(state.changed, state.drive, None)
-        motion = limited_run(state.changed, state.drive, end, bounds.MOST_STEPS)
+        motion = simulate(hammer, PulseTrain(wave, at=at), tolerance=DISPLAY_TOLERANCE)
     assert motion.status == "ok"
     struck = any(contact.surface == "backstop" for contact in motion.contacts)
     # Without a spring an armature stays where it was pulled.

@@ -6,24 +6,17 @@ from typing import Any
 
 import pytest
 from tests.studio.browser import Page
-from tests.studio.server import Studio, frames, say, studio
 
 import printhammer as ph
 
 STATE = "window.studio.studio.store.state"
 
 
-@pytest.fixture(scope="module")
-def paper() -> Iterator[Studio]:
-    with studio("hendriks-1983") as started:
-        yield started
-
-
 @pytest.fixture
-def opened(paper: Studio, opened_browser: Any) -> Iterator[Page]:
+def opened(address: str, opened_browser: Any) -> Iterator[Page]:
     page = opened_browser()
     page.size(1440, 900)
-    page.open(paper.address)
+    page.open(f"{address}#hammer=hendriks-1983")
     page.wait("window.studio?.studio?.frames.map?.detail === 'full' && window.studio.studio.frames.strobe")
     page.wait("window.studio.studio.frames.dots")
     yield page
@@ -132,12 +125,12 @@ def test_pins_have_names_and_stay_in_the_address(opened: Page) -> None:
         json.dumps([{"name": "<img src=x onerror=alert(1)>", "state": {"waveform": [1]}}]),
     ],
 )  # fmt: skip
-def test_pins_of_a_hostile_link_harm_nothing(paper: Studio, opened_browser: Any, pins: str) -> None:
+def test_pins_of_a_hostile_link_harm_nothing(address: str, opened_browser: Any, pins: str) -> None:
     page = opened_browser()
     page.open("about:blank")
     page.size(1280, 720)
     page.run(f"window.name = {json.dumps(pins)}; 1")
-    page.open(paper.address + "#pins=" + page.run("encodeURIComponent(window.name)"))
+    page.open(address + "#pins=" + page.run("encodeURIComponent(window.name)"))
     page.wait("window.studio?.studio?.frames.motion")
     page.wait("!window.studio.studio.busy")
     page.run("window.studio.studio.store.set({ rate: 1300 })")
@@ -146,17 +139,6 @@ def test_pins_of_a_hostile_link_harm_nothing(paper: Studio, opened_browser: Any,
     assert page.run("window.studio.studio.ghosts.length") == 0
     assert page.complaints == []
     page.call("Page.close")
-
-
-def test_questions_about_other_states_are_answered_or_refused(paper: Studio) -> None:
-    with paper.connect() as socket:
-        for kind, told in (("curves", "motion"), ("dots", "dots"), ("exponent", "exponent")):
-            say(socket, kind, 7, state=paper.state(hammer="hendriks-1983"))
-            assert frames(socket, told)[-1][0]["serial"] == 7
-        say(socket, "curves", 8, state={"rate": "fast"})
-        assert "state" in frames(socket, "refusal")[-1][0]["reason"]
-        say(socket, "dots", 9, state=paper.state(hammer="hendriks-1983"))
-        frames(socket, "dots")
 
 
 @pytest.mark.slow

@@ -4,7 +4,6 @@ from typing import Any
 
 import pytest
 from tests.studio.browser import Page
-from tests.studio.server import Studio, studio
 
 STATE = "window.studio.studio.store.state"
 SEEN = "!window.studio.studio.busy && !window.studio.studio.stale"
@@ -37,11 +36,11 @@ def test_every_view_is_enlarged_and_made_small_again(page: Page) -> None:
 
 
 @pytest.mark.slow
-def test_it_moves_at_first_unless_motion_is_not_wanted(opened_browser: Any, running: Studio) -> None:
+def test_it_moves_at_first_unless_motion_is_not_wanted(opened_browser: Any, address: str) -> None:
     for still in (True, False):
         page = opened_browser()
         page.size(1280, 720, still=still)
-        page.open(running.address)
+        page.open(address)
         page.wait("window.studio?.studio?.frames.dots")
         if still:
             page.run("new Promise((done) => setTimeout(done, 400))")
@@ -60,66 +59,62 @@ def test_it_moves_at_first_unless_motion_is_not_wanted(opened_browser: Any, runn
 
 
 @pytest.mark.slow
-def test_the_stories_show_what_they_tell(opened_browser: Any) -> None:
+def test_the_stories_show_what_they_tell(opened_browser: Any, address: str) -> None:
     """With the hammer of the paper; each is one click away, and what its text says is so."""
-    with studio("hendriks-1983") as running:
-        page = opened_browser()
-        page.size(1440, 900)
-        page.open(running.address)
-        page.wait("window.studio?.studio?.frames.dots")
-        struck = "window.studio.studio.frames.dots.dots.map((dot) => dot.struck)"
-        force = "window.studio.studio.frames.dots.dots.map((dot) => dot.peak_force ?? 0)"
+    page = opened_browser()
+    page.size(1440, 900)
+    page.open(address)
+    page.wait("window.studio?.studio?.frames.dots")
+    struck = "window.studio.studio.frames.dots.dots.map((dot) => dot.struck)"
+    force = "window.studio.studio.frames.dots.dots.map((dot) => dot.peak_force ?? 0)"
 
-        def open_story(name: str) -> None:
-            page.run(
-                "[...document.querySelectorAll('.story')]"
-                f".find((each) => each.textContent === '{name}').click()"
-            )
-            page.wait(SEEN)
-            page.wait("window.studio.studio.frames.dots.serial === window.studio.studio.serial")
-            assert name in page.run("document.querySelector('.notice').textContent")
-
-        open_story("One dot")
-        assert page.run(struck) == [True]
-        single = page.run(force)[0]
-        open_story("660 or 700 µs")
-        assert page.run(struck) == [True, False]
-        page.run("[...document.querySelectorAll('.switch')][1].click()")
-        page.wait(f"Math.abs(1 / {STATE}.rate - 700e-6) < 1e-12")
+    def open_story(name: str) -> None:
+        page.run(
+            f"[...document.querySelectorAll('.story')].find((each) => each.textContent === '{name}').click()"
+        )
         page.wait(SEEN)
         page.wait("window.studio.studio.frames.dots.serial === window.studio.studio.serial")
-        assert page.run(struck) == [True, True]
-        assert page.run(force)[1] > page.run(force)[0]
-        open_story("Buzz printing")
-        assert all(page.run(struck))
-        assert all(0.3 < each / single < 0.5 for each in page.run(force)[4:])
-        open_story("The second dot lost")
-        assert page.run(struck)[:3] == [True, False, True]
-        page.wait("window.studio.studio.frames.map.detail === 'full'")
-        page.wait("window.studio.studio.views.map.lost().first")
-        lost = page.run(
-            "(() => { const { list } = window.studio.studio.views.map.lost(); return list.length; })()"
-        )
-        assert lost > 100
-        open_story("Hung up")
-        low = page.run(
-            "(() => { const { data, places, fired } = window.studio.studio.frames.motion; let low = 1;"
-            " data.t.forEach((t, k) => { if (t > 6e-4 && t < fired.at(-1))"
-            " low = Math.min(low, data.x[k]); });"
-            " return low - places.backstop; })()"
-        )
-        assert low > 0.0
-        open_story("A strange train")
-        page.wait("window.studio.studio.frames.strobe?.verdict?.verdict === 'strange'")
-        page.wait(
-            "document.querySelector('.view-strobe .caption').textContent.includes('never repeats itself')"
-        )
-        page.run("document.querySelector('.notice .shut').click()")
-        assert not page.run("document.querySelector('.notice').checkVisibility()")
-        page.run("document.querySelector('.undo').click()")
-        assert page.run(f"{STATE}.rate") == 2200
-        assert page.complaints == []
-        page.call("Page.close")
+        assert name in page.run("document.querySelector('.notice').textContent")
+
+    open_story("One dot")
+    assert page.run(struck) == [True]
+    single = page.run(force)[0]
+    open_story("660 or 700 µs")
+    assert page.run(struck) == [True, False]
+    page.run("[...document.querySelectorAll('.switch')][1].click()")
+    page.wait(f"Math.abs(1 / {STATE}.rate - 700e-6) < 1e-12")
+    page.wait(SEEN)
+    page.wait("window.studio.studio.frames.dots.serial === window.studio.studio.serial")
+    assert page.run(struck) == [True, True]
+    assert page.run(force)[1] > page.run(force)[0]
+    open_story("Buzz printing")
+    assert all(page.run(struck))
+    assert all(0.3 < each / single < 0.5 for each in page.run(force)[4:])
+    open_story("The second dot lost")
+    assert page.run(struck)[:3] == [True, False, True]
+    page.wait("window.studio.studio.frames.map.detail === 'full'")
+    page.wait("window.studio.studio.views.map.lost().first")
+    lost = page.run(
+        "(() => { const { list } = window.studio.studio.views.map.lost(); return list.length; })()"
+    )
+    assert lost > 100
+    open_story("Hung up")
+    low = page.run(
+        "(() => { const { data, places, fired } = window.studio.studio.frames.motion; let low = 1;"
+        " data.t.forEach((t, k) => { if (t > 6e-4 && t < fired.at(-1))"
+        " low = Math.min(low, data.x[k]); });"
+        " return low - places.backstop; })()"
+    )
+    assert low > 0.0
+    open_story("A strange train")
+    page.wait("window.studio.studio.frames.strobe?.verdict?.verdict === 'strange'")
+    page.wait("document.querySelector('.view-strobe .caption').textContent.includes('never repeats itself')")
+    page.run("document.querySelector('.notice .shut').click()")
+    assert not page.run("document.querySelector('.notice').checkVisibility()")
+    page.run("document.querySelector('.undo').click()")
+    assert page.run(f"{STATE}.rate") == 2200
+    assert page.complaints == []
+    page.call("Page.close")
 
 
 @pytest.mark.slow
@@ -155,21 +150,20 @@ def click(page: Page, selector: str) -> None:
 
 
 @pytest.mark.slow
-def test_figure_6_takes_two_clicks_and_the_lost_dot_one(opened_browser: Any) -> None:
+def test_figure_6_takes_two_clicks_and_the_lost_dot_one(opened_browser: Any, address: str) -> None:
     """By the mouse alone, from an empty page."""
-    with studio("hendriks-1983") as running:
-        page = opened_browser()
-        page.size(1440, 900)
-        page.open(running.address)
-        page.wait("window.studio?.studio?.frames.map?.detail === 'full'")
-        struck = "window.studio.studio.frames.dots?.dots.map((dot) => Number(dot.struck)).join('')"
-        click(page, ".story:nth-of-type(2)")
-        page.wait(f"{struck} === '10'")
-        click(page, ".notice .switch:nth-of-type(2)")
-        page.wait(f"{struck} === '11'")
-        click(page, ".notice .shut")
-        click(page, ".find-lost")
-        page.wait(f"{struck}?.slice(0, 3) === '101'")
-        assert page.run(f"{STATE}.rate") == pytest.approx(1473, rel=3e-3)
-        assert page.complaints == []
-        page.call("Page.close")
+    page = opened_browser()
+    page.size(1440, 900)
+    page.open(address)
+    page.wait("window.studio?.studio?.frames.map?.detail === 'full'")
+    struck = "window.studio.studio.frames.dots?.dots.map((dot) => Number(dot.struck)).join('')"
+    click(page, ".story:nth-of-type(2)")
+    page.wait(f"{struck} === '10'")
+    click(page, ".notice .switch:nth-of-type(2)")
+    page.wait(f"{struck} === '11'")
+    click(page, ".notice .shut")
+    click(page, ".find-lost")
+    page.wait(f"{struck}?.slice(0, 3) === '101'")
+    assert page.run(f"{STATE}.rate") == pytest.approx(1473, rel=3e-3)
+    assert page.complaints == []
+    page.call("Page.close")

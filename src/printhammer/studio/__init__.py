@@ -1,7 +1,6 @@
-"""Studio: hammer, drive and all their pictures in a browser, updated while a slider moves.
+"""Studio: hammer, drive and all their pictures in one HTML file that computes in the browser.
 
-`serve` runs it on this machine for its user alone and needs the extra `studio`; `widget` embeds the same page
-in a notebook and needs the extra `notebook`.
+`live_page` returns the page, `widget` shows it in a notebook and needs the extra `notebook`.
 """
 
 from __future__ import annotations
@@ -9,10 +8,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from printhammer.studio.serve import serve
+    from printhammer.studio.live import live_page
+    from printhammer.studio.shelf import Shelf
     from printhammer.studio.widget import widget
 
-__all__ = ["serve", "widget"]
+__all__ = ["Shelf", "live_page", "widget"]
+
+_PLACES = {"Shelf": "shelf", "live_page": "live", "widget": "widget"}
 
 
 def __getattr__(name: str) -> Any:
@@ -20,7 +22,7 @@ def __getattr__(name: str) -> Any:
 
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    # Imported lazily by name, since server and widget need different extras.
-    value = getattr(import_module(f"{__name__}.{name}"), name)
+    # Imported lazily by name, since the page needs the kernel and the widget an extra.
+    value = getattr(import_module(f"{__name__}.{_PLACES[name]}"), name)
     globals()[name] = value
     return value

@@ -1,11 +1,11 @@
-"""Limits of the studio: sizes of messages and files, ranges of inputs, and computation time."""
+"""Limits of the studio: sizes of states and files, ranges of inputs, computation, resolution of pictures."""
 
 from __future__ import annotations
 
 from typing import Final
 
 LARGEST_MESSAGE: Final = 1_000_000
-"""Largest size of a message to the server, bytes."""
+"""Largest length of a state file, characters."""
 
 LARGEST_FILE: Final = 400_000
 """Largest length of a file dropped on the page, characters."""
@@ -14,7 +14,7 @@ MOST_DOTS: Final = 200
 """Largest number of dots in a dotted TOML key of a file dropped on the page."""
 
 LONGEST_REASON: Final = 500
-"""Largest length of the reason in a refusal frame, characters."""
+"""Largest length of the reason of a refusal, characters."""
 
 MOST_PULSES: Final = 64
 """Largest number of firings of a drive, and of slots of a pattern."""
@@ -49,17 +49,28 @@ MOST_SECTION_STEPS: Final = 60_000
 MOST_WORK: Final = 20_000_000
 """Limit on the total number of steps of all runs of a printed line."""
 
-ALIKE: Final = 1.25
-"""Factor by which a constant may change before the work of a map is estimated again."""
-
-PATIENCE: Final = 20.0
-"""Time limit for computing a view, s; a view that exceeds the limit shows a message instead."""
-
 MOST_SAMPLES: Final = 2000
 """Largest number of samples of a waveform, and of a measured curve."""
 
 LONGEST_TEXT: Final = 200
 """Largest length of a printed line, characters."""
 
-MOST_TABS: Final = 8
-"""Largest number of pages connected at the same time."""
+POINTS: Final = 1600
+"""Smallest number of points of a plotted curve."""
+
+MOST_ENDS: Final = 20_000
+"""Largest number of step ends among the points of a curve."""
+
+PREVIEW: Final = {"false": (64, 128), "true": (32, 128)}
+"""Numbers of rates and times of the coarse map, by whether a voltage drives the coil.
+
+A run with a circuit takes about five times as long."""
+
+FULL: Final = (512, 512)
+"""Numbers of rates and times of the full map."""
+
+GAP: Final = 65535
+"""Integer code of a map cell without a displacement."""
+
+POINTS_OF_SECTION: Final = (25, 50, 100, 150, 200, 300, 400)
+"""Numbers of strobe points that are shown one after the other."""

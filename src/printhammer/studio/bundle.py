@@ -1,4 +1,4 @@
-"""Page as one ES module and one style sheet, for a notebook, and as one file without a server."""
+"""Scripts and style sheets of the page, as parts of one HTML file."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import json
 import posixpath
 import re
 from functools import lru_cache
+from importlib.resources import files
 from typing import Final
 
-from printhammer.studio.files import page_files
-
+_ENDINGS: Final = (".js", ".css", ".svg")
 _IMPORT: Final = re.compile(r'from "(\.{1,2}/[\w./]+)"')
 _IMPORTS: Final = re.compile(r'^import .* from ".*";$\n?', re.MULTILINE)
 _EXPORT: Final = re.compile(r"^export (?=(async )?function|const|let|class)", re.MULTILINE)
@@ -23,38 +23,30 @@ for (const [name, text] of sources) {
 }
 """
 
-_WIDGET: Final = """
-const { mount } = await import(places["mount.js"]);
-export default {
-  render({ model, el }) {
-    el.classList.add("studio-widget");
-    // Notebooks have keys of their own, some of which cut cells: what is typed here is not for them.
-    el.dataset.lmSuppressShortcuts = "true";
-    el.addEventListener("keydown", (event) => event.stopPropagation());
-    el.style.setProperty("--height", model.get("height"));
-    const studio = mount(el, (text) => model.send({ text }), {
-      read: () => model.get("state"),
-      write: (text) => { model.set("state", text); model.save_changes(); },
-      address: () => model.get("state"),
-    });
-    const take = (_content, buffers) => { for (const buffer of buffers) studio.receive(buffer); };
-    model.on("msg:custom", take);
-    return () => model.off("msg:custom", take);
-  },
-};
-"""
-
 
 @lru_cache
-def module() -> str:
-    """Return one ES module that contains the modules of the page as texts, and loads them in order."""
-    return sources("mount.js") + _WIDGET
+def page_files() -> dict[str, bytes]:
+    """Load the files of the page; return their content by name."""
+    contents: dict[str, bytes] = {}
+    root = files("printhammer.studio").joinpath("web")
+    for place in ("", "vendor/", "engine/"):
+        for entry in root.joinpath(place).iterdir():
+            if entry.name.endswith(_ENDINGS):
+                contents[place + entry.name] = entry.read_bytes()
+    # The vendored file stays unmodified; its definitions are exported as a module here.
+    contents["vendor/uPlot.js"] = contents["vendor/uPlot.iife.min.js"] + b"\nexport default uPlot;\n"
+    contents["engine/call.js"] = files("printhammer.kernel.compile.web").joinpath("call.mjs").read_bytes()
+    return contents
 
 
 def sources(wanted: str) -> str:
     """Return a script that creates a module of the page and its dependencies."""
-    # Inside a page, no text may resemble the end of a script.
-    return _SOURCES % json.dumps(_ordered(wanted)).replace("<", "\\u003c")
+    return _SOURCES % inside(_ordered(wanted))
+
+
+def inside(content: object) -> str:
+    """Return JSON in which no text resembles the end of a script."""
+    return json.dumps(content).replace("<", "\\u003c")
 
 
 def merged(wanted: str) -> str:
@@ -84,40 +76,6 @@ def _ordered(wanted: str) -> list[tuple[str, str]]:
     return list(ordered.items())
 
 
-@lru_cache
 def style() -> str:
     """Return all style sheets of the page as one text."""
-    sheets = page_files()
-    return "\n".join(sheets[name].decode() for name in ("vendor/uPlot.min.css", "studio.css"))
-
-
-PLACE: Final = "/* what is kept */"
-"""Placeholder of the saved page for its state and curves, as JSON without the character <."""
-
-_PAGE: Final = """<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; script-src 'unsafe-inline' blob:; \
-style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'">
-<title>printhammer studio, as it was saved</title>
-<style>%s</style>
-</head>
-<body>
-<div id="studio"></div>
-<noscript>The curves are drawn by JavaScript.</noscript>
-<script type="application/json" id="kept">%s</script>
-<script type="module">%s
-const { show } = await import(places["kept.js"]);
-show(document.getElementById("studio"), JSON.parse(document.getElementById("kept").textContent));
-</script>
-</body>
-</html>
-"""
-
-
-@lru_cache
-def page() -> str:
-    """Return a page that shows, without a server, the content inserted at `PLACE`."""
-    return _PAGE % (style(), PLACE, sources("kept.js"))
+    return "\n".join(page_files()[name].decode() for name in ("vendor/uPlot.min.css", "studio.css"))

@@ -15,6 +15,7 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any, Final, get_args
 
 from printhammer import __version__
+from printhammer.drive.trains import PulseTrain
 from printhammer.drive.waveforms.drivers import Rail
 from printhammer.drive.waveforms.shapes import SHAPES
 from printhammer.run.energy import Ledger
@@ -24,20 +25,18 @@ from printhammer.run.plain.page import REFUSALS
 from printhammer.run.problem import TOLERANCE, Problem, fresh_carry
 from printhammer.run.start import initial_state
 from printhammer.studio import bounds
-from printhammer.studio.bundle import PLACE, merged, sources, style
-from printhammer.studio.frames import plain
-from printhammer.studio.pictures.chart import FULL, GAP, PREVIEW, PREVIEW_BY_VOLTAGE
-from printhammer.studio.pictures.engine import MOST_ENDS, POINTS
-from printhammer.studio.pictures.section import AT_ONCE, LATER
-from printhammer.studio.states.controls import describe, vocabulary
-from printhammer.studio.states.links import FORMAT, KIND
-from printhammer.studio.states.state import START, VIEWS, State, read_state
+from printhammer.studio.bundle import inside, merged, page_files, sources, style
+from printhammer.studio.coil import by_voltage, open_constants
+from printhammer.studio.controls import describe, vocabulary
+from printhammer.studio.launch import FORMAT, KIND
 from printhammer.support.constants import quantities
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
-    from printhammer.studio.states.shelf import Shelf
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.studio.shelf import Shelf
 
 _PAGE: Final = """<!doctype html>
 <html lang="en">
@@ -48,12 +47,13 @@ _PAGE: Final = """<!doctype html>
 'wasm-unsafe-eval'; worker-src blob:; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; \
 form-action 'none'">
 <title>printhammer studio</title>
+<link rel="icon" href="data:image/svg+xml;base64,{icon}">
 <style>{style}</style>
 </head>
 <body>
 <div id="studio"></div>
 <noscript>The studio needs JavaScript.</noscript>
-<script type="text/plain" id="start">{place}</script>
+<script type="application/json" id="start">{start}</script>
 <script type="text/plain" id="content">{content}</script>
 <script type="text/plain" id="worker">{worker}</script>
 <script type="module">{sources}
@@ -77,22 +77,33 @@ _SENTENCES: Final = {
 OPENING: Final = ("motion", "sketch", "map", "line")
 """Views with which a page opens: the map, and beside it the actuator, its curve and what it prints."""
 
+VIEWS: Final = ("motion", "forces", "loops", "phase", "sketch", "map", "strobe", "energy", "line")
+"""Names of the views that a page can display."""
 
-def live_page(shelf: Shelf) -> str:
-    """Return the page, with the hammers of a shelf, that opens with the start state of the shelf.
+
+def live_page(shelf: Shelf, start: Mapping[str, Any] | str = "") -> str:
+    """Return the studio as one HTML file that computes by itself.
+
+    Parameters
+    ----------
+    shelf : Shelf
+        Hammers of the page.
+    start : mapping or str, optional
+        State with which the page opens where its address contains none: entries of a state, or their text as
+        in the address. The page reports entries that it cannot use.
 
     Raises
     ------
     InputError
         A module is neither in the wheel nor can be linked: the extra `page` is not installed.
     """
-    content = content_of(shelf)
-    text = json.dumps(plain(content), allow_nan=False, separators=(",", ":"))
+    text = json.dumps(_plain(content_of(shelf)), allow_nan=False, separators=(",", ":"))
     return _PAGE.format(
         style=style(),
+        icon=b64encode(page_files()["icon.svg"]).decode(),
+        start=inside({"text": start} if isinstance(start, str) else {"state": start}),
         content=_packed(text.encode()),
-        place=PLACE,
-        worker=json.dumps(merged("engine/worker.js")).replace("<", "\\u003c"),
+        worker=inside(merged("engine/worker.js")),
         sources=sources("engine/page.js"),
     )
 
@@ -103,12 +114,10 @@ def content_of(shelf: Shelf, *, hammers: bool = True) -> dict[str, Any]:
     described = {name: _hammer(shelf, name, modules) for name in shelf.names} if hammers else {}
     shared = vocabulary()
     del shared["units"]
-    table, notes = shelf.start
-    table = {"views": OPENING, **table}
     return {
         "version": __version__,
         "names": shelf.names,
-        "start": {"state": table, "notes": notes},
+        "opening": OPENING,
         "vocabulary": shared,
         "hammers": described,
         "modules": list(modules.values()),
@@ -116,6 +125,16 @@ def content_of(shelf: Shelf, *, hammers: bool = True) -> dict[str, Any]:
         "sentences": _SENTENCES,
         "stateFile": {"kind": KIND, "format": FORMAT},
     }
+
+
+def _plain(value: Any) -> Any:
+    """Convert a value to plain data for JSON: NaN and infinity to None, NumPy numbers to Python numbers."""
+    if isinstance(value, dict):
+        return {str(name): _plain(entry) for name, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    value = value.item() if hasattr(value, "item") else value
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _packed(content: bytes) -> str:
@@ -126,7 +145,7 @@ def _packed(content: bytes) -> str:
 def _limits() -> dict[str, Any]:
     """Return the limits of states and of work, by name."""
     named = {name: getattr(bounds, name) for name in vars(bounds) if name.isupper()}
-    named |= {"POINTS": POINTS, "MOST_ENDS": MOST_ENDS, "FULL": FULL, "GAP": GAP, "VIEWS": VIEWS}
+    named["VIEWS"] = VIEWS
     named["WAVEFORMS"] = {
         name: {
             "known": ["shape", "quantity", *shape.model_fields],
@@ -136,12 +155,11 @@ def _limits() -> dict[str, Any]:
         }
         for name, shape in SHAPES.items()
     }
-    named["POINTS_OF_SECTION"] = (*AT_ONCE, *LATER)
     named["ENERGIES"] = [field.name for field in fields(Ledger)]
     named["LINE"] = _line()
     named |= {"DISPLAY_TOLERANCE": DISPLAY_TOLERANCE, "TOLERANCE": TOLERANCE, "REFUSALS": REFUSALS}
     named["DECAYS"] = get_args(Rail.model_fields["decay"].annotation)
-    return named | {"PREVIEW": {"true": PREVIEW_BY_VOLTAGE, "false": PREVIEW}}
+    return named
 
 
 def _line() -> dict[str, Any]:
@@ -172,20 +190,25 @@ def _hammer(shelf: Shelf, name: str, modules: dict[str, str]) -> dict[str, Any]:
     """Compose the entry of a hammer; add its module to `modules`, by its identity."""
     hammer = shelf.hammer(name)
     described = describe(hammer)
-    opening = {**START, "hammer": name, **described["start"]}
-    state = read_state(opening, shelf)
     entry: dict[str, Any] = {
         "described": described,
         "units": vocabulary(hammer)["units"],
         "text": hammer.to_toml(),
         "shipped": shelf.is_shipped(name),
     }
-    return entry | _numbers(state, modules)
+    wave = hammer.waveform
+    if wave is None:
+        fields = dict(described["start"]["waveform"])
+        wave = SHAPES[fields.pop("shape")](**fields)
+    return entry | _numbers(hammer, wave, modules)
 
 
-def _numbers(state: State, modules: dict[str, str]) -> dict[str, Any]:
-    """Return the arguments of the kernel for a state, and the index of its module."""
-    hammer, drive = state.changed, state.drive
+def _numbers(hammer: Hammer, wave: Waveform, modules: dict[str, str]) -> dict[str, Any]:
+    """Return the arguments of the kernel for a hammer and its pulse, and the index of its module."""
+    further = open_constants(hammer)
+    if by_voltage(wave) and "coil.resistance" in further:
+        hammer = hammer.replace({key: constant.si for key, (constant, _) in further.items()})
+    drive = PulseTrain(wave)
     problem = Problem(hammer, drive, initial_state(hammer, None), 0.0, DISPLAY_TOLERANCE)
     module = problem.page_module
     if module.name not in modules:

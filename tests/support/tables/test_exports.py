@@ -11,7 +11,7 @@ from printhammer.drive.file import read_drive
 from printhammer.drive.waveforms.shapes import Sampled
 from printhammer.errors import InputError
 from printhammer.maps.measured import load_measured_map
-from printhammer.studio.states.records import Record, read_record
+from printhammer.studio.records import Record, read_record
 from printhammer.support.tables.readings import read_table
 from printhammer.support.tables.text import decoded
 

@@ -11,7 +11,7 @@ from threading import Thread
 from typing import TYPE_CHECKING, Final
 
 from printhammer.cli import options as opt
-from printhammer.cli.runner import Answer, Content, Job, verb
+from printhammer.cli.runner import Answer, Content, Job, load_hammer, tables_beside, verb
 from printhammer.cli.screen import Column, table
 from printhammer.cli.terminal import say
 
@@ -21,44 +21,47 @@ if TYPE_CHECKING:
 
 @verb(
     "studio",
-    "printhammer studio hendriks-1983 --port 8080",
-    out=opt.file(
-        "Output file for a page that computes by itself, without a server or a network (.html); with this"
-        " option the studio is not started.",
-        ".html",
-    ),
+    "printhammer studio hendriks-1983 --state 'rate=1450&pulses=4'",
+    out=opt.file("Output file for the page (.html); with this option the page is not opened.", ".html"),
 )
 def studio(
     job: Job,
-    hammer: Hammer = opt.HAMMER,
-    port: int | None = opt.whole(
-        "Port on 127.0.0.1 (default: 19830, or a free port if that is taken; 0: a free port)."
+    hammers: list[str] | None = opt.argument(
+        "HAMMER",
+        "Names or files of hammers, the first of which is shown (default: the shipped hammers).",
+        many=True,
+        is_input=True,
     ),
-    state: Path | None = opt.source("Saved state to open: a file exported by the studio."),
+    only: bool = opt.switch("Leave out the shipped hammers that are not named, for a smaller page."),
+    state: str | None = opt.text(
+        "FILE|TEXT", "State to open: a file exported by the studio, or the part of an address after the #."
+    ),
     browser: bool = opt.switch(
         "Open the page in the default browser.", flag="--open/--no-open", default=True
     ),
 ) -> Answer:
-    """Start the studio, a local web page accessible only to its user; Ctrl-C stops it."""
+    """Write the studio as one HTML file that computes by itself, and open it in the browser.
+
+    The file needs neither a server nor a network. Without --out it lies in the user's cache.
+    """
+    from printhammer.studio.launch import keep_page, read_start
+    from printhammer.studio.live import live_page
+    from printhammer.studio.shelf import Shelf
+
+    own = []
+    for name in hammers or []:
+        own.append(load_hammer(name, fired=False))
+        job.check(*tables_beside(Path(name), own[-1].magnet, own[-1].waveform))
+    start, inside = read_start(state) if state else ("", None)
+    shelf = Shelf(*([inside] if inside else []), *own, only=only)
     if job.outputs:
-        from printhammer.studio.live import live_page
-        from printhammer.studio.states.links import open_file
-        from printhammer.studio.states.shelf import Shelf
+        return Answer(files={"out": Content.text(lambda: live_page(shelf, start))})
+    path = keep_page(live_page(shelf, start))
+    job.screen.print(f"The studio is the page {path}", soft_wrap=True)
+    if browser:
+        import webbrowser
 
-        shelf = Shelf(hammer)
-        if state is not None:
-            open_file(state, shelf)
-        return Answer(files={"out": Content.text(lambda: live_page(shelf))})
-    from printhammer.studio import serve
-
-    def ready(address: str) -> None:
-        job.screen.print(f"The studio is at {address}", soft_wrap=True)
-        if browser:
-            import webbrowser
-
-            webbrowser.open(address)
-
-    serve(hammer, port=port, state=state, ready=ready)
+        webbrowser.open(path.as_uri())
     return Answer()
 
 

@@ -1,5 +1,6 @@
 // What leaves the studio: files to keep, texts to copy.
 import { SvgPen } from "./pen.js";
+import { toText } from "./state.js";
 import { colours, FONT } from "./theme.js";
 
 export function save(name, content, type) {
@@ -53,26 +54,9 @@ export async function pngOf(view, width, height, origin) {
   return new Promise((done) => { canvas.toBlob(done, "image/png"); });
 }
 
-const PLACE = "/* what is kept */"; // as in bundle.py
-
-/** Save the studio as one page that shows what is set with its curves, read only, without a server. */
+/** Save the page with what is set in it. */
 export async function savePage(studio) {
   const { html } = await studio.ask("page", {});
-  const text = JSON.stringify(kept(studio)).replaceAll("<", "\\u003c");
-  save("studio-page.html", html.replace(PLACE, () => text), "text/html");
-}
-
-function kept(studio) {
-  const { described, limits, shapes, drivers, decays, unitTable, offered, overlay, version } = studio;
-  const frames = Object.fromEntries(Object.entries(studio.buffers).map(([kind, buffer]) => [kind, base64(buffer)]));
-  const measured = overlay && { ...overlay, data: { t: [...overlay.data.t], values: [...overlay.data.values] } };
-  const saved = new Date().toISOString().slice(0, 16).replace("T", " ");
-  return { state: studio.store.state, frames, hammer: described, limits, shapes, drivers, decays, units: unitTable, offered, overlay: measured, saved, version };
-}
-
-function base64(buffer) {
-  const all = buffer instanceof ArrayBuffer ? new Uint8Array(buffer) : new Uint8Array(buffer.buffer, buffer.byteOffset, buffer.byteLength);
-  let text = "";
-  for (let k = 0; k < all.length; k += 0x8000) text += String.fromCharCode(...all.subarray(k, k + 0x8000));
-  return btoa(text);
+  const start = JSON.stringify({ text: toText(studio.store.state) }).replaceAll("<", "\\u003c");
+  save("studio-page.html", html.replace(/(<script[^>]* id="start">)[^<]*/, (_all, head) => head + start), "text/html");
 }

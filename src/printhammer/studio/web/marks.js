@@ -53,10 +53,6 @@ export function marksFor(panel) {
     },
     /** A frame has come. */
     arrived(frame) {
-      if (frame.ahead) {
-        mark(frame.kind === "motion" ? CURVES : OF_FRAMES[frame.kind], "drawn ahead, of this hammer as it ships; what is set is being computed", true);
-        return;
-      }
       if (frame.serial <= refused) return;
       if (frame.kind !== "motion") { clear(OF_FRAMES[frame.kind] ?? []); return; }
       clear(CURVES);

@@ -1,10 +1,9 @@
-// The studio in an element: `mount(element, send)` returns what takes the server's frames.
+// The studio in an element: `mount(element, send)` returns what takes the frames that answer its messages.
 import { askColumns } from "./asking.js";
 import { energyView, lineView } from "./bars.js";
 import { buildControls } from "./controls.js";
 import { forcesView, motionView } from "./curves.js";
 import { element as make } from "./dom.js";
-import { decode } from "./frames.js";
 import { bindKeys } from "./keys.js";
 import { mapView } from "./map.js";
 import { marksFor } from "./marks.js";
@@ -17,7 +16,6 @@ import { setSystem, setUnits } from "./units.js";
 
 const MAKERS = { motion: motionView, sketch: sketchView, map: mapView, forces: forcesView, phase: phaseView, strobe: strobeView, loops: loopsView, energy: energyView, line: lineView };
 const LARGEST_TABLE = 50e6; // bytes of a measured table
-const SHOWN = ["motion", "dots", "map", "strobe", "line"]; // frames that views are drawn from
 const DROPPED = "dropped ";
 const LONGEST = 800000; // characters of a link
 const QUICK = ["motion", "forces", "phase"];
@@ -28,7 +26,7 @@ const QUICK = ["motion", "forces", "phase"];
  */
 export function mount(element, send, address = { read: () => "", write: () => {}, address: () => "" }) {
   const studio = {
-    element, store: new Store({ ...START }), frames: {}, buffers: {}, pinned: [], companion: null, remarks: null, overlay: null, cursor: 0, cursorFrom: null, window: null,
+    element, store: new Store({ ...START }), frames: {}, pinned: [], companion: null, remarks: null, overlay: null, cursor: 0, cursorFrom: null, window: null,
     described: null, offered: [], limits: {}, shapes: {}, drivers: [], decays: [], views: {}, serial: Math.floor(Math.random() * 2 ** 40), sentAt: new Map(), busy: false, stale: false,
   };
   // Runs that stay behind the one that is set: those that are pinned, and that of a story.
@@ -45,7 +43,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     send(JSON.stringify({ kind, serial: studio.serial, ...content }));
     return studio.serial;
   };
-  /** Ask the server a question; the answer is a frame. */
+  /** Ask a question; the answer is a frame. */
   studio.ask = (kind, content) => new Promise((done) => { asked.set(message(kind, content), done); });
 
   /** Send the state; one is under way at a time, and the latest follows it. */
@@ -75,8 +73,6 @@ export function mount(element, send, address = { read: () => "", write: () => {}
   };
   studio.hint = (text) => { studio.parts.hint.textContent = text; };
   studio.say = (text, bad = false) => {
-    studio.said = [text, bad];
-    if (studio.progress && !bad) return;
     studio.parts.status.textContent = text;
     studio.parts.status.title = text;
     studio.parts.status.classList.toggle("bad", bad);
@@ -88,20 +84,6 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     studio.parts.dialog.showModal();
     box.select();
   };
-
-  /** Tell what long work is under way, in the place of what is told else. */
-  function progress({ role, what, seconds }) {
-    if (what) {
-      const text = `${what}: ${Math.round(seconds)} s so far`;
-      marks.progress(role, text);
-      studio.progress = { role };
-      studio.parts.status.textContent = text;
-      studio.parts.status.classList.remove("bad");
-    } else if (studio.progress?.role === role) {
-      studio.progress = null;
-      studio.say(...(studio.said ?? ["ready"]));
-    }
-  }
 
   const shownViews = () => studio.store.state.views.map((name) => studio.views[name]).filter(Boolean);
   let turning = 0;
@@ -258,43 +240,16 @@ export function mount(element, send, address = { read: () => "", write: () => {}
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", studio.theme);
   studio.open(address.read());
 
-  return {
-    studio,
-    open: studio.open,
-    connected: () => {
-      const { status } = studio.parts;
-      status.removeAttribute("tabindex");
-      [status.onclick, status.onkeydown] = [null, null];
-      studio.say("ready");
-      if (studio.described) { studio.busy = false; studio.sendState(); }
-    },
-    /** The connection has ended: for a reason, after which `again` is for the user to call, or by itself. */
-    lost: (reason, again) => {
-      studio.busy = false;
-      studio.progress = null;
-      const { status } = studio.parts;
-      marks.none("not connected: the studio computes nothing", studio.serial);
-      studio.say(reason ? `the connection ended: ${reason}; press Enter here to connect again` : "the studio has ended, or is restarted: trying to connect again", true);
-      status.tabIndex = 0;
-      status.onclick = again;
-      status.onkeydown = (event) => { if (event.key === "Enter") again(); };
-    },
-    receive: (buffer) => {
-      const frame = decode(buffer);
-      if (SHOWN.includes(frame.kind) && !asked.has(frame.serial)) studio.buffers[frame.kind] = buffer;
-      accept(frame);
-    },
-    accept,
-  };
+  return { studio, open: studio.open, accept };
 
   /** Take a frame: the answer to a question, or what views are drawn from. */
   function accept(frame) {
-    if (asked.has(frame.serial) && frame.kind !== "progress") {
+    if (asked.has(frame.serial)) {
       asked.get(frame.serial)(frame);
       asked.delete(frame.serial);
       return;
     }
-    if ((frame.kind === "motion" && !frame.ahead) || frame.kind === "refusal") {
+    if (frame.kind === "motion" || frame.kind === "refusal") {
       studio.busy = false;
       if (studio.stale) studio.sendState();
     }
@@ -303,13 +258,12 @@ export function mount(element, send, address = { read: () => "", write: () => {}
       if (!studio.busy) marks.none(`not computed: ${frame.reason}`, frame.serial);
       return;
     }
-    if (frame.kind === "progress") { progress(frame); return; }
     marks.arrived(frame);
     studio.frames[frame.kind] = frame;
     if (frame.kind === "motion") {
       const text = frame.message || `${frame.steps} steps, ${frame.status}`;
       // What a link or a file held, and could not be taken, is told until something else is set.
-      if (!studio.notes && !frame.ahead) studio.say(text, frame.status !== "ok");
+      if (!studio.notes) studio.say(text, frame.status !== "ok");
       const t = frame.data.t;
       studio.cursor = Math.min(studio.cursor, t[t.length - 1]);
     }

@@ -23,15 +23,10 @@ export class Store {
     this.future = [];
     this.listeners = new Set();
     this.last = { control: null, at: 0 };
-    this.free = null;
   }
-
-  /** Let nothing be changed any more but some entries. */
-  keep(names) { this.free = names; }
 
   /** Change the state; changes of one control shortly after each other are undone together. */
   set(patch, control = null) {
-    if (this.free && !Object.keys(patch).every((name) => this.free.includes(name))) return;
     const now = performance.now();
     const same = control !== null && control === this.last.control && now - this.last.at < JOINED;
     if (!same) {
@@ -84,7 +79,7 @@ export function toText(state) {
   return found.toString();
 }
 
-/** Return a state without what only the page keeps: what the server is told. */
+/** Return a state without what only the page keeps. */
 export function bare({ pins: _pins, ...state }) { return state; }
 
 /** Return the pins of a text; what is none is left out. */
@@ -96,7 +91,7 @@ export function pinsOf(text) {
   return fine.slice(0, MOST_PINS).map(({ name, state }) => ({ name: name.slice(0, 40), state: { ...bare(START), ...bare(state) } }));
 }
 
-/** Return what a text tells, as it stands there: the server says what of it can be taken. */
+/** Return what a text tells, as it stands there; `taken` says what of it can be used. */
 export function fromText(text) {
   const told = {};
   const constants = {};

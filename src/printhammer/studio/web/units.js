@@ -3,7 +3,7 @@ let known = {};
 let system = 0;
 const LONG = 1e-2; // s, from which a time is no longer told in µs
 
-/** Take the units that the server told, by SI unit: [metric, inch-pound], each a name and a factor. */
+/** Take units, by SI unit: [metric, inch-pound], each a name and a factor. */
 export function setUnits(units) { known = units; }
 export function setSystem(number) { system = number; }
 export const getSystem = () => system;

@@ -1,4 +1,4 @@
-// What computes for the page: it answers the messages of the studio as a server would, with workers.
+// What computes for the page: it answers the messages of the studio with workers.
 import { crewOf } from "./crew.js";
 import { codesOf, pictureOf } from "./map.js";
 import { checkConstant, readFile, readState, Refusal, taken } from "./read.js";
@@ -110,7 +110,7 @@ export function engineOf(shelf, script, receive, page) {
       const { described, units } = shelf.hammers[asked];
       return { kind: "hammer", hammer: described, offered: shelf.names, asked, text: "", units, ...shelf.vocabulary };
     },
-    open: (serial, { state }) => ({ kind: "open", ...(state && Object.keys(state).length ? taken(state, shelf) : shelf.start) }),
+    open: (serial, { state }) => ({ kind: "open", ...taken(state && Object.keys(state).length ? state : shelf.start, shelf) }),
     texts: (serial, { state }) => ({ kind: "texts", texts: textsOf(read(state), shelf) }),
     page: () => ({ kind: "page", html: page() }),
     drop: (serial, { name, text }) => {
@@ -141,7 +141,7 @@ export function engineOf(shelf, script, receive, page) {
 
   return (text) => {
     const { kind, serial, ...content } = JSON.parse(text);
-    // Answers come later, as those of a server do.
+    // An answer never comes before its question has returned.
     queueMicrotask(() => {
       try {
         if (kind === "state") compute(serial, read(content.state));

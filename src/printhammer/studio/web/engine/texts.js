@@ -27,13 +27,14 @@ function hammerFile(state, hammer) {
     const dot = key.lastIndexOf(".");
     const [section, name] = dot < 0 ? ["", key] : [key.slice(0, dot), key.slice(dot + 1)];
     const { unit } = [...hammer.described.constants, ...hammer.described.open].find((constant) => constant.key === key);
-    text = changed(text, section, name, unit === "1" ? written(value) : `"${value} ${unit}"`);
+    text = changed(text, section, name, written(value), unit);
   }
   return text;
 }
 
 /** Set one value of a TOML text: the first line of a section that gives it, or a new one at the end of the section. */
-function changed(text, section, name, value) {
+function changed(text, section, name, value, unit) {
+  const whole = unit === "1" ? value : `"${value} ${unit}"`;
   const lines = text.split("\n");
   let here = "";
   let last = -1;
@@ -43,11 +44,14 @@ function changed(text, section, name, value) {
     if (here !== section) continue;
     if (lines[k].trim()) last = k;
     if (new RegExp(`^\\s*${name}\\s*=`).test(lines[k])) {
-      lines[k] = lines[k].includes("{") ? lines[k].replace(/(value\s*=\s*)("[^"]*"|[^,}\s]+)/, (_all, begin) => `${begin}${value}`) : `${name} = ${value}`;
+      const apart = /unit\s*=/.test(lines[k]);
+      lines[k] = lines[k].includes("{")
+        ? lines[k].replace(/(value\s*=\s*)("[^"]*"|[^,}\s]+)/, (_all, begin) => `${begin}${apart ? value : whole}`).replace(/(unit\s*=\s*)"[^"]*"/, (_all, begin) => `${begin}"${unit}"`)
+        : `${name} = ${whole}`;
       return lines.join("\n");
     }
   }
-  lines.splice(last + 1, 0, `${name} = ${value}`);
+  lines.splice(last + 1, 0, `${name} = ${whole}`);
   return lines.join("\n");
 }
 

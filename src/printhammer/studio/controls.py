@@ -9,7 +9,7 @@ from printhammer import __version__
 from printhammer.drive.waveforms.drivers import DRIVERS, Rail
 from printhammer.drive.waveforms.shapes import SHAPES, Waveform
 from printhammer.studio import bounds
-from printhammer.studio.states.coil import by_voltage, open_constants, rail_of, span_of
+from printhammer.studio.coil import by_voltage, open_constants, rail_of, span_of
 from printhammer.units import from_si
 
 if TYPE_CHECKING:

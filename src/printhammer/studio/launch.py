@@ -1,0 +1,135 @@
+"""The page as a file of the user: the state with which it opens, and the folder that keeps it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import sys
+import tomllib
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final
+
+from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
+from printhammer.studio.bounds import LARGEST_FILE, LARGEST_MESSAGE, MOST_DOTS
+from printhammer.support.files import make_folder, read_text, write_file
+
+FORMAT: Final = 1
+KIND: Final = "printhammer studio state"
+
+_KEPT: Final = 8
+"""Number of pages that the folder keeps; arbitrary."""
+
+
+def read_start(written: str) -> tuple[dict[str, Any] | str, Hammer | None]:
+    """Return the state with which a page opens, and the hammer that a state file contains.
+
+    Parameters
+    ----------
+    written : str
+        Path of a state file that the studio has exported, or the text of a state as in the address of a page:
+        "rate=900&pulses=3". The page itself reports entries that it cannot use.
+
+    Raises
+    ------
+    InputError
+        The file is not a state file, or its hammer is invalid.
+    """
+    path = Path(written)
+    if "=" in written and not path.is_file():
+        return written.rpartition("#")[2], None
+    text = read_text(path, "the state")
+    if len(text) > LARGEST_MESSAGE:
+        raise InputError(
+            f"{path}: {len(text)} characters",
+            file=path,
+            key="characters",
+            expected=f"at most {LARGEST_MESSAGE}",
+        )
+    try:
+        content = json.loads(text)
+    except (ValueError, RecursionError):
+        content = None
+    if not isinstance(content, dict) or content.get("kind") != KIND:
+        raise InputError(
+            f"{path}: expected a state file of the studio, as its export saves it", file=path, key="state"
+        )
+    if content.get("format") != FORMAT:
+        form = str(content.get("format"))[:40]
+        raise InputError.of("format", form, FORMAT, file=str(path), written=form)
+    state = content.get("state")
+    if not isinstance(state, dict):
+        raise InputError(f"{path}: state is expected to be a table", file=path, key="state")
+    if not (isinstance(own := state.get("text"), str) and own):
+        return state, None
+    hammer = hammer_inside(own, f"{path}, text")
+    return {**state, "hammer": hammer.name, "text": ""}, hammer
+
+
+def hammer_inside(text: str, where: str) -> Hammer:
+    """Parse a hammer file that another file contains; it may not refer to further files.
+
+    Raises
+    ------
+    InputError
+        The text is not a hammer file, or refers to a table.
+    """
+    # The parse time of a key with many dots grows with the square of their number.
+    dots = max(part.count(".") for part in re.split(r"[\n,=\[\]{}]", text))
+    if len(text) > LARGEST_FILE or dots > MOST_DOTS:
+        raise InputError(
+            f"{where}: expected at most {LARGEST_FILE} characters, and keys of at most {MOST_DOTS} dots",
+            file=where,
+            key="text",
+        )
+    try:
+        document = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        reason = " ".join(str(error).split())
+        raise InputError(f"{where}: expected a TOML file ({reason})", file=where, key="text") from None
+    for name, section in document.items():
+        if isinstance(section, Mapping) and "file" in section:
+            raise InputError(
+                f"{where}: {name}.file names another file, which the studio does not read",
+                file=where,
+                key=f"{name}.file",
+            )
+    hammer = Hammer.from_toml(text, name=where)
+    hammer.check()
+    return hammer
+
+
+def keep_page(html: str) -> Path:
+    """Write a page into the user's cache, under a digest of its content; return its path.
+
+    Raises
+    ------
+    InputError
+        The folder of the cache cannot be written.
+    """
+    folder = make_folder(_cache())
+    path = folder / f"studio-{hashlib.sha256(html.encode()).hexdigest()[:16]}.html"
+    if path.exists():
+        path.touch()
+    else:
+        write_file(path, html)
+    pages = sorted(folder.glob("studio-*.html"), key=lambda page: page.stat().st_mtime, reverse=True)
+    for old in pages[_KEPT:]:
+        with suppress(OSError):
+            old.unlink()
+    return path
+
+
+def _cache() -> Path:
+    """Return the folder for files that the program can write again, by the custom of the system."""
+    if os.name == "nt":
+        base = os.environ.get("LOCALAPPDATA") or str(Path.home() / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = str(Path.home() / "Library" / "Caches")
+    else:
+        base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    return Path(base) / "printhammer"

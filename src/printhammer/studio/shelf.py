@@ -1,0 +1,49 @@
+"""Hammers of a studio page, by name."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from printhammer.hammer.hammer import Hammer
+
+DEFAULT: Final = "hendriks-1983"
+"""Name of the hammer that a studio page displays by default."""
+
+
+class Shelf:
+    """Hammers that a page offers, in the order of its list; the page opens with the first.
+
+    Parameters
+    ----------
+    *own : Hammer
+        Hammers that come first; each may replace a shipped hammer of the same name.
+    only : bool, optional
+        Whether the shipped hammers are left out; a shelf without hammers of its own has them all.
+    """
+
+    def __init__(self, *own: Hammer, only: bool = False) -> None:
+        from printhammer.hammer.hammer import shipped
+
+        self.own = {hammer.name: hammer for hammer in own}
+        others = () if only and own else sorted(shipped(), key=lambda name: (name != DEFAULT, name))
+        self.names: Final = list(dict.fromkeys([*self.own, *others]))
+        """Names of all hammers."""
+
+    def is_shipped(self, name: str) -> bool:
+        """Whether the hammer of a name is an unmodified shipped hammer."""
+        from printhammer.hammer.hammer import shipped
+
+        return name in shipped() and self.hammer(name).fingerprint == _shipped(name).fingerprint
+
+    def hammer(self, name: str) -> Hammer:
+        """Return the hammer of a name."""
+        return self.own.get(name) or _shipped(name)
+
+
+@lru_cache(maxsize=32)
+def _shipped(name: str) -> Hammer:
+    from printhammer.hammer.hammer import load
+
+    return load(name)

@@ -1,1 +1,0 @@
-"""State of a studio page: hammer, drive, edits."""

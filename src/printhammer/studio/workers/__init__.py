@@ -1,1 +1,0 @@
-"""Worker processes of the studio, which may be terminated at any time."""

@@ -1,0 +1,89 @@
+"""Modules of the page in Node; helpers only."""
+
+import json
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+from printhammer.run.problem import Problem
+from printhammer.studio import Shelf
+from printhammer.studio.bundle import merged
+from printhammer.studio.live import content_of
+
+STATE: dict[str, Any] = {
+    "hammer": "",
+    "text": "",
+    "constants": {},
+    "waveform": None,
+    "rate": 1200.0,
+    "pulses": 9,
+    "pattern": "",
+    "overlap": "add",
+    "low": 500.0,
+    "high": 2000.0,
+    "line": "",
+    "views": ["motion", "map", "strobe"],
+}
+"""A state of the first hammer of a page."""
+
+_ASK = """
+const { createInterface } = require("node:readline");
+let shelf = null;
+const asked = { %s };
+createInterface({ input: process.stdin }).on("line", (line) => {
+  const [what, ...words] = JSON.parse(line);
+  if (what === "shelf") {
+    shelf = { ...words[0], readers: readersOf(words[0].limits, words[0].vocabulary), noFiles: "no files" };
+    console.log("true");
+    return;
+  }
+  try { console.log(JSON.stringify({ found: asked[what](...words) })); }
+  catch (error) {
+    if (!(error instanceof Refusal)) throw error;
+    console.log(JSON.stringify({ refused: error.message }));
+  }
+});
+"""
+
+
+class NoModule:
+    """Stands for the WebAssembly module of a hammer where only its description matters."""
+
+    name = "none"
+
+    def content(self) -> bytes:
+        return b""
+
+
+def without_modules(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Write pages without WebAssembly modules, which take long to link."""
+    monkeypatch.setattr(Problem, "page_module", NoModule())
+
+
+@contextmanager
+def node(module: str, functions: str, shelf: Shelf) -> Iterator[Any]:
+    """Run a module of the page; give a function that calls one of `functions` by name with JSON."""
+    with pytest.MonkeyPatch.context() as patch:
+        without_modules(patch)
+        content = content_of(shelf)
+    command = ["node", "--eval", merged(module) + _ASK % functions]
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert process.stdin is not None
+    assert process.stdout is not None
+
+    def ask(what: str, *words: Any) -> Any:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        print(json.dumps([what, *words]), file=process.stdin, flush=True)
+        return json.loads(process.stdout.readline())
+
+    try:
+        ask("shelf", json.loads(json.dumps(content)))
+        yield ask
+    finally:
+        process.stdin.close()
+        process.stdout.close()
+        assert process.wait(20) == 0

@@ -1,0 +1,159 @@
+"""The page as a file: the state with which it opens, the folder that keeps it, its parts, the widget."""
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.errors import refused
+from tests.hammers import CRUDE
+from tests.studio.reading import without_modules
+
+from printhammer.hammer.hammer import load
+from printhammer.studio import Shelf, launch, live_page, widget
+from printhammer.studio.bundle import merged, page_files, sources, style
+
+TEXT = CRUDE.read_text("utf-8")
+
+
+def state_file(folder: Path, **state: Any) -> str:
+    path = folder / "state.json"
+    path.write_text(json.dumps({"kind": launch.KIND, "format": launch.FORMAT, "state": state}), "utf-8")
+    return str(path)
+
+
+def test_a_page_begins_with_a_file_or_the_text_of_an_address(tmp_path: Path) -> None:
+    assert launch.read_start("rate=900&pulses=3") == ("rate=900&pulses=3", None)
+    assert launch.read_start("file:///a/page.html#rate=900") == ("rate=900", None)
+    assert launch.read_start(state_file(tmp_path, rate=777.0, hammer="tung-shaw-1988")) == (
+        {"rate": 777.0, "hammer": "tung-shaw-1988"},
+        None,
+    )
+    start, own = launch.read_start(state_file(tmp_path, rate=777.0, hammer="", text=TEXT))
+    assert own is not None
+    assert own.fingerprint == load(CRUDE).fingerprint
+    assert start == {"rate": 777.0, "hammer": own.name, "text": ""}
+
+
+@pytest.mark.parametrize(
+    ("content", "key"),
+    [
+        ("", "state"),
+        ("{", "state"),
+        ("[" * 100_000, "state"),
+        ('{"kind": "printhammer studio state", "format": 9}', "format"),
+        ('{"kind": "printhammer studio state", "format": 1, "state": 3}', "state"),
+        (" " * 2_000_000, "characters"),
+    ],
+)
+def test_what_is_no_state_file_is_refused_in_one_sentence(tmp_path: Path, content: str, key: str) -> None:
+    path = tmp_path / "a.json"
+    path.write_text(content, "utf-8")
+    with refused(key, file="a.json"):
+        launch.read_start(str(path))
+
+
+@pytest.mark.parametrize(
+    ("text", "key"),
+    [
+        ("x = [", "text"),
+        ("name = 'a'", "format"),
+        ('name = "a"\n[waveform]\nshape = "sampled"\nfile = "/etc/passwd"\n', "waveform.file"),
+        ('format = 1\nname = "a"\n[magnet]\nlaw = "table"\nfile = "t.csv"\n', "magnet.file"),
+        # These would take minutes to read.
+        ("a." * 150_000 + "b = 1", "text"),
+        ("x = {" + "a." * 150_000 + "b = 1}", "text"),
+        ("[" + "a." * 150_000 + "b]", "text"),
+    ],
+)
+def test_a_hammer_inside_a_file_names_no_other_file(tmp_path: Path, text: str, key: str) -> None:
+    with refused(key):
+        launch.read_start(state_file(tmp_path, text=text))
+
+
+def test_hammers_of_ones_own_come_first() -> None:
+    own = load(CRUDE).replace("name", "mine")
+    shelf = Shelf(own, load("relay-5v").replace({"mass": 2e-3}))
+    assert shelf.names[:3] == ["mine", "relay-5v", "hendriks-1983"]
+    assert [shelf.is_shipped(name) for name in shelf.names[:3]] == [False, False, True]
+    assert Shelf(own, only=True).names == ["mine"]
+    assert len(Shelf(only=True).names) == len(shelf.names) - 1
+
+
+def test_the_state_of_a_page_cannot_end_its_script(monkeypatch: pytest.MonkeyPatch) -> None:
+    without_modules(monkeypatch)
+    page = live_page(Shelf(load(CRUDE), only=True), {"line": "</script><script>alert(1)"})
+    assert page.count("</script>") == 4
+    (start,) = re.findall(r'id="start">(.*?)</script>', page)
+    assert json.loads(start)["state"]["line"] == "</script><script>alert(1)"
+
+
+def test_pages_are_kept_under_their_content_and_the_oldest_go(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(launch, "_cache", lambda: tmp_path / "cache")
+    first = launch.keep_page("a")
+    assert launch.keep_page("a") == first
+    assert first.read_text("utf-8") == "a"
+    others = {launch.keep_page(f"page {k}") for k in range(20)}
+    left = set(first.parent.iterdir())
+    assert len(others) == 20
+    assert len(left) == 8
+
+
+@pytest.mark.parametrize("last", ["engine/page.js", "engine/worker.js"])
+def test_a_bundle_holds_every_part_before_it_is_needed(last: str) -> None:
+    listed = json.loads(sources(last).partition("const sources = ")[2].partition(";\nconst places")[0])
+    seen: list[str] = []
+    for name, text in listed:
+        needed = re.findall(r'from "\./([\w./]+)"', text)
+        assert set(needed) <= set(seen), name
+        seen.append(name)
+    assert seen[-1] == last
+
+
+def test_every_script_of_the_page_is_used() -> None:
+    used = {
+        name
+        for last in ("engine/page.js", "engine/worker.js")
+        for name, _ in json.loads(sources(last).partition("const sources = ")[2].partition(";\nconst")[0])
+    }
+    assert used == {name for name in page_files() if name.endswith(".js")} - {"vendor/uPlot.iife.min.js"}
+
+
+def test_nothing_is_fetched_from_elsewhere() -> None:
+    names = re.compile(rb"(?:https?:)?//[\w-]+\.\w+")
+    own = {name: data for name, data in page_files().items() if not name.startswith("vendor/")}
+    found = {name: names.findall(data) for name, data in own.items()}
+    # The name of a language is an address that nobody fetches.
+    assert {place for list_ in found.values() for place in list_} <= {b"http://www.w3"}
+
+
+def test_the_style_holds_that_of_the_curves() -> None:
+    assert ".uplot" in style()
+    assert ".studio" in style()
+
+
+@pytest.mark.parametrize("name", sorted(name for name in page_files() if name.endswith(".js")))
+def test_every_part_is_a_module_that_can_be_parsed(name: str, tmp_path: Path) -> None:
+    if (program := shutil.which("node")) is None:
+        return
+    path = tmp_path / "part.mjs"
+    path.write_bytes(page_files()[name])
+    done = subprocess.run((program, "--check", path), capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_script_of_workers_declares_no_name_twice() -> None:
+    script = f"new Function({json.dumps(merged('engine/worker.js'))});"
+    assert subprocess.run(["node", "--eval", script], check=False).returncode == 0
+
+
+def test_the_widget_holds_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    without_modules(monkeypatch)
+    hammer = load(CRUDE)
+    made: Any = widget(hammer, state="rate=900", height="500px")
+    assert (made.page, made.state, made.height) == (live_page(Shelf(hammer, only=True)), "rate=900", "500px")
