@@ -74,9 +74,6 @@ _SENTENCES: Final = {
 }
 """What the page says of work that only Python does, by name."""
 
-OPENING: Final = ("motion", "sketch", "map", "line")
-"""Views with which a page opens: the map, and beside it the actuator, its curve and what it prints."""
-
 VIEWS: Final = ("motion", "forces", "loops", "phase", "sketch", "map", "strobe", "energy", "line")
 """Names of the views that a page can display."""
 
@@ -117,7 +114,6 @@ def content_of(shelf: Shelf, *, hammers: bool = True) -> dict[str, Any]:
     return {
         "version": __version__,
         "names": shelf.names,
-        "opening": OPENING,
         "vocabulary": shared,
         "hammers": described,
         "modules": list(modules.values()),

@@ -9,10 +9,10 @@ async function unpacked(text) {
 /** Unpack the content of the page. */
 export async function shelfOf(text) {
   const content = await (await unpacked(text)).json();
-  const { names, hammers, modules, limits, vocabulary, opening, version, sentences, stateFile } = content;
+  const { names, hammers, modules, limits, vocabulary, version, sentences, stateFile } = content;
   const compiled = modules.map(() => null);
   return {
-    names, hammers, limits, vocabulary, opening, version, sentences, stateFile, noFiles: sentences.files,
+    names, hammers, limits, vocabulary, version, sentences, stateFile, noFiles: sentences.files,
     readers: readersOf(limits, vocabulary),
     /** The compiled module of a hammer; each is compiled once. */
     module(name) {
