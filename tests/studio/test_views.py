@@ -4,10 +4,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from printhammer.studio.states.shelf import Shelf
 from tests.studio.browser import Page
 
 from printhammer.studio.live import live_page
-from printhammer.studio.states.shelf import Shelf
 
 pytestmark = pytest.mark.slow
 
