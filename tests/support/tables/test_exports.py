@@ -11,9 +11,7 @@ from printhammer.drive.file import read_drive
 from printhammer.drive.waveforms.shapes import Sampled
 from printhammer.errors import InputError
 from printhammer.maps.measured import load_measured_map
-from printhammer.studio.records import Record, read_record
 from printhammer.support.tables.readings import read_table
-from printhammer.support.tables.text import decoded
 
 Curves = dict[str, np.ndarray]
 AFTER = exports.TIMES >= 0.0
@@ -40,19 +38,11 @@ def of_coil(path: Path) -> Curves:
     return read_table(path, {"time": "s", "current": "A"}, optional={"displacement": "m"}).values
 
 
-def of_studio(path: Path) -> Curves:
-    record = read_record(decoded(path.read_bytes(), "trace.csv"), "trace.csv")
-    if not isinstance(record, Record):
-        raise InputError("asked", key="columns")
-    return {"time": record.times, **record.curves}
-
-
 READERS: dict[str, Callable[[Path], Curves]] = {
     "drive": of_drive,
     "map": of_map,
     "motion": of_motion,
     "coil": of_coil,
-    "studio": of_studio,
 }
 
 
@@ -89,10 +79,7 @@ def right(found: Curves, name: str) -> None:
 def test_what_a_file_alone_says_is_right_or_refused(tmp_path: Path, name: str, reader: str) -> None:
     export = exports.EXPORTS[name]()
     path = written(tmp_path, export, "")
-    if name == "LTspice" and reader == "studio":
-        # Its "I(L1)" says current, its "V(pos)" is left out.
-        right(READERS[reader](path), name)
-    elif export.columns or reader == "map":
+    if export.columns or reader == "map":
         # Neither what a channel shows nor a rate stands in the file.
         with pytest.raises(InputError) as caught:
             READERS[reader](path)
