@@ -81,7 +81,7 @@ def node(module: str, functions: str, shelf: Shelf) -> Iterator[Any]:
         return json.loads(process.stdout.readline())
 
     try:
-        ask("shelf", json.loads(json.dumps(content)))
+        ask("shelf", content)
         yield ask
     finally:
         process.stdin.close()

@@ -7,22 +7,23 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.studio.node import Engine
-from tests.studio.test_live import NAME, OneHammer
+from tests.studio.reading import STATE
+from tests.studio.test_live import NAME
 
 import printhammer as ph
-from printhammer.studio.states.state import START
+from printhammer.studio import Shelf
 
 COUNTS, JUDGED = [25, 50, 100, 150, 200], [1001, 2000]
 
 
 @pytest.fixture(scope="module")
 def engine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Engine]:
-    with Engine(OneHammer(), tmp_path_factory.mktemp("engine")) as made:
+    with Engine(Shelf(ph.load(NAME), only=True), tmp_path_factory.mktemp("engine")) as made:
         yield made
 
 
 def judged(engine: Engine, rate: float, **changed: Any) -> list[dict[str, Any]]:
-    state = {**START, "hammer": NAME, "rate": rate, **changed}
+    state = {**STATE, "hammer": NAME, "rate": rate, **changed}
     return engine.work("section", state, counts=COUNTS, judged=JUDGED)
 
 

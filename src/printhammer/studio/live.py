@@ -94,7 +94,7 @@ def live_page(shelf: Shelf, start: Mapping[str, Any] | str = "") -> str:
     InputError
         A module is neither in the wheel nor can be linked: the extra `page` is not installed.
     """
-    text = json.dumps(_plain(content_of(shelf)), allow_nan=False, separators=(",", ":"))
+    text = json.dumps(content_of(shelf), allow_nan=False, separators=(",", ":"))
     return _PAGE.format(
         style=style(),
         icon=b64encode(page_files()["icon.svg"]).decode(),
@@ -105,13 +105,13 @@ def live_page(shelf: Shelf, start: Mapping[str, Any] | str = "") -> str:
     )
 
 
-def content_of(shelf: Shelf, *, hammers: bool = True) -> dict[str, Any]:
-    """Compose the content of the page; with `hammers`, also the hammers of the shelf and their modules."""
+def content_of(shelf: Shelf) -> Any:
+    """Compose the content of the page as plain data for JSON."""
     modules: dict[str, str] = {}
-    described = {name: _hammer(shelf, name, modules) for name in shelf.names} if hammers else {}
+    described = {name: _hammer(shelf, name, modules) for name in shelf.names}
     shared = vocabulary()
     del shared["units"]
-    return {
+    content = {
         "version": __version__,
         "names": shelf.names,
         "vocabulary": shared,
@@ -121,6 +121,7 @@ def content_of(shelf: Shelf, *, hammers: bool = True) -> dict[str, Any]:
         "sentences": _SENTENCES,
         "stateFile": {"kind": KIND, "format": FORMAT},
     }
+    return _plain(content)
 
 
 def _plain(value: Any) -> Any:
