@@ -56,7 +56,7 @@ def test_a_page_is_written_to_be_sent_around(opened: list[str], cli: Callable, t
     ("words", "said"),
     [
         (("no-such",), "no-such"),
-        (("--state", "no-such.json"), "no-such.json: there is no"),
+        (("--state", "no-such.json"), "no-such.json"),
         (("--state", str(CRUDE)), "expected a state file"),
         (("--out", "page.png"), "--out page.png: expected a name"),
         (("--port", "80"), "--port"),
