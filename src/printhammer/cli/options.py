@@ -278,7 +278,7 @@ def check_one_spacing(options: Mapping[str, object], example: Callable[[], str])
         raise InputError(f"--period and --rate: expected one of them, such as {example()}", key="--period")
 
 
-def refuse(options: Mapping[str, object], expected: str) -> None:
+def check_unset(options: Mapping[str, object], expected: str) -> None:
     """Raise InputError if any of the options is set; the message states what is `expected`."""
     for name, value in options.items():
         if value is not None:

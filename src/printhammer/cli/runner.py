@@ -414,7 +414,7 @@ def firing_of(
     from printhammer.drive.file import load_drive
     from printhammer.drive.trains import PulseTrain
 
-    opt.refuse(train, f"no such option with --drive {file}")
+    opt.check_unset(train, f"no such option with --drive {file}")
     drive = load_drive(file, hammer.waveform)
     job.check(*tables_beside(file, drive.waveform))
     if math.isinf(drive.waveform.support) and drive.period is not None:

@@ -118,12 +118,12 @@ class Cells:
     """Whether the cells are left-aligned."""
 
     @property
-    def _converted(self) -> bool:
+    def _is_converted(self) -> bool:
         return not self.format and self.unit in SHOWN
 
     def unit_sign(self, system: System) -> str:
         """Return the unit for the heading; empty for a pure number or text."""
-        return sign(self.unit, system) if self._converted else self.unit
+        return sign(self.unit, system) if self._is_converted else self.unit
 
     def texts(self, system: System) -> list[str]:
         """Return the texts of the cells, including style marks."""
@@ -135,7 +135,7 @@ class Cells:
             return NONE
         if isinstance(value, str):
             return value
-        return shown(value, self.unit, system) if self._converted else format(value, self.format)
+        return shown(value, self.unit, system) if self._is_converted else format(value, self.format)
 
 
 @dataclass(frozen=True)

@@ -83,7 +83,7 @@ def read_axis(
     geometric = table.spacing == "geometric"
     values = _values(table, here, note.si, grid, geometric)
     for value in values:
-        if not _inside(value, note):
+        if not _is_inside(value, note):
             raise InputError(
                 f"{here}: {value!r} {note.si} is out of bounds", key=here, expected=f"{expected(note)}"
             )
@@ -193,7 +193,7 @@ def _values(table: AxisTable, here: str, si: str, grid: bool, geometric: bool) -
     return grid_values
 
 
-def _inside(value: float, note: Quantity) -> bool:
+def _is_inside(value: float, note: Quantity) -> bool:
     return (
         (note.gt is None or value > note.gt)
         and (note.ge is None or value >= note.ge)

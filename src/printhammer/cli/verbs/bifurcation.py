@@ -206,9 +206,9 @@ def basins(
     if quench:
         of_basins = {name: passed.get(name) for name in ("period", "rate", "overlap", "drive", "x", "v")}
         more = {name: passed.get(name) for name in ("firings", "rounds")}
-        opt.refuse({**of_basins, **more, "box": box, "saddles": saddles}, "none beside --quench")
+        opt.check_unset({**of_basins, **more, "box": box, "saddles": saddles}, "none beside --quench")
     else:
-        opt.refuse(of_quench, "--quench beside it")
+        opt.check_unset(of_quench, "--quench with it")
         firing = firing_of(job, hammer, passed, 1.05e-3, ", or --quench")
     if saddles is not None:
         read_count(saddles, "saddles")

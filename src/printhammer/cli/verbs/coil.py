@@ -111,7 +111,7 @@ def impact_time(
     if record:
         from printhammer.control.recorded_impacts import recorded_impacts
 
-        opt.refuse(
+        opt.check_unset(
             {"noise": noise, "sampling-rate": sampling_rate, "bits": bits}, "no such option with --record"
         )
         probe = {name: passed[name] for name in ("signal", "delay", "bandwidth") if name in passed}
@@ -195,7 +195,7 @@ def duty(
         from printhammer.control.thermal_limit import read_rates, thermal_limit
         from printhammer.errors import located
 
-        opt.refuse(
+        opt.check_unset(
             {"heat": heat, **{name.replace("_", "-"): passed.get(name) for name in passed}},
             "no such option with --rates",
         )

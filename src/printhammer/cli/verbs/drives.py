@@ -38,7 +38,8 @@ _MOST_RATES: Final = 200  # Largest number of rates; each takes seconds to minut
         ),
         "spacing": opt.text(
             "TIME",
-            "Time between nodes of the current, e.g. '50 us' (default: from the duration of contact).",
+            "Time between nodes of the current, e.g. '50 us' "
+            "(default: 0.6 of the time in which a pulse indents the pack).",
         ),
         "tolerance": opt.TOLERANCE,
     },
@@ -57,7 +58,7 @@ def energy(
     pulses: bool = opt.switch(
         "Use only pulses of the hammer's waveform, and optimise their firing times and widths."
     ),
-    supply: bool = opt.switch("Show the dots of the burst for currents scaled by 0.97 to 1.03 as well."),
+    supply: bool = opt.switch("Add the dots of the same burst with all currents scaled by 0.97 to 1.03."),
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:

@@ -83,7 +83,7 @@ def magnet(
     strict: bool = _STRICT,
     **passed: Any,
 ) -> Answer:
-    """Fit F0, Am and Bm of the magnet, and Bs and As of the spring.
+    """Fit the constants F0, Am and Bm of the magnet, and Bs and As of the spring, to measured forces.
 
     The sum of magnet and spring forces does not separate F0 from Bs: add a table of the spring alone with
     --spring.
@@ -151,7 +151,7 @@ def spring(
     strict: bool = _STRICT,
     **passed: Any,
 ) -> Answer:
-    """Fit Bs and As of the spring."""
+    """Fit the constants Bs and As of the spring to measured forces."""
     from printhammer.identify.fitting import fit
 
     return _run_fit(job, hammer, strict, lambda known: fit("spring", file, hammer=known, **passed))

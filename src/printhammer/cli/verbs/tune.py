@@ -293,10 +293,10 @@ def learn(
     )
     if signal is not None:
         own = {"noise": noise, "offset-spread": offset_spread}
-        opt.refuse(own, "--signal-noise instead, with --signal")
+        opt.check_unset(own, "--signal-noise instead, with --signal")
         readings |= _from_coil(job, hammer, signal, signal_noise)
     else:
-        opt.refuse({"signal-noise": signal_noise}, "--signal as well")
+        opt.check_unset({"signal-noise": signal_noise}, "--signal as well")
     driven = None if unit is None else load(unit)
     passed.setdefault("rate", rate_text(hammer, 1275.0))
     passed.setdefault("largest_current", current_bound(hammer))
