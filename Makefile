@@ -74,14 +74,15 @@ LOCK := build/lock-venv/bin/uv pip compile --quiet --universal --fork-strategy f
 	--generate-hashes --no-emit-index-url --no-emit-find-links --no-header --no-annotate
 
 # What lint, types and the fast tests need; the docs need sphinx, which nothing else does.
-TESTED := tables netcdf sweep cluster studies notebook pdf test lint
+TESTED := laws tables netcdf sweep cluster studies notebook pdf test lint
 
 lock: ## resolve the pinned requirements again (UPGRADE=--upgrade for the newest)
 	$(PYTHON) -m venv build/lock-venv
 	build/lock-venv/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements/lock.txt
 	$(LOCK) $(UPGRADE) requirements/lock.in --output-file requirements/lock.txt
 	$(LOCK) $(UPGRADE) pyproject.toml requirements/build.in --extra all --output-file requirements/dev.txt
-	$(LOCK) $(UPGRADE) pyproject.toml --constraint requirements/dev.txt --output-file requirements/runtime.txt
+	$(LOCK) $(UPGRADE) pyproject.toml --extra laws --constraint requirements/dev.txt --output-file requirements/runtime.txt
+	$(LOCK) $(UPGRADE) pyproject.toml requirements/oldest.in --extra laws --extra page --output-file requirements/oldest.txt
 	$(LOCK) $(UPGRADE) requirements/build.in --constraint requirements/dev.txt --output-file requirements/build.txt
 	$(LOCK) $(UPGRADE) pyproject.toml requirements/build.in $(foreach extra,$(TESTED),--extra $(extra)) \
 		--constraint requirements/dev.txt --output-file requirements/test.txt

@@ -1,76 +1,123 @@
-"""Build hook of the wheel: adds the kernel's modules, lowered and compressed (see decision 0026)."""
+"""Build hook of the wheel: adds lowered modules and code of shipped hammers (decisions 0026, 0029)."""
 
 from __future__ import annotations
 
 import atexit
 import lzma
+import os
+import subprocess
 import sys
 import tempfile
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
 _ABSENT = {"magnet": "", "spring": "", "pack": "", "backstop": "", "absent": "printhammer.parts.absent"}
+_MOST_WORKERS = 8
+"""Largest number of processes; each needs up to half a gigabyte of memory."""
 
 
 class LoweredModules(BuildHookInterface[Any]):
     """Build hook that lowers all entry-point templates and the laws of all shipped parts into the wheel."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Add the lowered modules to the wheel; an editable installation lowers modules on demand instead."""
+        """Add the generated files to the wheel; an editable installation generates them on demand instead."""
         if version == "editable":
             return
-        sys.path.insert(0, str(Path(self.root, "src")))
-        from numba import TypingError
-
-        from printhammer.drive.trains import PulseTrain, SineForce
-        from printhammer.hammer.hammer import load, shipped
-        from printhammer.kernel.compile import link
-        from printhammer.kernel.compile.bindings import bindings_of
-        from printhammer.kernel.compile.cache import sealed
-        from printhammer.kernel.compile.lanes import specialise_lanes, suits
-        from printhammer.kernel.compile.modules import Module, every_template, laws_of
-        from printhammer.kernel.compile.specialise import specialise, variational
-        from printhammer.kernel.model.laws import LAW_FUNCTIONS, Laws
-        from printhammer.parts import PARTS
-        from printhammer.run import problem
-        from printhammer.run.ensemble_group import closed_form
-        from printhammer.run.plain import entries
-
         folder = tempfile.TemporaryDirectory()
         atexit.register(folder.cleanup)
+        command = [sys.executable, str(Path(self.root, "hatch_build.py")), folder.name]
+        count = min(os.cpu_count() or 1, _MOST_WORKERS)
+        workers = [subprocess.Popen(command, cwd=self.root) for _ in range(count)]
+        try:
+            codes = [worker.wait() for worker in workers]
+            if any(codes):
+                raise RuntimeError("the kernel's modules cannot be generated")
+        finally:
+            for worker in workers:
+                worker.kill()
+        for path in Path(folder.name).iterdir():
+            if path.is_file():
+                build_data["force_include"][str(path)] = f"printhammer/kernel/modules/{path.name}"
 
-        def add(shipped: Path, content: bytes) -> None:
-            path = Path(folder.name, shipped.name)
-            path.write_bytes(content)
-            build_data["force_include"][str(path)] = shipped.relative_to(Path(self.root, "src")).as_posix()
 
-        def ship(module: Module) -> None:
-            add(module.shipped, lzma.compress(module.content(), preset=9))
+def files() -> Iterator[tuple[Path, Callable[[], bytes | None]]]:
+    """Yield the path of each generated file in the wheel, and a function that returns its content or None."""
+    from numba import TypingError
 
-        for template in (*every_template(), *entries.templates()):
-            ship(template)
-        for role in LAW_FUNCTIONS:
-            parts = {part.__module__ for (known, _), part in PARTS.items() if known == role}
-            for name in ("", *sorted(parts)):
-                bindings = bindings_of(Laws(**{**_ABSENT, role: name}))
-                ship(laws_of(role, bindings, False))
-                # A law of more constants than a lane has room for never runs in lanes.
-                with suppress(TypingError):
-                    ship(laws_of(role, bindings, True))
-        for hammer in map(load, shipped()):
-            # A textbook oscillator has no pulse of its own, and is driven by a force.
-            drive = PulseTrain(hammer.waveform) if hammer.waveform else SineForce(1.0, 1.0)
-            laws = problem.laws_of(hammer, drive)
-            ship(entries.page_module(laws))
-            kernel = specialise(laws)
-            _rates, kinds = closed_form(drive.kernel_arrays()[2])
-            kernels = [kernel, variational(kernel, forced=False), variational(kernel, forced=True)]
-            if suits(laws) and kinds is not None:
-                kernels.append(specialise_lanes(laws, kinds))
-            for entry in (entry for each in kernels for entry in each.entries):
-                # Processors of the level COMMON share their machine code; that of others runs nowhere else.
-                if link.processor()[1] == link.COMMON:
-                    add(entry.code.shipped, sealed(entry.code.get(entry.machine_code)))
+    from printhammer.drive.trains import PulseTrain, SineForce
+    from printhammer.hammer.hammer import load, shipped
+    from printhammer.kernel import schemes_1983
+    from printhammer.kernel.compile import link
+    from printhammer.kernel.compile.bindings import bindings_of
+    from printhammer.kernel.compile.cache import sealed
+    from printhammer.kernel.compile.lanes import specialise_lanes, suits
+    from printhammer.kernel.compile.modules import Entry, Module, every_template, laws_of, plain_template
+    from printhammer.kernel.compile.specialise import specialise, variational
+    from printhammer.kernel.model.laws import LAW_FUNCTIONS, Laws
+    from printhammer.parts import PARTS
+    from printhammer.run import problem
+    from printhammer.run.ensemble_group import closed_form
+    from printhammer.run.plain import entries
+
+    def lowered(module: Module) -> tuple[Path, Callable[[], bytes | None]]:
+        def content() -> bytes | None:
+            # A law of more constants than a lane has room for never runs in lanes.
+            with suppress(TypingError):
+                return lzma.compress(module.content(), preset=9)
+            return None
+
+        return module.shipped, content
+
+    def compiled(entry: Entry) -> tuple[Path, Callable[[], bytes]]:
+        return entry.code.shipped, lambda: sealed(entry.code.get(entry.machine_code))
+
+    scheme = plain_template("scheme", schemes_1983.PROGRAM, False)
+    yield from map(lowered, (*every_template(), *entries.templates(), scheme))
+    for role in LAW_FUNCTIONS:
+        parts = {part.__module__ for (known, _), part in PARTS.items() if known == role}
+        for name in ("", *sorted(parts)):
+            bindings = bindings_of(Laws(**{**_ABSENT, role: name}))
+            yield from (lowered(laws_of(role, bindings, for_lanes)) for for_lanes in (False, True))
+    hammers = [load(name) for name in shipped()]
+    # A textbook oscillator has no pulse of its own, and is driven by a force.
+    drives = [PulseTrain(each.waveform) if each.waveform else SineForce(1.0, 1.0) for each in hammers]
+    posed = [(problem.laws_of(*pair), pair[1]) for pair in zip(hammers, drives, strict=True)]
+    # The longest compilations, those with a circuit, begin first: the processes then end together.
+    posed.sort(key=lambda pair: not pair[0].circuit)
+    for laws, _drive in posed:
+        yield lowered(entries.page_module(laws))
+    # Processors of the level COMMON share their machine code; that of others runs nowhere else.
+    if link.processor()[1] != link.COMMON:
+        return
+    for laws, drive in posed:
+        kernel = specialise(laws)
+        _rates, kinds = closed_form(drive.kernel_arrays()[2])
+        kernels = [variational(kernel, forced=True), variational(kernel, forced=False), kernel]
+        if suits(laws) and kinds is not None:
+            kernels.append(specialise_lanes(laws, kinds))
+        yield from (compiled(entry) for each in kernels for entry in each.entries)
+
+
+def generate(folder: Path) -> None:
+    """Write the generated files that no other process has begun to a folder that the processes share."""
+    begun = folder / "begun"
+    begun.mkdir(exist_ok=True)
+    for shipped, make in files():
+        try:
+            (begun / shipped.name).touch(exist_ok=False)
+        except FileExistsError:
+            continue
+        content = make()
+        if content is not None:
+            (folder / shipped.name).write_bytes(content)
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).parent / "src"))
+    generate(Path(sys.argv[1]))

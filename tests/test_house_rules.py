@@ -89,7 +89,8 @@ def test_locks_hold_no_address_and_a_hash_for_everything(lock: Path) -> None:
 
 
 def test_the_locks_agree() -> None:
-    assert {lock.name for lock in LOCKS} == {"build.txt", "dev.txt", "lock.txt", "runtime.txt", "test.txt"}
+    names = {"build.txt", "dev.txt", "lock.txt", "oldest.txt", "runtime.txt", "test.txt"}
+    assert {lock.name for lock in LOCKS} == names
     pins = {
         lock.name: set(re.findall(r"^([a-z0-9-]+==[\w.]+)", lock.read_text("utf-8"), re.MULTILINE))
         for lock in LOCKS

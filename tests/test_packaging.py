@@ -134,7 +134,7 @@ def test_the_wheel_holds_every_file_of_the_package_and_no_other(wheel: Path) -> 
     assert shipped - modules == ours
     plain = {name for name, entry in entries().items() if not entry.packing}
     kinds = {Path(name).name.rpartition("_")[0] for name in modules}
-    assert kinds == {*KINDS, *LAW_FUNCTIONS, *plain, "web"}
+    assert kinds == {*KINDS, *LAW_FUNCTIONS, *plain, "scheme", "web"}
     assert {"printhammer/py.typed", "printhammer/hammers/hendriks-1983.toml"} <= shipped
     assert any(re.fullmatch(r"printhammer/claims/.*\.toml", name) for name in shipped)
     assert any(re.fullmatch(r"printhammer/.*\.(html|jinja|j2)", name) for name in shipped)
@@ -162,6 +162,7 @@ def test_the_wheel_compiles_without_numba_and_shipped_hammers_not_at_all(
 import os, sys
 from pathlib import Path
 os.environ["NUMBA_CACHE_DIR"] = "empty"
+sys.modules["numba"] = None
 import printhammer as ph
 from printhammer.kernel.compile import link
 hammer = ph.load({name!r})
@@ -171,8 +172,9 @@ motion = ph.simulate(hammer, drives[0])
 _ = motion.dots, motion.energy, motion.x
 assert ph.Ensemble(hammer, drives, 9.0 * width).run(dots=True).ok.all()
 assert not list(Path("empty").rglob("*.code")) or link.processor()[1] != link.COMMON
-assert ph.simulate(hammer, ph.SineForce(1e-3, 0.1 / width), duration=9.0 * width).ok
-assert "numba" not in sys.modules
+force = ph.SineForce(1e-3, 0.1 / width)
+assert ph.simulate(hammer, force, duration=9.0 * width).ok
+assert ph.simulate(hammer, force, duration=9.0 * width, scheme="runge-kutta-4").x.size
 """
     assert output_of(elsewhere / "python", "-c", code, cwd=tmp_path) == ""
     kept = [path.suffix for path in (tmp_path / "empty").rglob("*") if path.is_file()]

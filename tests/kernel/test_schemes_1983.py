@@ -1,5 +1,4 @@
 import math
-import sys
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,16 +9,15 @@ from tests.truth import oracles
 
 from printhammer.drive.trains import PulseTrain, SineForce
 from printhammer.drive.waveforms.shapes import HalfSine, Rectangle
+from printhammer.kernel.model.laws import Laws
 from printhammer.kernel.schemes_1983 import (
     CONTACT_STEP,
     FREE_STEP,
     LATE_AFTER,
     LATE_STEP,
-    LAW_NAMES,
     SchemeRun,
     integrate,
 )
-from printhammer.parts import absent
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.backstop.rigid import RigidBackstop
 from printhammer.parts.base import ROLES
@@ -50,18 +48,15 @@ STAND_IN = made_of(spring=SPRING, pack=PACK, backstop=STOP)
 
 
 def run(hammer: Any, drive: Any, state: tuple[float, float], t_end: float, **options: Any) -> SchemeRun:
-    laws, constants = {}, {}
+    modules, constants = {}, {}
     origin = hammer.backstop.position if hammer.backstop else 0.0
     for role in ("magnet", "spring", "pack", "backstop"):
         part, stand_in = getattr(hammer, role), getattr(STAND_IN, role)
         law = part or stand_in
-        module = sys.modules[law.module] if law else absent
+        modules[role] = law.module if law else ""
         constants[role] = np.array(law.packed(origin) if law else ()) * bool(part)
-        for name in LAW_NAMES:
-            if name.startswith(role):
-                laws[name] = getattr(module, name, None) or getattr(absent, name)
     return integrate(
-        laws,
+        Laws(**modules, absent="printhammer.parts.absent"),
         constants,
         drive.kernel_arrays(),
         mass=hammer.mass,

@@ -81,7 +81,7 @@ def test_units_and_provenance(hammer: "ph.Hammer", chart: xr.Dataset) -> None:
     assert chart.attrs["hammer_fingerprint"] == hammer.fingerprint
     assert chart.attrs["printhammer"] == ph.__version__
     assert chart.attrs["pulses"] == 9
-    assert {"numpy", "numba", "tolerance", "waveform", "overlap", "made"} <= set(chart.attrs)
+    assert {"numpy", "llvmlite", "tolerance", "waveform", "overlap", "made"} <= set(chart.attrs)
     assert chart.attrs["pack_front_m"] == hammer.front
 
 

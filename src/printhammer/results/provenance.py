@@ -10,7 +10,7 @@
 | `scheme` | the integration scheme of a single run |
 | `tolerance` | error allowed in one step |
 | `status` | outcome of the run, for results of a single run |
-| `printhammer`, `numpy`, `numba`, `scipy` | versions on which the bits depend |
+| `printhammer`, `numpy`, `llvmlite`, `scipy` | versions on which the bits depend |
 
 Keys that do not apply to a result are omitted; the versions are always present.
 """
@@ -26,7 +26,7 @@ from printhammer.drive.trains import Drive
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.hammer.hammer import Hammer
 
-VERSIONS: Final = ("printhammer", "numpy", "numba", "scipy")
+VERSIONS: Final = ("printhammer", "numpy", "llvmlite", "scipy")
 """Keys of the versions, which every result has."""
 
 KEYS: Final = (

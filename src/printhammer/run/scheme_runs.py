@@ -79,7 +79,7 @@ class SchemeProblem(Problem):
         """Integrate to time `end`, s; return the ends of the steps, or the states at given moments."""
         hammer = self.hammer
         return schemes_1983.integrate(
-            {name: self._law(name) for name in schemes_1983.LAW_NAMES},
+            self.laws,
             self._packed,
             self.drive.kernel_arrays(),
             mass=hammer.mass,

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.kernel.compile import cache, calls, link, modules
@@ -145,6 +146,18 @@ def test_a_law_of_ones_own_is_lowered_by_the_public_interface_of_numba(
         if not function.is_declaration and function.linkage == llvm.Linkage.external
     }
     assert defined == {link.law_symbol(name, for_lanes) for name in LAW_FUNCTIONS["backstop"]}
+
+
+@pytest.mark.parametrize(("role", "module"), [("backstop", "own_backstop"), ("spring", "")])
+def test_without_numba_a_module_that_has_to_be_lowered_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, role: str, module: str
+) -> None:
+    (tmp_path / "own_backstop.py").write_text(OWN_LAW)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setitem(sys.modules, "numba", None)
+    parts = {"magnet": "", "spring": "", "pack": "", "backstop": "", role: module}
+    with refused(key="laws"):
+        modules.laws_of(role, bindings_of(Laws(**parts, absent="printhammer.parts.absent")), False)._make()
 
 
 def test_a_law_of_ones_own_computes_what_the_same_law_that_ships_computes(

@@ -16,6 +16,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
+from printhammer.errors import missing_extra
 from printhammer.kernel.compile import calls, link
 from printhammer.kernel.compile.bindings import code_digest, plain_digest
 from printhammer.kernel.compile.cache import Code, File, say_once
@@ -80,6 +81,17 @@ def _versions() -> str:
     return "-".join(versions)
 
 
+def require_numba(needs: str) -> None:
+    """Raise InputError, which names the extra `laws`, if numba is not installed; `needs` is a clause."""
+    try:
+        import numba  # noqa: F401
+    except ImportError:
+        raise missing_extra(needs, "laws") from None
+
+
+_NEEDED: Final = "this installation contains no lowered modules of the kernel, and lowering needs numba"
+
+
 class Module:
     """Lowered module, as LLVM bitcode, of a template or of a part's laws; `make` lowers the module."""
 
@@ -139,6 +151,7 @@ def template_of(entry: str, variant: Mapping[str, bool]) -> Module:
     """Return the template of an entry point in a variant, without lowering it."""
 
     def make() -> bytes:
+        require_numba(_NEEDED)
         from printhammer.kernel.compile import lower
 
         return lower.template(entry, variant)
@@ -155,6 +168,7 @@ def plain_template(name: str, plain: Plain, circuit: bool, packing: Mapping[str,
     packing = packing if plain.packing else {}
 
     def make() -> bytes:
+        require_numba(_NEEDED)
         from printhammer.kernel.compile import lower
 
         return lower.plain(name, plain, circuit if plain.laws else None, packing)
@@ -178,18 +192,21 @@ def every_template() -> Iterator[Module]:
 def laws_of(role: str, bindings: Bindings, for_lanes: bool) -> Module:
     """Return the module of the law functions of a part, for arrays of constants or for lanes."""
     package = __name__.partition(".")[0]
-    ours = all(bindings.names[name].__module__.partition(".")[0] == package for name in LAW_FUNCTIONS[role])
+    homes = {bindings.names[name].__module__ for name in LAW_FUNCTIONS[role]}
+    others = sorted(home for home in homes if home.partition(".")[0] != package)
 
     def make() -> bytes:
-        if ours:
+        if not others:
+            require_numba(_NEEDED)
             from printhammer.kernel.compile import lower
 
             return lower.laws(role, bindings.names, for_lanes)
+        require_numba(f"{others[0]}: the {role} law is not part of printhammer and needs numba")
         from printhammer.kernel.compile import own
 
         return own.laws(role, bindings.names, for_lanes)
 
-    lowering = _LOWERING if ours else ("compile/own.py",)
+    lowering = ("compile/own.py",) if others else _LOWERING
     sources = _digest_of((*lowering, "model/laws.py"))
     if for_lanes:
         sources += _digest_of(("lanes/layout.py", "lanes/math.py"))

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, cast
 
 from printhammer.kernel.compile.bindings import bindings_of
-from printhammer.kernel.compile.modules import Entry, WebModule, one_at_a_time, web_module_of
+from printhammer.kernel.compile.modules import Entry, WebModule, one_at_a_time, require_numba, web_module_of
 from printhammer.kernel.compile.templates import TEMPLATES, VARIATIONAL, bind, compile_law, execute_all
 from printhammer.kernel.variational.layout import changing, electric_row
 
@@ -102,6 +102,7 @@ class Kernel:
     @functools.cached_property
     def namespace(self) -> dict[str, Any]:
         """All names of the template modules, bound to the laws, for direct calls of helper functions."""
+        require_numba("to run the kernel as plain Python (NUMBA_DISABLE_JIT) needs numba")
         from printhammer.kernel.compile.compiling import compiled
 
         bindings = bindings_of(self.laws)
