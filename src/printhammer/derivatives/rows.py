@@ -138,7 +138,7 @@ class _Maps:
         self.current = None if strobes.electric is None else strobes.electric[:, -1]
 
     def images(self, rows: Any, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Compute the images (n, 2) of scaled states of given rows, and the derivatives (n, 2, 2)."""
+        """Compute the images of scaled states, shape (n, 2), of given rows, and their derivatives."""
         steps = _SPACING * np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
         count, places = len(steps), np.repeat(rows, len(steps))
         floor = np.stack([self.lowest[rows] / self.scales[rows, 0], np.full(len(rows), -np.inf)], axis=1)

@@ -66,7 +66,7 @@ class Cloud(NamedTuple):
 
     @classmethod
     def of(cls, points: FloatArray) -> Cloud:
-        """Build the cloud of successive points (n, 2); the reach is computed between its two halves."""
+        """Build the cloud of successive points, shape (n, 2), and compute its reach from its two halves."""
         half = len(points) // 2
         apart, _ = cKDTree(points[:half]).query(points[half:])
         return cls(cKDTree(points), float(np.quantile(apart, REACH)))

@@ -129,7 +129,7 @@ class BifurcationCurve(Result, rows="point"):
     @property
     @derived("1", "whether stability is lost, the other multiplier being inside the unit circle", "point")
     def limits(self) -> BoolArray:
-        """Mask of the points where stability is lost, (N,): the other multiplier is in the unit circle."""
+        """Mask of points, shape (N,), where stability is lost: the other multiplier is in the unit circle."""
         if self.kind == "grazing":
             return np.asarray(np.abs(self.multipliers).max(axis=1) < 1.0)
         return np.asarray(np.abs(self.multipliers).max(axis=1) < 1.0 + SAME)

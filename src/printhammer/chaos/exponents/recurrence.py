@@ -197,7 +197,7 @@ def _threshold(distances: FloatArray, theiler: int, rate: float) -> float:
 def rows_of(
     states: npt.ArrayLike | Strobe, scales: npt.ArrayLike | None, most: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the states as an array, (n, m) with n up to `most`, and the scales of their components."""
+    """Return the states, shape (n, m) with n up to `most`, and the scales of their components."""
     if isinstance(states, Strobe):
         rows = np.column_stack([states.x, states.v, states.memory])
         units = states.window.half_widths[[0, 1, 0]]

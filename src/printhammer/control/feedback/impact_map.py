@@ -52,7 +52,7 @@ _LARGEST_FORCE: Final = 1.15  # Force above which an action is inadmissible, rel
 
 @dataclass(frozen=True)
 class ForceMap:
-    """Peak force as a function of touch (T,), return current (B,) and release (R,)."""
+    """Peak force for each of T touches, B return currents and R releases."""
 
     kind: IntArray  # `PUSHED` or `FREE`, (T,)
     speed: FloatArray  # Speed of the touch, m/s; evenly spaced within a kind, (T,)
@@ -91,7 +91,7 @@ class ForceMap:
 
 @dataclass(frozen=True)
 class ImpactMap:
-    """Outcome of each switching action of the coil (A,) from each touch of a force map (T,)."""
+    """Outcome of each of A switching actions of the coil from each of the T touches of a force map."""
 
     back: FloatArray  # Return current, A, (A,)
     fire: FloatArray  # Time after the touch at which the next push begins, s, (A,)

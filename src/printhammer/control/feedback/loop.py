@@ -77,8 +77,8 @@ class Learned:
 class Touched:
     """Contact with the pack, from which the position of the pack's front is estimated.
 
-    `start` is before and `end` after the contact, s. At the start, `state` (3,) holds
-    displacement, m, speed, m/s, and current scale, with their `covariance` (3, 3).
+    `start` is before and `end` after the contact, s. At the start, `state` holds displacement, m, speed, m/s,
+    and current scale, and `covariance`, shape (3, 3), their covariances.
     """
 
     start: float

@@ -111,7 +111,7 @@ def front_force(farther: Plant, table: ImpactMap) -> FloatArray:
 
 
 def between_fronts(front: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Locate fronts (M,) between the maps: index of the map below, weight of the map above.
+    """Locate M fronts between the maps: index of the map below, weight of the map above.
 
     A front is the distance beyond nominal as a fraction of the stroke; values outside the maps are clipped.
     """
@@ -134,7 +134,7 @@ _EFFORT: Final = 0.1  # Cost of the largest return current over a whole period
 
 
 class Committed(NamedTuple):
-    """Actions after touches (M,) that have been taken and cannot be changed.
+    """Actions after M touches that have been taken and cannot be changed.
 
     Return current, A; printed force relative to the single pulse; time since the touch, s.
     """
@@ -204,7 +204,7 @@ class Policy:
         front_error: FloatArray,
         done: Committed | None = None,
     ) -> tuple[IntArray, FloatArray, Choice]:
-        """Choose the best action for touches (M,); return its index, cost, and the outcomes of all actions.
+        """Choose the best action for each of M touches; return index, cost, and the outcomes of all actions.
 
         The touches have a `kind`, a lateness `late`, s, and a `speed`, m/s. The next dot is due after `wait`,
         s, and `after` dots follow between the next dot and a rest. The pack is `front` farther away than
@@ -296,7 +296,7 @@ class Policy:
 
 
 class Choice:
-    """Outcomes of all actions from touches (M,), interpolated in speed and in the distance of the front."""
+    """Outcomes of all actions from M touches, interpolated in speed and in the distance of the front."""
 
     def __init__(self, fronts: Fronts, kind: IntArray, speed: FloatArray, front: FloatArray) -> None:
         self._fronts = fronts
@@ -307,7 +307,7 @@ class Choice:
         self.next_speed = self.of("next_speed")
 
     def settle(self, force: FloatArray) -> None:
-        """Replace the outcomes by those after dots (M,) with known forces, relative to the single pulse.
+        """Replace the outcomes by those after M dots with known forces, relative to the single pulse.
 
         Outcomes of the middle force of the maps are shifted linearly; the other forces become inadmissible.
         """
@@ -326,13 +326,13 @@ class Choice:
             setattr(self, name, settled.reshape(self.force.shape))
 
     def by_speed(self, values: FloatArray, way: IntArray | None = None) -> FloatArray:
-        """Interpolate an array (T, A) of the nominal hammer to (M, A), or to (M,) for one action each."""
+        """Interpolate a nominal array, shape (T, A), to shape (M, A), or (M,) for one action each."""
         every: Any = slice(None) if way is None else way
         share = self.share[:, np.newaxis] if way is None else self.share
         return blend(values[self.below, every], values[self.below + 1, every], share)
 
     def of(self, name: str, way: IntArray | None = None) -> FloatArray:
-        """Interpolate arrays (T, A) of all maps to (M, A), or to (M,) for one action each."""
+        """Interpolate arrays of all maps, shape (T, A), to shape (M, A), or (M,) for one action each."""
         tables = [getattr(table, name) for table in self._fronts.maps]
         shape = (len(self.below), tables[MIDDLE].shape[1]) if way is None else (len(self.below),)
         values = np.empty(shape)
@@ -348,7 +348,7 @@ class Choice:
 
 
 def between(table: ImpactMap, kind: IntArray, speed: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Locate touches (M,) between the rows of the map: index of the row below, weight of the row above."""
+    """Locate M touches between the rows of the map: index of the row below, weight of the row above."""
     below, share = np.zeros(len(kind), np.int64), np.zeros(len(kind))
     for number in range(int(table.kind.max()) + 1):
         rows = np.flatnonzero(table.kind == number)

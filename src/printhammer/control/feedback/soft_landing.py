@@ -37,7 +37,7 @@ _SETTLED: Final = 0.65  # Time after the brake pulse until the armature counts a
 
 @dataclass(frozen=True)
 class Landing:
-    """Best brake pulse for each touch of a map (T,); NaN if the force is not reached."""
+    """Best brake pulse for each of the T touches of a map; NaN if the force is not reached."""
 
     release: FloatArray  # Time after the touch at which the push ends, s, (T,)
     force: FloatArray  # Force relative to the single pulse, (T,)
@@ -47,7 +47,7 @@ class Landing:
     # Residual speed, m/s; a distance from rest counts as the speed that covers it in a third of the
     # single-pulse flight time, (T,)
     left: FloatArray
-    settled: float  # Time after the touch from which on the armature counts as at rest, s
+    settled: float  # Time from the touch until the armature counts as at rest, s
 
 
 def soft_landing(plant: Plant, forces: ForceMap) -> Landing:

@@ -99,7 +99,7 @@ class Belief:
         return cls(chosen, weights[kept] / weights[kept].sum())
 
     def moments(self) -> tuple[FloatArray, FloatArray]:
-        """Compute means and standard deviations of the constants over all modes, (constants,) each."""
+        """Compute means and standard deviations over all modes, each of shape (constants,)."""
         means = np.array([mode.mean for mode in self.modes])
         spread = np.array([np.diag(mode.covariance) for mode in self.modes])
         mean = self.weights @ means

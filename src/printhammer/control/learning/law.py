@@ -65,7 +65,7 @@ ADVANCE, WIDTH, DELAY, BRAKE = range(4)
 
 
 class OpenLoop(NamedTuple):
-    """Open-loop drive, the same pulse at every slot: its table settings (4, entries) and its waveform."""
+    """Open-loop drive, the same pulse at every slot: its table settings, shape (4, entries), and waveform."""
 
     settings: FloatArray
     pulse: Waveform
@@ -75,8 +75,9 @@ class OpenLoop(NamedTuple):
 class Adjustable:
     """Entries of a table that are learned: advance, width, and brake width of entries with a brake pulse.
 
-    `base` (4, entries) are the settings to which corrections are added, in s relative to the slots, at a slot
-    rate in Hz, for the hammer with its driver. Corrections are arrays (..., inputs), in units of `STEP`.
+    `base`, shape (4, entries), are the settings to which corrections are added, in s relative to the slots,
+    at a slot rate in Hz, for the hammer with its driver. Corrections are arrays of shape (..., inputs), in
+    units of `STEP`.
     """
 
     task: Task
@@ -113,7 +114,7 @@ class Adjustable:
         return np.asarray((self._clip(self._raw(after)) - self.base)[rows, columns] / STEP)
 
     def started_from(self, base: FloatArray) -> Adjustable:
-        """Return a copy whose base settings are `base`, (4, entries), clipped to all bounds."""
+        """Return a copy whose base settings are `base`, shape (4, entries), clipped to all bounds."""
         # Unlike entries of the first table, entries of this table may not stay beyond a bound.
         strict, own = base.copy(), base.copy()
         strict[ADVANCE] = -np.inf
@@ -236,8 +237,8 @@ class LearningLaw:
     def update(self, belief: Belief, corrections: FloatArray, unexplained: FloatArray) -> Printing[Update]:
         """Compute the corrections after a stage; yield the lines that simulated hammers have to print.
 
-        `unexplained` (2, dots) is the model error of arrival and force of the dots of the line, normalised by
-        the limits.
+        `unexplained`, shape (2, dots), is the model error of arrival and force of the dots of the line,
+        normalised by the limits.
         """
         modes = self.production.hammers(np.array([mode.mean for mode in belief.modes]))
         there = np.array([hammer is not None for hammer in modes])

@@ -57,7 +57,7 @@ class Surrogate:
 
     @classmethod
     def of(cls, rows: FloatArray, values: FloatArray) -> Surrogate:
-        """Fit readings (members,) as a function of constants (members, constants) by ridge regression."""
+        """Fit one reading per member to constants, shape (members, constants), by ridge regression."""
         known = np.isfinite(values)
         size = rows.shape[1]
         upper = np.triu_indices(size)
@@ -151,13 +151,13 @@ def choose(
     Parameters
     ----------
     times
-        Candidate rungs, and the impact times of their dots, normalised by the limit, (members, dots).
+        Candidate rungs, and the impact times of their dots, normalised by the limit, shape (members, dots).
     line
         Surrogates of the impact times of a line in open loop.
     force
         Surrogate of the force of the single pulse.
     rows
-        Constants of the members, in prior standard deviations, (members, constants).
+        Constants of the members, in prior standard deviations, shape (members, constants).
     noise, offset
         Standard deviations of a single time reading and of the sensor's offset, normalised by the limit.
     """
@@ -238,13 +238,13 @@ class Press:
     ) -> tuple[DotTable, Judgement]:
         """Simulate a line on every hammer; return the dots and their deviations.
 
-        `settings` holds one array (4, entries) per hammer. `pulses` are the waveforms, one per hammer; the
-        default is the pulse of the task for all hammers.
+        `settings` holds one array of shape (4, entries) per hammer. `pulses` are the waveforms, one per
+        hammer; the default is the pulse of the task for all hammers.
         """
         return printed(self.order_line(settings, slots, pulses), self.task)
 
     def multipliers(self, settings: FloatArray) -> FloatArray:
-        """Compute the multipliers of rows printed with settings (4, entries), for each hammer, shape (M,).
+        """Compute the multipliers of rows printed with settings, shape (4, entries), one for each hammer.
 
         A multiplier is the largest absolute Floquet multiplier of two rows, with a dot in every slot and in
         every second slot; see `printhammer.derivatives.rows.row_multipliers`. The result is NaN if neither

@@ -78,7 +78,7 @@ class Production:
         ]
 
     def hammers(self, rows: FloatArray) -> list[Hammer | None]:
-        """Build the hammers of rows (M, size); None for a row with invalid constants."""
+        """Build the hammers of rows, shape (M, size); None for a row with invalid constants."""
         return self.variability.hammers(self.nominal, rows[:, : self.constants])
 
     def press(self, hammers: Sequence[Hammer]) -> Press:
@@ -88,7 +88,7 @@ class Production:
     def readings(
         self, rows: FloatArray, rungs: Sequence[Rung], lines: Sequence[FloatArray]
     ) -> Printing[FloatArray]:
-        """Predict the readings of hammers (M, size): of the ladder, and of lines printed with settings.
+        """Predict the readings of hammers, shape (M, size): of the ladder, and of lines with settings.
 
         The result, shape (M, measured * dots), is normalised by the limits; NaN where a dot is lost.
         """

@@ -110,7 +110,7 @@ def best_of(
 
 
 def sobol(dimensions: int, count: int) -> FloatArray:
-    """Return the first points (count, dimensions) of an unscrambled Sobol sequence in the unit cube."""
+    """Return the first points of an unscrambled Sobol sequence, shape (count, dimensions), in [0, 1)."""
     from scipy.stats import qmc
 
     return np.asarray(qmc.Sobol(dimensions, scramble=False).random(count))

@@ -36,7 +36,7 @@ _REACH, _SHRINKS = 0.25, 0.7  # Half-width of the first cloud, and factor on the
 def printing_profile(
     shares: FloatArray, largest: float, duration: float, arrival: float, nodes: int
 ) -> FloatArray:
-    """Return currents (n, nodes), A, that brake, wait and throw, from parameters in [0, 1].
+    """Return currents, A, shape (n, nodes), that brake, wait and throw, from parameters in [0, 1].
 
     `shares`, shape (n, `PRINTING_SHARES`), are the parameters: three current levels and two switching times.
     `largest` is the current limit, A; the slot lasts `duration`, and its dot is due at `arrival`, both in s.
@@ -65,9 +65,9 @@ def refined(
     badness: Callable[[FloatArray], FloatArray],
     count: int,
 ) -> tuple[FloatArray, FloatArray]:
-    """Evaluate Sobol profiles and refine the best; return their currents (n, nodes) and objective values.
+    """Evaluate Sobol profiles and refine the best; return their currents, shape (n, nodes), and objectives.
 
-    `profile` maps shares (n, `count`) to currents, `badness` maps currents to the objective.
+    `profile` maps shares, shape (n, `count`), to currents, `badness` maps currents to the objective.
     """
     places = sobol(count, _SPREAD)
     bad = badness(profile(places))
@@ -85,7 +85,7 @@ def refined(
 
 
 def _in_steps(levels: FloatArray, edges: FloatArray, duration: float, nodes: int) -> FloatArray:
-    """Average piecewise constant currents (n, k), with edges (n, k - 1), s, over the steps between nodes."""
+    """Average n piecewise constant currents of k levels, with edges, s, over the steps between nodes."""
     ends = np.pad(edges, ((0, 0), (1, 1)), constant_values=((0.0, 0.0), (0.0, duration)))
     times = node_times(duration, nodes)
     past = np.clip(times, ends[:, :-1, np.newaxis], ends[:, 1:, np.newaxis]) - ends[:, :-1, np.newaxis]

@@ -129,7 +129,7 @@ class Task:
     tolerance: float  # As for `printhammer.simulate`
 
     def run(self, begin: SlotState, currents: FloatArray, duration: float, tolerance: float) -> Outcomes:
-        """Simulate a slot of `duration`, s, with currents (M, nodes), A, at the nodes after the first."""
+        """Simulate M slots of `duration`, s, with currents, A, shape (M, nodes), after the first node."""
         front = self.hammer.front
         assert front is not None
         grid = np.linspace(0.0, duration, _SAMPLES)

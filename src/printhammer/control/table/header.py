@@ -53,7 +53,8 @@ def whole_ticks(
     """Round the times of a table to whole ticks, such that no pulse begins before the preceding one ends.
 
     Where rounding to the nearest tick makes two pulses overlap, the brake pulse begins later or is shorter,
-    or the dot is fired later, by a tick or two. Arguments as for `look_ahead`, with arrays (rates, entries).
+    or the dot is fired later, by a tick or two. Arguments as for `look_ahead`, with arrays of shape (rates,
+    entries).
     """
     rounded = {name: np.rint(values / tick) for name, values in times.items()}
     advance, width, delay, brake = (rounded[name] for name in COLUMNS)

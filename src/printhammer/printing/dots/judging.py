@@ -77,11 +77,11 @@ def judge(
 ) -> Judgement:
     """Compare the dots of an ensemble, one firing per dot, with the limits.
 
-    `wanted` (members, firings) is the mask of dots to evaluate; the dots of a lead-in, for instance, are
-    excluded. `slot_times` (members, firings), s, may differ from the firing times, and are ignored where no
-    dot is evaluated. `nominal` is the single-pulse dot: one for all members, or one for each. `ok` (members,)
-    is the mask of simulations that reached their ends; in the others the last dot counts as "not run", since
-    its contact may be open.
+    `wanted`, shape (members, firings), is the mask of dots to evaluate; the dots of a lead-in, for instance,
+    are excluded. `slot_times`, s, of the same shape, may differ from the firing times, and are ignored where
+    no dot is evaluated. `nominal` is the single-pulse dot: one for all members, or one for each. `ok`, shape
+    (members,), is the mask of simulations that reached their ends; in the others the last dot counts as "not
+    run", since its contact may be open.
     """
     shape = dots.fired.shape
     for name, values in (("wanted", wanted), ("slot_times", slot_times)):

@@ -44,13 +44,13 @@ PAPER_X: Final = (38.1e-6, 88.9e-6)
 """Displacements of the window of Fig. 11 of Hendriks (1983), m: 0.0015 to 0.0035 in."""
 
 PAPER_V: Final = (-0.635, 0.635)
-"""Velocities of the window of Fig. 11, m/s: -25 to +25 in/s."""
+"""Velocities of the window of Hendriks' Fig. 11, m/s: -25 to +25 in/s."""
 
 PAPER_BACKSTOP: Final = 50.8e-6
-"""Position of the paper's backstop, m: 0.002 in."""
+"""Position of the backstop in Hendriks (1983), m: 0.002 in."""
 
 PAPER_FRONT: Final = 203.2e-6
-"""Front of the paper's pack, m: 0.008 in."""
+"""Front of the pack in Hendriks (1983), m: 0.008 in."""
 
 SAME: Final = 1e-3
 """Relative difference within which positions are those of the paper."""

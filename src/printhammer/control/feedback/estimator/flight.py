@@ -63,10 +63,10 @@ class FreeForce:
 
 @dataclass(frozen=True)
 class Expected:
-    """Prior expectation of touches (M,).
+    """Prior expectation of M touches, one element of each array per touch.
 
-    Time, s, and speed, m/s; `scale`, the relative deviation of all currents from nominal; and the covariance
-    (M, 3, 3) of displacement at that time, m, speed, m/s, and scale.
+    Time, s, and speed, m/s; `scale`, the relative deviation of all currents from nominal; and the covariance,
+    shape (M, 3, 3), of displacement at that time, m, speed, m/s, and scale.
     """
 
     time: FloatArray
@@ -89,7 +89,7 @@ class Flight:
     covariance: FloatArray
 
     def at(self, time: FloatArray, accelerations: Accelerations) -> tuple[FloatArray, FloatArray]:
-        """Propagate state (M, 3) and covariance (M, 3, 3) in free flight to another time, s."""
+        """Propagate states, shape (M, 3), and covariances, (M, 3, 3), in free flight to another time, s."""
         place, speed, scale = self.state.T
         way = time - self.reference
         grid = self.reference[:, np.newaxis] + np.linspace(1.0, 0.0, _NODES) * way[:, np.newaxis]
@@ -116,8 +116,8 @@ def flight_from_samples(
 ) -> Flight:
     """Estimate flights and coming touches of packs with their fronts at `front`, m, from samples.
 
-    `accelerations` maps displacements, m, times, s, and scales, all broadcastable to (M, K), to accelerations
-    of a flying armature, m/s².
+    `accelerations` maps displacements, m, times, s, and scales, all broadcastable to the shape (M, K), to
+    accelerations of a flying armature, m/s².
     """
     times, shown, used, error = samples
     reference = expected.time
@@ -174,12 +174,12 @@ def least_squares(
     prior: FloatArray,
     expected: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Compute the weighted least-squares step (M, U) with a prior, and its precision matrix (Gauss-Newton).
+    """Compute the weighted least-squares step with a prior, and its precision matrix (Gauss-Newton).
 
-    `slopes` are the derivatives (M, N) of the samples with respect to each of U unknowns, `rest` (M, N) the
-    residuals, and `weight` (M, N) the weights, 0 for unused samples. The prior is a step `expected` (M, U)
-    with the precision `prior` (M, U, U). The returned precision (M, U, U) is the inverse of the covariance of
-    the step.
+    For M runs, `slopes` are the derivatives of N samples with respect to each of U unknowns, each of shape
+    (M, N); `rest` are the residuals and `weight` the weights, 0 for unused samples, of the same shape. The
+    prior is a step `expected`, shape (M, U), with the precision `prior`, shape (M, U, U). The returned
+    precision is the inverse of the covariance of the step.
     """
     precision, pull = prior.copy(), np.empty(expected.shape)
     # Explicit sums, so that a run's bits do not depend on the other runs, as they may in a matrix product.
@@ -193,7 +193,7 @@ def least_squares(
 
 
 def _integrate(grid: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Integrate once and twice over equal steps, from the last time backwards, shape (M, K) (trapezoidal)."""
+    """Integrate rows once and twice by the trapezoidal rule on equal steps, backwards from the last time."""
     step = (grid[:, -1:] - grid[:, :1]) / (grid.shape[1] - 1)
 
     def backwards(integrand: FloatArray) -> FloatArray:

@@ -77,7 +77,7 @@ class PositionSensor(Declared):
         return max(1, round(time / self.interval))
 
     def numbers(self, since: FloatArray, until: FloatArray, most: int) -> IntArray:
-        """Return the indices of the latest samples in time spans (M,), s, as an array (M, most).
+        """Return the indices of the latest samples in time spans, s, one per run; shape (M, most).
 
         `until` is the time at which the samples are needed, so the latest was taken one delay earlier. The
         indices ascend, padded with -1 at the front.
@@ -88,9 +88,9 @@ class PositionSensor(Declared):
         return np.where(latest >= np.maximum(first, 0)[:, np.newaxis], latest, -1)
 
     def read(self, x: FloatArray, numbers: IntArray, runs: Words, stroke: float) -> FloatArray:
-        """Return the readings of true displacements (M, N), m, at samples with indices (M, N).
+        """Return the readings of true displacements, m, at the samples with the given indices, shape (M, N).
 
-        `runs` (M,) are the noise keys of the runs; `stroke` is the distance from backstop to pack, m.
+        `runs`, shape (M,), are the noise keys of the runs; `stroke` is the distance from backstop to pack, m.
         """
         shown = x + self.noise * stroke * normal(self.seed, runs[:, np.newaxis], numbers)
         if self.step > 0.0:

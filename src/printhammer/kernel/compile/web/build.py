@@ -5,7 +5,7 @@ of a kernel with the mathematical functions that they call, from zig's C library
 imports nothing, so that every browser computes the same bits; it exports its memory, its entry points, which
 take the address of a block of arguments (:func:`printhammer.kernel.compile.calls.calling_code`), and the
 address `__heap_base` from which memory is free. Its custom section `printhammer` is a JSON object that
-describes the arguments; `call.mjs` reads that and calls.
+describes the arguments, from which `call.mjs` writes the block for a call.
 """
 
 from __future__ import annotations
