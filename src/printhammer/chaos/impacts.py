@@ -85,7 +85,7 @@ class Section(Result):
     @property
     @derived("1", "number of the touch", "touch", kind="coordinate", dtype=np.int32)
     def touch(self) -> IntArray:
-        """Numbers of the touches, from 1 on."""
+        """Numbers of the touches, counted from 1."""
         return np.arange(1, len(self.t) + 1)
 
     @property

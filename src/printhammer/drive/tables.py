@@ -160,7 +160,7 @@ def bridge(fields: Any, table: Any) -> int:
 
 
 def fill_supply(fields: Any, reservoir: bool, supply: Any, at: int) -> None:
-    """Write the supply of a driver from index `at` on: the fields of `drive.waveforms.base.Supply`."""
+    """Write the supply of a driver, beginning at index `at`: the fields of `drive.waveforms.base.Supply`."""
     supply[at], supply[at + 1] = fields[_DIODE_VOLTAGE], 0.0
     supply[at + 2] = fields[_OWN] if reservoir else 0.0
     supply[at + 3] = fields[_OWN + 1] if reservoir else 0.0

@@ -80,7 +80,7 @@ def basin_entropy(labels: npt.ArrayLike, *, box: SupportsIndex = BOX) -> BasinEn
     Parameters
     ----------
     labels : int array, shape (n, m)
-        Index of the attractor of each cell, from 1 on; cells of unknown attractor, 0 or negative, are
+        Number of the attractor of each cell, counted from 1; cells of unknown attractor, 0 or negative, are
         excluded.
     box : int, optional
         Number of cells along the side of a box; cells beyond the last whole box are excluded.

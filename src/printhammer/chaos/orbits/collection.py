@@ -166,7 +166,7 @@ class Orbits(Result):
 
     @property
     def indices(self) -> dict[int, int]:
-        """Sums of the indices of the fixed points of the strobe map, by number of firings from 1 on.
+        """Sums of the indices of the fixed points of the strobe map, by number of firings, 1 first.
 
         See `index_sums`. Empty if no theorem states the sum.
         """

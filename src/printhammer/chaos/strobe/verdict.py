@@ -166,7 +166,7 @@ def _finite(number: float) -> float | None:
 def repeats(
     states: FloatArray, branches: IntArray, scales: FloatArray, longest: int = LARGEST_PERIOD
 ) -> FloatArray:
-    """Compute the largest distance of states q firings apart, for q from 1 on, shape (longest,).
+    """Compute the largest distance of states q firings apart, for each q from 1, shape (longest,).
 
     States, shape (n, 3), are displacement, velocity and memory of the pack at successive firings; their
     `branches`, shape (n,), are those of the pack's force law, 0 outside the pack. A distance is the largest

@@ -108,7 +108,7 @@ class Adjustable:
         return [plain] if self.own is None else [plain, self.own]
 
     def limited(self, before: FloatArray, change: FloatArray) -> FloatArray:
-        """Add a change to corrections (inputs,) and clip the resulting settings to all bounds."""
+        """Add a change to corrections, shape (inputs,), and clip the resulting settings to all bounds."""
         after = before + np.clip(change, -_LARGEST, _LARGEST)
         rows, columns = self.inputs
         return np.asarray((self._clip(self._raw(after)) - self.base)[rows, columns] / STEP)
@@ -122,7 +122,7 @@ class Adjustable:
         return replace(self, base=replace(self, base=strict)._clip(own))
 
     def settings(self, corrections: FloatArray) -> FloatArray:
-        """Compute the settings with corrections (inputs,), shape (4, entries)."""
+        """Compute the settings, shape (4, entries), with corrections, shape (inputs,)."""
         shared = shared_numbers(self.task.gaps, self.task.reach)
         return np.asarray(self._raw(corrections)[:, shared])
 

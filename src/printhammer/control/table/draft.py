@@ -144,12 +144,12 @@ class Draft:
     ) -> FloatArray:
         """Return deviations of force and arrival of patterns' last dots, as fractions of the limits.
 
-        `values` (cells, 2) are advance and width of the last dots, s, and `shifts` (shifts, 2) are trial
-        changes of both. With `dense`, each entry is evaluated in several patterns, see `gaps_before`. With
-        `whole`, the result is the largest deviation of all dots of a pattern that share the history of the
-        last one. The shape is (cells, shifts, deviations), over hammers, patterns, force and arrival; NaN for
-        a lost dot or a pattern with extra contacts. An entry with fewer patterns than the others repeats its
-        first pattern.
+        `values`, shape (cells, 2), are advance and width of the last dots, s, and `shifts`, shape (shifts,
+        2), are trial changes of both. With `dense`, each entry is evaluated in several patterns, see
+        `gaps_before`. With `whole`, the result is the largest deviation of all dots of a pattern that share
+        the history of the last one. The shape is (cells, shifts, deviations), over hammers, patterns, force
+        and arrival; NaN for a lost dot or a pattern with extra contacts. An entry with fewer patterns than
+        the others repeats its first pattern.
         """
         task = self.task
         gaps = [gaps_before(history, task.reach) if dense else [()] for _row, history in cells]

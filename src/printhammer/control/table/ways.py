@@ -40,7 +40,7 @@ def solve(
     bounded: Bounded,
     longest: float = LONGEST_STEP,
 ) -> FloatArray:
-    """Minimise deviations over firing times and widths (dots, 2); return the best iterates.
+    """Minimise deviations over firing times and widths; return the best iterates, shape (dots, 2).
 
     The method is Levenberg-Marquardt (J. Nocedal and S. J. Wright, *Numerical Optimization*, ch. 10).
 
@@ -89,11 +89,11 @@ def changes(
     most: FloatArray,
     longest: float = LONGEST_STEP,
 ) -> FloatArray:
-    """Compute one Levenberg-Marquardt step (dots, 2) for two times, s, with bounds on the second.
+    """Compute a Levenberg-Marquardt step, shape (dots, 2), for two times, s, with bounds on the second.
 
-    `slopes` (dots, deviations, 2) are the derivatives of the deviations `off` (dots, deviations) with respect
-    to firing time, or advance, and width, 1/s; the change of width, s, is clipped to `least` and `most`
-    (dots,), and both changes to `longest`, s.
+    `slopes`, shape (dots, deviations, 2), are the derivatives of the deviations `off`, shape (dots,
+    deviations), with respect to firing time, or advance, and width, 1/s. The change of width, s, is clipped
+    to `least` and `most`, one value per dot, and both changes to `longest`, s.
     """
     turned = slopes.transpose(0, 2, 1)
     # The damping keeps the step finite in a direction that does not affect the deviations.

@@ -55,8 +55,8 @@ class Rectangle(_Pulse):
     """Rectangle with exponential rise and decay: the current of a coil that is switched on and off.
 
     I(tau) = amplitude (1 - exp(-tau / rise)) for 0 <= tau < width, then I(width) exp(-(tau - width) / decay),
-    and zero from `DECAY_TIMES` decay constants after the width on, where 1e-12 of the current is left. A rise
-    or decay of 0 is a sharp edge.
+    and zero later than `DECAY_TIMES` decay constants after the width, when 1e-12 of the current is left. A
+    rise or decay of 0 is a sharp edge.
     """
 
     shape: ClassVar[str] = "rectangle"
