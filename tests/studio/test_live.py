@@ -1,18 +1,37 @@
 """The page that computes by itself, opened from a file: what Python computes, four views, hostile links."""
 
 import json
+from pathlib import Path
 from typing import Any
 
 import pytest
 from tests.studio.browser import Page
+from tests.studio.reading import without_modules
 
 import printhammer as ph
 from printhammer.printing.page.page import print_page
 from printhammer.printing.page.pattern import Pattern
+from printhammer.studio import Shelf, live_page
 from printhammer.studio.controls import fields_of
 from printhammer.studio.live import VIEWS
 
 NAME = "hendriks-1983-1"
+
+
+def test_the_page_begins_from_a_file(
+    opened_browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its scripts run and it describes its hammer, here one whose module is left out."""
+    without_modules(monkeypatch)
+    path = tmp_path / "page.html"
+    path.write_text(live_page(Shelf(ph.load(NAME), only=True), "rate=900&pulses=3"), "utf-8")
+    page = opened_browser()
+    page.open(path.as_uri())
+    page.wait("!!window.studio?.studio?.described && !!document.querySelector('[data-key=rate]')")
+    assert page.run("window.studio.studio.store.state.rate") == 900
+    page.call("Page.close")
+
+
 WHOLE = "window.studio?.studio?.frames.map?.detail === 'full'"
 WHOLE += (
     " && window.studio.studio.frames.strobe?.data.x.length === 400 && !document.querySelector('.outdated')"

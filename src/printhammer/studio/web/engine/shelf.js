@@ -12,7 +12,7 @@ export async function shelfOf(text) {
   const { names, hammers, modules, limits, vocabulary, version, sentences, stateFile } = content;
   const compiled = modules.map(() => null);
   return {
-    names, hammers, limits, vocabulary, version, sentences, stateFile, noFiles: sentences.files,
+    names, hammers, limits, vocabulary, start: {}, version, sentences, stateFile, noFiles: sentences.files,
     readers: readersOf(limits, vocabulary),
     // State with which the page opens where its address contains none.
     start: {},
