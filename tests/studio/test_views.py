@@ -119,3 +119,22 @@ def test_views_suit_the_device(page: Page) -> None:
     assert "Closings" in page.run(f"{SHOWN}.map((each) => each.ariaLabel)")
     assert page.run("document.querySelector('.view-energy').ariaLabel") == "Energy per closing"
     assert page.run("document.querySelector('#control-line')") is None
+
+
+def test_a_trace_has_offsets_a_name_a_residual_and_an_undo(page: Page) -> None:
+    # The motion itself, 5 um too high and 40 us too late.
+    page.run(
+        f"{{ const {{ store, frames }} = {STUDIO}; const {{ t, x }} = frames.motion.data;"
+        " store.set({ trace: { name: 'scope', t: [...t].map((time) => time + 4e-5),"
+        " values: [...x].map((place) => place + 5e-6), dt: -4e-5, dx: 0 } }); } 1"
+    )
+    residual = "parseFloat(document.querySelector('.residual').textContent.slice(9))"
+    assert page.run(residual) == pytest.approx(5.0, abs=0.01)
+    page.run(f"{STUDIO}.store.set({{ trace: {{ ...{STUDIO}.store.state.trace, dx: -5e-6 }} }}); 1")
+    assert page.run(residual) < 1e-3
+    assert page.run("document.querySelector('.trace [type=text]').value") == "scope"
+    page.run(f"{STUDIO}.undo(); 1")
+    assert page.run(residual) == pytest.approx(5.0, abs=0.01)
+    assert page.run(f"{STUDIO}.overlay.data.t.length") > 100
+    page.run(f"{STUDIO}.undo(); 1")
+    assert page.run(f"{STUDIO}.overlay === null && document.querySelector('.trace').hidden")

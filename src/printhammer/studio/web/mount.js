@@ -195,8 +195,9 @@ export function mount(element, send, address = { read: () => "", write: () => {}
   function lay({ name, data }) {
     const quantity = ["current", "force", "voltage"].find((kind) => kind in data);
     const shown = [];
+    const patch = {};
     if (data.displacement) {
-      studio.overlay = { what: "displacement", name, data: { t: data.t, values: data.displacement } };
+      patch.trace = { name, t: [...data.t], values: [...data.displacement], dt: 0, dx: 0 };
       shown.push("its displacement is laid over the motion");
     }
     if (quantity) {
@@ -205,18 +206,18 @@ export function mount(element, send, address = { read: () => "", write: () => {}
       const begin = data.t.findIndex((time) => time >= 0);
       const waveform = { shape: "sampled", times: [...data.t.slice(begin)], values: [...data[quantity].slice(begin)], quantity };
       // What was measured together is compared with one such pulse.
-      studio.store.set({ waveform, ...(data.displacement ? { pulses: 1, pattern: "" } : {}) });
+      Object.assign(patch, { waveform, ...(data.displacement ? { pulses: 1, pattern: "" } : {}) });
     }
+    studio.store.set(patch);
     studio.notes = `${name}: ${shown.join(", ")}`;
     studio.say(studio.notes);
-    redrawAll();
   }
 
   studio.store.listeners.add((state) => {
     const wanted = state.text || state.hammer;
     if (wanted !== studio.loaded) { load(state, false); return; }
-    // Pins are the page's own.
-    const same = Boolean(before) && Object.keys(state).every((key) => key === "pins" || state[key] === before[key]);
+    // Pins and the trace are the page's own.
+    const same = Boolean(before) && Object.keys(state).every((key) => key === "pins" || key === "trace" || state[key] === before[key]);
     before = state;
     if (!same) {
       if (begun) studio.notes = "";

@@ -10,6 +10,7 @@ import { readoutOf } from "./readout.js";
 import { bare, DEEPEST, VIEWS } from "./state.js";
 import { storyRow } from "./stories.js";
 import { tourOf } from "./tour.js";
+import { traceRow } from "./trace.js";
 import { titleOf, viewsOf } from "./words.js";
 
 const NARROW = 820; // pixels, as in the style sheet
@@ -84,7 +85,7 @@ export function layout(studio, makers) {
   const sheet = make("button", { type: "button", class: "sheet", "aria-expanded": "false", onclick: () => sheet.setAttribute("aria-expanded", String(side.classList.toggle("open"))) }, "Controls");
   const pinned = make("div", { class: "pinned" });
   const side = make("aside", { class: "side", "aria-label": "controls" }, pinned, sheet, controls, hint);
-  const stage = make("div", { class: "stage" }, stories.note, tour.element, pinRow(studio), grid);
+  const stage = make("div", { class: "stage" }, stories.note, tour.element, pinRow(studio), traceRow(studio), grid);
   const page = make("div", { class: "studio" }, bar, side, stage, status, dialog);
   studio.element.classList.add("studio-place");
   studio.element.replaceChildren(page);

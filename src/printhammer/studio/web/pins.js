@@ -47,7 +47,6 @@ export function pinRow(studio) {
     studio.say(`pinned as ${name}, ${pinsOf().length} of ${MOST_PINS}`);
   };
   studio.unpin = () => {
-    studio.overlay = null;
     if (pinsOf().length) studio.store.amend({ pins: [] });
     studio.say("pins taken away");
     redraw();

@@ -80,7 +80,7 @@ export function toText(state) {
 }
 
 /** Return a state without what only the page keeps. */
-export function bare({ pins: _pins, ...state }) { return state; }
+export function bare({ pins: _pins, trace: _trace, ...state }) { return state; }
 
 /** Return the pins of a text; what is none is left out. */
 export function pinsOf(text) {
