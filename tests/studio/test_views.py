@@ -1,13 +1,9 @@
 """The page in a browser: its header, its stories, the map under the finger, views that suit the device."""
 
-from pathlib import Path
 from typing import Any
 
 import pytest
-from printhammer.studio.states.shelf import Shelf
 from tests.studio.browser import Page
-
-from printhammer.studio.live import live_page
 
 pytestmark = pytest.mark.slow
 
@@ -16,24 +12,11 @@ SETTLED = f"{STUDIO}?.frames.map?.detail === 'full' && !{STUDIO}.busy && !docume
 SHOWN = "[...document.querySelectorAll('.panel')].filter((each) => each.checkVisibility())"
 
 
-class Three(Shelf):
-    """A shelf with a print hammer, a textbook ball and a relay."""
-
-    names = ("hendriks-1983", "bouncing-ball", "relay-5v")  # type: ignore[assignment]
-
-
-@pytest.fixture(scope="module")
-def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("views") / "page.html"
-    path.write_text(live_page(Three()), "utf-8")
-    return path
-
-
 @pytest.fixture
-def page(written: Path, opened_browser: Any) -> Any:
+def page(address: str, opened_browser: Any) -> Any:
     opened = opened_browser()
     opened.size(1440, 900)
-    opened.open(written.as_uri())
+    opened.open(f"{address}#hammer=hendriks-1983")
     opened.wait(f"window.studio && {SETTLED}")
     yield opened
     assert opened.complaints == []
@@ -115,10 +98,6 @@ def test_views_suit_the_device(page: Page) -> None:
     captions = page.run(f"{SHOWN}.map((each) => each.querySelector('.caption').textContent).join()")
     for word in ("armature", "dot", "backstop", "paper"):
         assert word not in captions
-    choose(page, "relay-5v")
-    assert "Closings" in page.run(f"{SHOWN}.map((each) => each.ariaLabel)")
-    assert page.run("document.querySelector('.view-energy').ariaLabel") == "Energy per closing"
-    assert page.run("document.querySelector('#control-line')") is None
 
 
 def test_a_trace_has_offsets_a_name_a_residual_and_an_undo(page: Page) -> None:

@@ -10,7 +10,7 @@ export async function begin() {
   const text = (id) => document.getElementById(id).textContent;
   const shelf = await shelfOf(text("content"));
   const start = JSON.parse(text("start"));
-  Object.assign(shelf.start, start.state);
+  shelf.start = start.state ?? {};
   // In a notebook the page has no address of its own; its frame knows the state.
   const framed = location.protocol === "about:";
   let [page, told] = [null, ""];
