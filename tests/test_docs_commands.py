@@ -12,8 +12,7 @@ from typing import Any
 import pytest
 import typer
 
-from printhammer.cli.main import app
-from printhammer.cli.registry import VERBS
+from printhammer.cli.main import VERBS, app
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted(path for path in (ROOT / "docs").rglob("*.md") if "gallery" not in path.parts)

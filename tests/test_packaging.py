@@ -84,6 +84,7 @@ def test_every_direct_requirement_is_locked() -> None:
 def test_importing_the_package_imports_nothing_heavy(tmp_path: Path) -> None:
     assert heavy_after("import printhammer, printhammer.errors", tmp_path) == set()
     assert heavy_after("import numba", tmp_path) >= {"numba", "numpy"}
+    assert "matplotlib" not in heavy_after("import printhammer.figures", tmp_path)
 
 
 def test_help_imports_nothing_heavy(tmp_path: Path) -> None:
@@ -226,7 +227,7 @@ def test_the_commands_of_the_readme_work_elsewhere(elsewhere: Path, tmp_path: Pa
 
 
 def test_the_readme_says_what_holds() -> None:
-    from printhammer.claims.definition import claims
+    from printhammer.claims.judging import claims
     from printhammer.report.reconstruction.results import shipped_results
 
     search = shipped_results().search

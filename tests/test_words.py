@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from printhammer.cli.registry import GROUPS, VERBS
+from printhammer.cli.main import GROUPS, VERBS
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src/printhammer"

@@ -27,8 +27,8 @@ from studies.reconstruction.family.family import family_hammers
 import printhammer as ph
 from printhammer.control.feedback.closed_loop import FeedbackStrategy
 from printhammer.control.feedback.controller import Controller
-from printhammer.control.feedback.estimator.sensor import PositionSensor
 from printhammer.control.feedback.plant import driver_of
+from printhammer.control.feedback.sensor import PositionSensor
 from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.strategy import Strategy, open_loop
 from printhammer.printing.dots.trial import Case, attempt

@@ -150,7 +150,7 @@ def feedback(hammer: ph.Hammer, units: list[ph.Hammer]) -> list[list[Cell]]:
     """Return the results of feedback for a shorter cycle, with its sensor and with a blinded sensor."""
     controller = Controller(hammer, driver_of(hammer))
     slots, rows = slots_of(cycle_with_lead_in(6, 0)), []
-    from printhammer.control.feedback.estimator.sensor import PositionSensor
+    from printhammer.control.feedback.sensor import PositionSensor
 
     for share in SHARES:
         for name, noise in (("feedback", 0.01), ("feedback, sensor blinded", 100.0)):

@@ -36,7 +36,7 @@ from .drive.trains import Burst as Burst
 from .drive.trains import PulseTrain as PulseTrain
 from .drive.trains import SineForce as SineForce
 from .drive.waveforms.base import Waveform as Waveform
-from .drive.waveforms.chain import Chain as Chain
+from .drive.waveforms.shapes import Chain as Chain
 from .errors import InputError as InputError
 from .errors import PrinthammerError as PrinthammerError
 from .hammer.equilibrium import equilibria as equilibria

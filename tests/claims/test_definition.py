@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from printhammer.claims import JUDGES, KINDS, PENDING, claims
-from printhammer.claims.definition import SIDES, within
+from printhammer.claims.judging import SIDES, within
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 NUMBERS = (int, float)

@@ -12,9 +12,8 @@ import pytest
 import typer
 
 import printhammer as ph
-from printhammer.cli.main import app
+from printhammer.cli.main import GROUPS, VERBS, app
 from printhammer.cli.options import Files, read_plain, read_whole
-from printhammer.cli.registry import GROUPS, VERBS
 from printhammer.cli.runner import Verb
 
 NAMES = [verb.name for verb in VERBS]

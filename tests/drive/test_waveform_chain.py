@@ -11,8 +11,16 @@ from tests.errors import refused
 
 from printhammer.drive.file import read_drive
 from printhammer.drive.trains import PulseTrain
-from printhammer.drive.waveforms.chain import TAIL
-from printhammer.drive.waveforms.shapes import SHAPES, Chain, HalfSine, Rectangle, Sine, Trapezoid, Waveform
+from printhammer.drive.waveforms.shapes import (
+    SHAPES,
+    TAIL,
+    Chain,
+    HalfSine,
+    Rectangle,
+    Sine,
+    Trapezoid,
+    Waveform,
+)
 
 PRINT = Rectangle(amplitude=0.9, width=350e-6, rise=1e-5, decay=2.4e-5)
 BRAKE = Trapezoid(amplitude=0.25, rise=0.0, width=2e-4, fall=0.0)

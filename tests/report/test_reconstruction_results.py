@@ -8,8 +8,7 @@ from scipy.stats import binomtest
 from tests.errors import refused
 from tests.report.reconstruction_files import changed, write
 
-from printhammer.report.reconstruction.results import FILES, Results, shipped_results
-from printhammer.report.reconstruction.shares import Share
+from printhammer.report.reconstruction.results import FILES, Results, Share, shipped_results
 
 
 def test_all_that_is_there_is_read(tmp_path: Path) -> None:

@@ -13,8 +13,16 @@ from printhammer.claims import claims
 from printhammer.errors import InputError
 from printhammer.figures import PaperFigure
 from printhammer.report import build, pdf, write_report
-from printhammer.report.contents import cited_figures, distance, misses
-from printhammer.report.quantities import band_text, percent, split_name, typeset, value_text
+from printhammer.report.contents import (
+    band_text,
+    cited_figures,
+    distance,
+    misses,
+    percent,
+    split_name,
+    typeset,
+    value_text,
+)
 from printhammer.report.reconstruction.results import Results
 
 if TYPE_CHECKING:

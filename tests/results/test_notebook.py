@@ -14,7 +14,7 @@ from IPython.core.formatters import DisplayFormatter
 
 import printhammer as ph
 from printhammer.results.declare import MOST_ROWS
-from printhammer.results.rows import Rows
+from printhammer.results.result import Rows
 from printhammer.run.contacts import Contact, Dot
 
 PNG = b"\x89PNG\r\n\x1a\n"

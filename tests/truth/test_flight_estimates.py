@@ -5,8 +5,8 @@ import pytest
 from tests import hammers
 
 import printhammer as ph
-from printhammer.control.feedback.estimator.flight import Expected, Flight, FreeForce, flight_from_samples
-from printhammer.control.feedback.estimator.sensor import Samples
+from printhammer.control.feedback.flight import Expected, Flight, FreeForce, flight_from_samples
+from printhammer.control.feedback.sensor import Samples
 
 
 def expected(touch: float, speed: float, errors: tuple[float, float, float], count: int = 1) -> Expected:

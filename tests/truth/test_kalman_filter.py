@@ -10,14 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests import hammers
 
-from printhammer.control.feedback.estimator.flight import (
+from printhammer.control.feedback.flight import (
     Expected,
     Flight,
     FreeForce,
     flight_from_samples,
     least_squares,
 )
-from printhammer.control.feedback.estimator.sensor import Samples
+from printhammer.control.feedback.sensor import Samples
 from printhammer.hammer.static_force import StaticForce
 
 Array = npt.NDArray[np.float64]

@@ -7,8 +7,17 @@ both.
 from printhammer.claims import bursts, integrators, statics, strobes, verdicts
 from printhammer.claims import pulses as pulses
 from printhammer.claims.context import Context, NotMeasurableError
-from printhammer.claims.definition import KINDS, Claim, claims
-from printhammer.claims.judging import JUDGES, PENDING, JudgedClaim, Measured, judge, judge_all
+from printhammer.claims.judging import (
+    JUDGES,
+    KINDS,
+    PENDING,
+    Claim,
+    JudgedClaim,
+    Measured,
+    claims,
+    judge,
+    judge_all,
+)
 from printhammer.claims.pulses import buzz_search
 
 __all__ = [

@@ -13,8 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from printhammer.claims.context import Context, NotMeasurableError
-from printhammer.claims.definition import Claim, claims
-from printhammer.claims.judging import WHOLE, Measured, measures, spread
+from printhammer.claims.judging import WHOLE, Claim, Measured, claims, measures, spread
 from printhammer.claims.verdicts import panel_name, printed_verdicts
 from printhammer.drive.trains import Drive, PulseTrain
 from printhammer.maps.frequency import TAIL

@@ -8,8 +8,7 @@ from typing import Final
 import numpy as np
 
 from printhammer.claims.context import Context
-from printhammer.claims.definition import Claim
-from printhammer.claims.judging import WHOLE, Measured, measures
+from printhammer.claims.judging import WHOLE, Claim, Measured, measures
 from printhammer.drive.trains import PulseTrain
 from printhammer.hammer.equilibrium import equilibria
 from printhammer.run.motion import Motion

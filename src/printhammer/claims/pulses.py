@@ -12,8 +12,16 @@ from typing import Any
 import numpy as np
 
 from printhammer.claims.context import TAIL, Context, NotMeasurableError
-from printhammer.claims.definition import Claim, claims
-from printhammer.claims.judging import WHOLE, Measured, falling, largest, measures, rank_correlation
+from printhammer.claims.judging import (
+    WHOLE,
+    Claim,
+    Measured,
+    claims,
+    falling,
+    largest,
+    measures,
+    rank_correlation,
+)
 from printhammer.drive.trains import PulseTrain
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.hammer.hammer import Hammer

@@ -10,8 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from printhammer.claims.context import CYCLE, Context, NotMeasurableError
-from printhammer.claims.definition import Claim, claims
-from printhammer.claims.judging import WHOLE, Measured, measures
+from printhammer.claims.judging import WHOLE, Claim, Measured, claims, measures
 from printhammer.drive.trains import PulseTrain
 from printhammer.hammer.equilibrium import equilibria, holding_margin, positive_intervals
 from printhammer.hammer.hammer import Hammer

@@ -7,8 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from printhammer.claims.context import Context
-from printhammer.claims.definition import Claim, claims
-from printhammer.claims.judging import WHOLE, Measured, measures, rank_correlation
+from printhammer.claims.judging import WHOLE, Claim, Measured, claims, measures, rank_correlation
 from printhammer.claims.verdicts import panel_name, printed_verdicts
 from printhammer.support.arrays import FloatArray
 

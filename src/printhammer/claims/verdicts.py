@@ -11,8 +11,7 @@ from printhammer.chaos import Strobe, Verdict, strobes
 from printhammer.chaos.strobe.scan import scan
 from printhammer.chaos.strobe.verdict import LAST
 from printhammer.claims.context import Context
-from printhammer.claims.definition import Claim, claims
-from printhammer.claims.judging import WHOLE, Measured, measures
+from printhammer.claims.judging import WHOLE, Claim, Measured, claims, measures
 from printhammer.hammer.hammer import Hammer
 
 _CHANGE: Final = 1e-5  # Relative change of all constants, far below any tolerance of production; arbitrary

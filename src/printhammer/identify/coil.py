@@ -5,7 +5,7 @@
 Data: columns ``time`` and ``current``, optionally ``voltage``; one shot per file. Without a voltage column
 the hammer's own driver supplies the voltage. The final current determines the resistance, its rise the
 inductance, and the curvature of the rise a shorted turn or saturation; a moving armature adds a back-EMF. The
-errors of the current probe are declared or fitted, see `printhammer.identify.probe`.
+errors of the current probe are declared or fitted, see `printhammer.identify.current`.
 """
 
 from __future__ import annotations
@@ -22,19 +22,21 @@ from printhammer.drive.input import read_number, read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import quantity_of, unknown
-from printhammer.identify.current import Trace, probe_current, read_trace
-from printhammer.identify.least_squares import Law, Parameters
-from printhammer.identify.noise import robust_scale
-from printhammer.identify.probe import (
+from printhammer.identify.current import (
     NOMINAL,
     SIGNS,
     UNITS,
     ProbeError,
+    Trace,
     bounds_of,
     plateaus,
+    probe_current,
     read_probe,
+    read_trace,
     resolution_of,
 )
+from printhammer.identify.least_squares import Law, Parameters
+from printhammer.identify.noise import robust_scale
 from printhammer.identify.result import Fit
 from printhammer.identify.static.assemble import Data, assemble, check_rows, judge, solved, term_p_value
 from printhammer.support.arrays import FloatArray, IntArray

@@ -30,8 +30,7 @@ from printhammer.results import Declared, column, scalar
 from printhammer.results.files import need_for
 from printhammer.support.arrays import FloatArray
 from printhammer.support.tables.columns import Columns
-from printhammer.support.tables.layout import Table, read_layout
-from printhammer.support.tables.names import Heading
+from printhammer.support.tables.layout import Heading, Table, read_layout
 from printhammer.support.tables.readings import Readings, columns_of, readings_of
 from printhammer.units import parse, to_si
 

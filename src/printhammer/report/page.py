@@ -1,26 +1,330 @@
-"""HTML page of a report: one self-contained file."""
+"""HTML page of a report: one self-contained file, with its data as text and positions on scales."""
 
 from __future__ import annotations
 
 import base64
 import json
+import math
 from collections import Counter
+from collections.abc import Iterable
 from importlib.resources import files
 from typing import Any, Final
 
-from printhammer.claims import JudgedClaim
+from printhammer.claims import Claim, JudgedClaim
+from printhammer.claims import claims as every_claim
+from printhammer.claims.verdicts import panel_name, printed_verdicts
 from printhammer.hammer.hammer import Hammer
-from printhammer.report.contents import Report, linked_source
-from printhammer.report.quantities import band_text, percent, split_name, typeset, value_text, words_of
-from printhammer.report.views import (
-    failing_view,
-    family_view,
-    panels_view,
-    predictions_view,
-    rates_view,
-    schemes_view,
-    timings_view,
+from printhammer.report.contents import (
+    Miss,
+    Report,
+    band_text,
+    linked_source,
+    misses,
+    percent,
+    split_name,
+    typeset,
+    value_text,
+    words_of,
 )
+from printhammer.report.reconstruction.results import BestFor, Family, FamilyMember, Share
+
+SAME: Final = 1e-9
+"""Relative difference up to which two constants count as equal; above rounding errors of unit conversion."""
+
+
+def share_view(share: Share, floor: float | None = None) -> dict[str, Any]:
+    """Return a fraction with its interval, as text and as positions in percent of a scale."""
+    low, high = share.interval
+
+    def place(part: float) -> float:
+        if floor is None:
+            return 100.0 * part
+        return 100.0 * (1.0 - math.log10(max(part, floor)) / math.log10(floor))
+
+    return {
+        "share": share,
+        "rate": percent(share.rate),
+        "interval": f"{percent(low)} to {percent(high)}",
+        "dot": f"{place(share.rate):.2f}",
+        "low": f"{place(low):.2f}",
+        "width": f"{place(high) - place(low):.2f}",
+    }
+
+
+def rates_view(report: Report) -> dict[str, Any] | None:
+    """Return the base rates, the rarest first, on a logarithmic axis; None without base rates."""
+    rates = report.reconstruction.base_rates
+    if rates is None:
+        return None
+    shares = [(result, rates.share(result.claim.name)) for result in report.results]
+    known = [(result, share) for result, share in shares if share is not None]
+    # A rate of zero is drawn at the left end.
+    positive = [share.rate or share.interval[1] for _, share in known]
+    decades = max(1, math.ceil(-math.log10(min(positive)) - 1e-12)) if positive else 1
+    floor = 10.0**-decades
+    known.sort(key=lambda entry: entry[1].rate)
+    return {
+        "rates": rates,
+        "rows": [{"result": result, **share_view(share, floor)} for result, share in known],
+        "unknown": [result for result, share in shares if share is None],
+        "ticks": [
+            {"text": percent(10.0**-k), "place": f"{100.0 * (1.0 - k / decades):.2f}"}
+            for k in range(decades, -1, -1)
+        ],
+    }
+
+
+def panels_view(report: Report) -> list[dict[str, Any]]:
+    """Return the panels of Fig. 11: verdict of the paper, computed verdict, fraction of random hammers.
+
+    The fraction counts the random hammers whose computed verdict is that of the paper.
+    """
+    verdicts: list[str] = []
+    for result in report.results:
+        if result.claim.name == "poincare" and result.value is not None:
+            verdicts = result.value["verdicts"]
+    rates = report.reconstruction.base_rates
+    shares = {} if rates is None else rates.panels
+    if not verdicts:
+        return []
+    rows = []
+    for (period, printed), verdict in zip(printed_verdicts().items(), verdicts, strict=True):
+        share = shares.get(panel_name(period))
+        rows.append(
+            {
+                "name": panel_name(period),
+                "printed": printed.replace("-", " "),
+                "found": verdict.replace("-", " "),
+                "same": verdict == printed,
+                "base": None if share is None else share_view(share),
+            }
+        )
+    return rows
+
+
+def schemes_view(report: Report) -> dict[str, Any] | None:
+    """Return the effect of the integrators of 1983; None if the data belong to another hammer."""
+    found = report.reconstruction.schemes
+    if found is None or found.shipped != report.hammer.fingerprint:
+        return None
+    printed = list(printed_verdicts().values())
+    rows = [
+        {
+            "way": way,
+            "panels": [
+                {"text": name.replace("-", " "), "same": name == wanted}
+                for name, wanted in zip(names, printed, strict=True)
+            ],
+            "as_printed": sum(map(str.__eq__, names, printed)),
+        }
+        for way, names in found.panels.items()
+    ]
+    changes = [
+        {
+            **row.model_dump(),
+            "rate": percent(row.share),
+            "interval": "" if row.share_error is None else f"± {percent(row.share_error)}",
+        }
+        for row in found.changes
+    ]
+    return {
+        "found": found,
+        "names": [panel_name(period) for period in printed_verdicts()],
+        "printed": [name.replace("-", " ") for name in printed],
+        "rows": rows,
+        "changes": changes,
+        "family": list(found.family.values()),
+    }
+
+
+def predictions_view(report: Report) -> dict[str, Any] | None:
+    """Return the predictions of the search on the stated claims alone; None without data."""
+    predictions = report.reconstruction.predictions
+    if predictions is None or not report.reconstructed:
+        return None
+    rates = report.reconstruction.base_rates
+    verdicts = {result.claim.name: result for result in report.results}
+    rows = []
+    for name in every_claim():
+        share = predictions.share(name)
+        if share is None or predictions.claims[name].kind == "stated":
+            continue
+        base = None if rates is None else rates.share(name)
+        rows.append(
+            {
+                "name": name,
+                "kind": predictions.claims[name].kind,
+                "result": verdicts.get(name),
+                "base": None if base is None else share_view(base),
+                **share_view(share),
+            }
+        )
+    return {"found": predictions, "rows": rows}
+
+
+def failing_view(report: Report) -> list[dict[str, Any]]:
+    """Return the failing claims, each with its distance from the band, the reason, and the best hammer."""
+    search = report.search
+    rows = []
+    for result in report.results:
+        if result.verdict == "fails":
+            known = None if search is None else search.failing.get(result.claim.name)
+            best = None if known is None else known.best
+            rows.append(
+                {
+                    "result": result,
+                    "misses": misses(result.claim, result.value),
+                    "why": "" if known is None else known.why,
+                    "best": None if best is None else _best_view(best, result.claim, report.hammer),
+                }
+            )
+    return rows
+
+
+def _best_view(best: BestFor, claim: Claim, hammer: Hammer) -> dict[str, Any]:
+    missed = {miss.words: miss for miss in misses(claim, best.value)}
+    lines = []
+    for name, wanted in claim.band.items():
+        words, unit = split_name(name)
+        if name in best.value:
+            miss = missed.get(words)
+            kept = Miss(words, value_text(best.value[name], unit), band_text(wanted, unit), "")
+            lines.append({"miss": miss or kept, "met": miss is None})
+    constants = []
+    for key, value in best.constants.items():
+        constant = hammer.constants.get(key)
+        ratio = value / constant.si if constant is not None and constant.si else None
+        if ratio is None or not math.isclose(ratio, 1.0, rel_tol=SAME):
+            constants.append(
+                {
+                    "key": key,
+                    "value": f"{value:.4g}",
+                    "shipped": "" if constant is None else f"{constant.si:.4g}",
+                    "unit": "" if constant is None else constant.si_unit,
+                    "ratio": "" if ratio is None else f"{ratio:.3g}",
+                }
+            )
+    return {"holds": best.holds, "lines": lines, "constants": constants, "costs": best.costs}
+
+
+def timings_view(report: Report) -> dict[str, Any]:
+    """Return the computation times of figures and claims, s, the slowest first."""
+    entries: list[tuple[str, str, float]] = [
+        (f"Figure {drawing.number}", f"figure-{drawing.number}", drawing.seconds)
+        for drawing in report.drawings
+    ]
+    entries += [(words_of(result.claim.name), result.claim.name, result.seconds) for result in report.results]
+    longest = max((seconds for *_, seconds in entries), default=0.0) or 1.0
+    return {
+        "rows": [
+            {"name": name, "to": to, "seconds": f"{seconds:.2f}", "width": f"{100.0 * seconds / longest:.1f}"}
+            for name, to, seconds in sorted(entries, key=lambda entry: -entry[2])
+        ],
+        "all": f"{report.seconds:.1f}",
+        "figures": f"{sum(drawing.seconds for drawing in report.drawings):.1f}",
+        "claims": f"{sum(result.seconds for result in report.results):.1f}",
+    }
+
+
+_ROOM: Final = 4.0
+"""Margin at each end of a scale, in percent of its length; arbitrary."""
+
+
+def family_view(report: Report) -> dict[str, Any] | None:
+    """Return conclusions, claims, members and constants of the family; None without a family."""
+    family = report.family
+    if family is None:
+        return None
+    names = list(dict.fromkeys(name for member in family.hammers for name in member.conclusions))
+    return {
+        "conclusions": _conclusions(family),
+        "claims": _claims(family),
+        "heads": [split_name(name)[0] for name in names],
+        "members": [_member(member, names) for member in family.hammers],
+        "panels": len(printed_verdicts()),
+        "spread": _spread(family, report.hammer),
+    }
+
+
+def _conclusions(family: Family) -> list[dict[str, Any]]:
+    """Return the conclusions, those that hold for all hammers first."""
+    rows = []
+    for name, conclusion in family.conclusions.items():
+        words, unit = split_name(name)
+        values = [member.conclusions.get(name) for member in family.hammers]
+        # Statements have no value per member; their range is that of margins, of no interest to readers.
+        is_statement = not any(name in member.conclusions for member in family.hammers)
+        ends = ("", "") if is_statement else (conclusion.low, conclusion.high)
+        low, high = (value_text(end, unit, other=False) for end in ends)
+        dots = _dots([value for value in values if value is not None])
+        rows.append(
+            {"words": words, "low": low, "high": high, "dots": dots}
+            | {"robust": conclusion.robust, "text": conclusion.text}
+        )
+    return sorted(rows, key=lambda row: not row["robust"])
+
+
+def _dots(values: Iterable[float], ends: tuple[float, float] | None = None) -> list[str]:
+    """Return positions on a scale, in percent, linear between the smallest and the largest value."""
+    values = list(values)
+    low, high = ends or (min(values, default=0.0), max(values, default=0.0))
+    span = high - low
+    return [f"{_ROOM + (100.0 - 2.0 * _ROOM) * ((v - low) / span if span else 0.5):.2f}" for v in values]
+
+
+def _member(member: FamilyMember, names: list[str]) -> dict[str, Any]:
+    """Return a hammer with its verdicts and consequences."""
+    kinds = {name: claim.kind for name, claim in every_claim().items()}
+    verdicts = list(member.verdicts.values())
+    stated = [verdict for name, verdict in member.verdicts.items() if kinds[name] == "stated"]
+    return {
+        "name": member.name,
+        "stated": f"{stated.count('holds')} of {len(stated)}",
+        "all": f"{verdicts.count('holds')} of {len(verdicts)}",
+        "panels": member.panels,
+        "values": [
+            value_text(member.conclusions.get(name), split_name(name)[1], other=False) for name in names
+        ],
+    }
+
+
+def _spread(family: Family, hammer: Hammer) -> dict[str, Any]:
+    """Return the constants relative to those of the shipped hammer, on a logarithmic axis."""
+    ratios: dict[str, list[float]] = {}
+    for key, constant in hammer.constants.items():
+        values = [member.constants[key] for member in family.hammers if key in member.constants]
+        if values and all(value * constant.si > 0.0 for value in values):
+            ratios[key] = [value / constant.si for value in values]
+    moved = {key: many for key, many in ratios.items() if any(abs(ratio - 1.0) > SAME for ratio in many)}
+    widest = max((abs(math.log(ratio)) for many in moved.values() for ratio in many), default=1.0)
+    return {
+        "rows": [
+            {
+                "key": key,
+                "low": f"{min(many):.3g}",
+                "high": f"{max(many):.3g}",
+                "dots": _dots([math.log(ratio) for ratio in many], (-widest, widest)),
+            }
+            for key, many in moved.items()
+        ],
+        "same": [key for key in ratios if key not in moved],
+        "ends": (f"{math.exp(-widest):.2g}", f"{math.exp(widest):.2g}"),
+    }
+
+
+def _claims(family: Family) -> dict[str, Any]:
+    """Return the claims that hold for all hammers, for some, and for none."""
+    counts = {}
+    for name in every_claim():
+        verdicts = [member.verdicts[name] for member in family.hammers if name in member.verdicts]
+        if verdicts:
+            counts[name] = (verdicts.count("holds"), len(verdicts))
+    return {
+        "every": [name for name, (holds, count) in counts.items() if holds == count],
+        "some": [(name, holds, count) for name, (holds, count) in counts.items() if 0 < holds < count],
+        "none": [name for name, (holds, _) in counts.items() if not holds],
+    }
+
 
 KINDS: Final = {
     "stated": "the paper prints the number or the verdict; the band is the printed precision",

@@ -14,10 +14,9 @@ from typing import Any
 
 from printhammer.claims import JudgedClaim
 from printhammer.errors import missing_extra
-from printhammer.report.contents import Report
+from printhammer.report.contents import Report, percent, typeset
 from printhammer.report.page import view
-from printhammer.report.quantities import percent, typeset
-from printhammer.report.reconstruction.shares import Share
+from printhammer.report.reconstruction.results import Share
 from printhammer.support.constants import Constant
 from printhammer.support.files import write_file
 

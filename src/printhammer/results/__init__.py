@@ -3,8 +3,7 @@
 from printhammer.results.declare import Column, Declared, column, coordinate, derived, part, scalar
 from printhammer.results.files import ENDINGS, Reopened, reopen, save_dataset
 from printhammer.results.provenance import KEYS, provenance
-from printhammer.results.result import RESULTS, Result
-from printhammer.results.rows import Rows
+from printhammer.results.result import RESULTS, Result, Rows
 from printhammer.results.summary import Cells, Facts, Grid, Summary
 
 __all__ = [

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from printhammer.chaos.strobe.scan import scan
 from printhammer.claims import Context
 from printhammer.claims.context import NotMeasurableError
-from printhammer.claims.definition import claims
-from printhammer.claims.judging import spread
+from printhammer.claims.judging import claims, spread
 from printhammer.drive.trains import PulseTrain
 from printhammer.printing.dots.nominal import SinglePulse
 from printhammer.printing.dots.settling import SETTLED, rebounds

@@ -17,8 +17,7 @@ import numpy as np
 
 from printhammer.claims import Context
 from printhammer.claims.context import NotMeasurableError
-from printhammer.claims.definition import claims
-from printhammer.claims.judging import judge
+from printhammer.claims.judging import claims, judge
 from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
 from printhammer.report.reconstruction.results import (

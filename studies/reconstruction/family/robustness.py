@@ -12,8 +12,7 @@ import math
 from statistics import median
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.claims.definition import claims
-from printhammer.claims.judging import rank_correlation
+from printhammer.claims.judging import claims, rank_correlation
 from printhammer.results import Declared, part
 from studies.reconstruction.family.conclusions import QUANTITIES
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from printhammer.claims.definition import claims
+from printhammer.claims.judging import claims
 from printhammer.errors import InputError
 from printhammer.results import Result, column, coordinate, scalar
 from studies.reconstruction.judging.judged import FIGURE_11, STATED

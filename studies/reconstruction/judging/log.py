@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from printhammer.claims.definition import claims
+from printhammer.claims.judging import claims
 from printhammer.errors import InputError
 from printhammer.support.constants import shown
 from studies.reconstruction.judging.judged import text_of

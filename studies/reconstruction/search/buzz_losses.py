@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.claims.definition import claims
+from printhammer.claims.judging import claims
 from printhammer.drive.trains import PulseTrain
 from printhammer.printing.dots.buzz import PATIENCE, delayed_trains
 from studies.reconstruction.search.candidates import TOLERANCE

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.claims.definition import claims
+from printhammer.claims.judging import claims
 from printhammer.claims.strobes import window
 from printhammer.claims.verdicts import printed_verdicts
 from printhammer.drive.trains import PulseTrain

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.claims.context import TAIL
-from printhammer.claims.definition import claims
-from printhammer.claims.judging import rank_correlation
+from printhammer.claims.judging import claims, rank_correlation
 from printhammer.claims.pulses import half_rise
 from printhammer.drive.trains import PulseTrain
 from printhammer.hammer.equilibrium import holding_margin

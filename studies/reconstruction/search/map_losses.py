@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.claims.bursts import erratic_pairs, erratic_share, rates_of
-from printhammer.claims.definition import claims
-from printhammer.claims.judging import spread
+from printhammer.claims.judging import claims, spread
 from printhammer.drive.trains import PulseTrain
 from printhammer.maps.frequency import TAIL
 from studies.reconstruction.search.losses import hinge, run_all

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.chaos.strobe.verdict import repeats
-from printhammer.claims.definition import claims
+from printhammer.claims.judging import claims
 from printhammer.claims.verdicts import printed_verdicts
 from printhammer.drive.trains import PulseTrain
 from printhammer.run.ensemble import Ensemble

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 
-from printhammer.claims.definition import claims
+from printhammer.claims.judging import claims
 from printhammer.hammer.hammer import Hammer, load
 from printhammer.units import to_si
 

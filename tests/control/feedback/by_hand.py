@@ -4,8 +4,8 @@ import numpy as np
 
 import printhammer as ph
 from printhammer.control.feedback.comparison import BURST, Feedback, ObservedRun
-from printhammer.control.feedback.estimator.sensor import PositionSensor
 from printhammer.control.feedback.plant import driver_of
+from printhammer.control.feedback.sensor import PositionSensor
 from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import nominal
 

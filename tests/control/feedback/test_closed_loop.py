@@ -12,9 +12,8 @@ from tests.control.feedback import coarse
 import printhammer as ph
 from printhammer.control.feedback.closed_loop import FeedbackStrategy
 from printhammer.control.feedback.controller import Controller
-from printhammer.control.feedback.estimator.sensor import PositionSensor
-from printhammer.control.feedback.loop import FRONT_ERROR, SCALE_ERROR, Loop
-from printhammer.control.feedback.plant import Driver
+from printhammer.control.feedback.plant import FRONT_ERROR, SCALE_ERROR, Driver, Loop
+from printhammer.control.feedback.sensor import PositionSensor
 from printhammer.printing.rates.variability import Perturbation, perturbed
 
 PERFECT = PositionSensor(noise=0.0, step=0.0)

@@ -13,12 +13,11 @@ from printhammer.cli.main import main
 from printhammer.control.feedback.closed_loop import FeedbackStrategy
 from printhammer.control.feedback.comparison import Feedback
 from printhammer.control.feedback.controller import Controller
-from printhammer.control.feedback.estimator.sensor import PositionSensor
-from printhammer.control.feedback.loop import FRONT_ERROR, SCALE_ERROR
-from printhammer.control.feedback.plant import driver_of
+from printhammer.control.feedback.plant import FRONT_ERROR, SCALE_ERROR, driver_of
+from printhammer.control.feedback.sensor import PositionSensor
 from printhammer.drive.file import read_drive
 from printhammer.printing.dots.judging import Limits
-from printhammer.printing.dots.pieces import simulate_pieces
+from printhammer.printing.dots.paper import simulate_pieces
 from printhammer.printing.dots.strategy import eight_slot_patterns, slot_times, slots_of
 from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.variability import Perturbation, perturbed

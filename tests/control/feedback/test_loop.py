@@ -6,16 +6,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from printhammer.control.feedback.controller import _current, _steps
-from printhammer.control.feedback.loop import (
+from printhammer.control.feedback.plant import (
     APART,
     FRONT_ERROR,
     REMEMBERED,
     SCALE_ERROR,
+    Driver,
     Learned,
     Loop,
     Pulse,
 )
-from printhammer.control.feedback.plant import Driver
 
 DRIVER = Driver(2.0, 6e-6)
 LEVELS = st.sampled_from([-2.0, -0.8, 0.0, 2.0])

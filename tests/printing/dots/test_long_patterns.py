@@ -1,7 +1,6 @@
 import string
 
-from printhammer.printing.dots.long_patterns import KINDS, TEXT, long_patterns, row_of_dots
-from printhammer.printing.dots.strategy import LEAD_IN
+from printhammer.printing.dots.strategy import KINDS, LEAD_IN, TEXT, long_patterns, row_of_dots
 
 
 def test_kinds_follow_each_other_and_only_the_cycle_has_a_lead_in() -> None:

@@ -8,7 +8,7 @@ from tests.errors import refused
 from tests.hammers import crude
 
 import printhammer as ph
-from printhammer.printing.dots.pieces import simulate_pieces
+from printhammer.printing.dots.paper import simulate_pieces
 from printhammer.printing.dots.strategy import slots_of
 
 PITCH = 4e-4

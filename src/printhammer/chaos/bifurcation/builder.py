@@ -37,8 +37,15 @@ from printhammer.chaos.bifurcation.columns import (
     scales_of_columns,
     state_or_rest,
 )
-from printhammer.chaos.strobe.resting import exact_cycle, rests_of
-from printhammer.chaos.strobe.train import FINER, LONG_CYCLE, State, exponents_onward, is_memoryless
+from printhammer.chaos.strobe.train import (
+    FINER,
+    LONG_CYCLE,
+    State,
+    exact_cycle,
+    exponents_onward,
+    is_memoryless,
+    rests_of,
+)
 from printhammer.run.effort import Effort
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray

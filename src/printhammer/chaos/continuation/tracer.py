@@ -22,7 +22,7 @@ from printhammer.chaos.continuation.branch_points import (
 from printhammer.chaos.continuation.crossings import follow_crossing
 from printhammer.chaos.continuation.family import Passage, RegimeFamily, has_rigid_backstop
 from printhammer.chaos.continuation.fixed_points import Corrector, Node
-from printhammer.chaos.continuation.grazing_ends import fades, grazing_end
+from printhammer.chaos.continuation.flights import fades, grazing_end
 from printhammer.chaos.strobe.map import mirror_image, quiet_section, state_later
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError

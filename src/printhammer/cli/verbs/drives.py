@@ -162,7 +162,7 @@ def feedback(
     The exit status is 1 if a pattern exceeds the limits with feedback.
     """
     from printhammer.control.feedback.comparison import feedback as compared
-    from printhammer.control.feedback.estimator.sensor import PositionSensor
+    from printhammer.control.feedback.sensor import PositionSensor
     from printhammer.control.table.compensation import TableStrategy, load_table
     from printhammer.drive.file import save_drive
     from printhammer.drive.input import read_positive

@@ -13,8 +13,8 @@ from typing import ClassVar, Final, NamedTuple
 import numpy as np
 
 from printhammer.control.feedback.controller import CONTACT, LEADS, WINDOW, Controller
-from printhammer.control.feedback.estimator.sensor import PositionSensor, Samples, run_key
-from printhammer.control.feedback.loop import Loop
+from printhammer.control.feedback.plant import Loop
+from printhammer.control.feedback.sensor import PositionSensor, Samples, run_key
 from printhammer.drive.sequence import PulseSequence
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.hammer.hammer import Hammer

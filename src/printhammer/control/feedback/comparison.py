@@ -18,9 +18,9 @@ import numpy.typing as npt
 
 from printhammer.control.feedback.closed_loop import FeedbackStrategy
 from printhammer.control.feedback.controller import Controller
-from printhammer.control.feedback.estimator.sensor import PositionSensor
 from printhammer.control.feedback.plant import Driver, driver_of
 from printhammer.control.feedback.policy import OFFSETS, STEPS
+from printhammer.control.feedback.sensor import PositionSensor
 from printhammer.control.pulses import current_bound
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError

@@ -14,12 +14,9 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from printhammer.control.feedback.estimator.adaptation import Contacts
-from printhammer.control.feedback.estimator.flight import Expected, FreeForce, flight_from_samples
-from printhammer.control.feedback.estimator.sensor import Samples
+from printhammer.control.feedback.flight import Contacts, Expected, FreeForce, flight_from_samples
 from printhammer.control.feedback.impact_map import ALWAYS, FREE, PUSHED, blend_known, force_map
-from printhammer.control.feedback.loop import APART, REMEMBERED, Loop, Printed, Pulse, Touched
-from printhammer.control.feedback.plant import Driver, Plant
+from printhammer.control.feedback.plant import APART, REMEMBERED, Driver, Loop, Plant, Printed, Pulse, Touched
 from printhammer.control.feedback.policy import (
     KNOWN,
     Choice,
@@ -29,6 +26,7 @@ from printhammer.control.feedback.policy import (
     between_fronts,
     fronts,
 )
+from printhammer.control.feedback.sensor import Samples
 from printhammer.control.feedback.soft_landing import launch
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer

@@ -1,12 +1,13 @@
-"""The plant: the nominal hammer with the driver of its coil, and simulations of drives.
+"""The plant: the nominal hammer with the driver of its coil, simulations of drives, and the state of a run.
 
-The driver switches the coil between currents of either sign.
+The driver switches the coil between currents of either sign. A `Loop` is the state of one closed-loop run:
+firings, motion, and the controller's estimates and plan.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Final, cast
 
@@ -22,7 +23,7 @@ from printhammer.printing.dots.nominal import Nominal, pulse_of
 from printhammer.printing.rates.variability import Perturbation, perturbed
 from printhammer.results import Declared, scalar
 from printhammer.run.ensemble import DISPLAY_TOLERANCE, DotTable, Ensemble, Strobes
-from printhammer.support.arrays import BoolArray
+from printhammer.support.arrays import BoolArray, FloatArray
 from printhammer.support.threads import Progress
 
 
@@ -129,3 +130,134 @@ def driver_of(hammer: Hammer, current: float = LARGEST_CURRENT, edge: float | No
         )
     own = max(float(getattr(pulse, "decay", STANDARD)), FASTEST)
     return Driver(current, own if edge is None else edge)
+
+
+REMEMBERED: Final = 4  # Number of the latest pulses whose currents may not have decayed
+APART: Final = 1e-9  # Shortest time between two switchings, s
+# Prior standard deviation of the front, as a fraction of the stroke
+FRONT_ERROR: Final = 0.04
+SCALE_ERROR: Final = 0.03  # Prior standard deviation of the current scale
+# Standard deviations of the random walk per decision (process noise)
+_FRONT_DRIFT: Final = 0.002
+_SCALE_DRIFT: Final = 0.002
+_FARTHEST: Final = 5.0  # Prior standard deviations from nominal beyond which an estimate is rejected
+
+
+@dataclass
+class Pulse:
+    """One firing and the current switchings decided so far.
+
+    The command changes to `levels`, A, at the times `at`, s.
+    """
+
+    fired: float
+    at: list[float] = field(default_factory=list)
+    levels: list[float] = field(default_factory=list)
+
+    def switch(self, time: float, level: float) -> None:
+        """Append a switching, at least `APART` after the previous one."""
+        self.at.append(max(time, self.at[-1] + APART) if self.at else time)
+        self.levels.append(level)
+
+    def waveform(self, edge: float) -> Switched:
+        """Return the pulse as a waveform with the time constant `edge`, s."""
+        return Switched(at=tuple(t - self.fired for t in self.at), levels=tuple(self.levels), edge=edge)
+
+
+@dataclass
+class Learned:
+    """Estimates of a driven hammer: means and standard deviations.
+
+    `front` is the distance by which the front of the pack is farther away than nominal, as a fraction of the
+    stroke; `scale` is the relative deviation of all currents from nominal.
+    """
+
+    front: float = 0.0
+    front_error: float = FRONT_ERROR
+    scale: float = 0.0
+    scale_error: float = SCALE_ERROR
+
+    def drift(self) -> None:
+        """Add the process noise to the standard deviations of front and scale, up to their prior values."""
+        self.front_error = float(min(np.hypot(self.front_error, _FRONT_DRIFT), FRONT_ERROR))
+        self.scale_error = float(min(np.hypot(self.scale_error, _SCALE_DRIFT), SCALE_ERROR))
+
+    def take_scale(self, scale: float, variance: float) -> None:
+        """Adopt an estimate of the scale with its variance, unless it is implausible."""
+        if abs(scale) <= _FARTHEST * SCALE_ERROR and variance > 0.0:
+            self.scale, self.scale_error = scale, float(np.sqrt(variance))
+
+    def take_front(self, front: float, variance: float) -> None:
+        """Adopt an estimate of the front with its variance, unless it is implausible."""
+        if abs(front) <= _FARTHEST * FRONT_ERROR and variance > 0.0:
+            self.front, self.front_error = front, float(np.sqrt(variance))
+
+
+@dataclass
+class Touched:
+    """Contact with the pack, from which the position of the pack's front is estimated.
+
+    `start` is before and `end` after the contact, s. At the start, `state` holds displacement, m, speed, m/s,
+    and current scale, and `covariance`, shape (3, 3), their covariances.
+    """
+
+    start: float
+    end: float
+    state: FloatArray
+    covariance: FloatArray
+
+
+@dataclass(frozen=True)
+class Printed:
+    """Contact as predicted when its pulse was chosen, before its samples corrected the estimated front."""
+
+    # Time, s, speed, m/s, and kind of the touch
+    touch: float
+    speed: float
+    kind: int
+    front: float  # Distance of the front beyond nominal, estimated at that time, as a fraction of the stroke
+    # Force relative to the single pulse, and its derivative with respect to the distance of the front
+    force: float
+    slope: float
+    back: float  # Return current, A
+
+
+@dataclass
+class Loop:
+    """State of one closed-loop run: pattern, firings, motion, estimates and plan."""
+
+    slots: tuple[int, ...]  # Indices of the slots with a dot
+    due: FloatArray  # Requested touch times, s, (dots,)
+    key: int  # Key of the sensor noise of this run
+    state: FloatArray  # Displacement, m, velocity, m/s, mode, memory, (4,)
+    pulses: list[Pulse] = field(default_factory=list)  # All firings decided up to now
+    # Expected coming touch: time, s, speed, m/s, and kind
+    touch: float = 0.0
+    speed: float = 0.0
+    kind: int = 0
+    since: float = 0.0  # Time from which on the armature is in free flight, s
+    time: float = 0.0  # Time that the simulation has reached, s
+    alive: bool = True  # Whether the simulation continues
+    launched: bool = True  # Whether the coming touch follows a launch from rest
+    rests: bool = False  # Whether the armature comes to rest and has not been launched yet
+    learned: Learned = field(default_factory=Learned)  # Estimates of the driven hammer
+    touched: Touched | None = None  # Latest touch, from which the front is estimated
+    # Latest touch, if the throw after it is decided again when the contact is over
+    printed: Printed | None = None
+    # Sensor readings used at each decision: times, s, and displacements, m
+    seen: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
+    # Estimated time, s, and speed, m/s, of each touch
+    touches: list[tuple[float, float]] = field(default_factory=list)
+
+    def wait(self, dot: int) -> float:
+        """Return the time from a dot to the next one, s; infinite after the last."""
+        return float(self.due[dot + 1] - self.due[dot]) if dot + 1 < len(self.due) else np.inf
+
+    def drive(self, edge: float) -> PulseSequence:
+        """Return the drive that consists of all firings decided up to now."""
+        return PulseSequence([pulse.waveform(edge) for pulse in self.pulses], [p.fired for p in self.pulses])
+
+    def recent(self, driver: Driver) -> BoundedSequence:
+        """Return the drive of the latest pulses: those whose currents may still flow."""
+        pulses = self.pulses[-REMEMBERED:]
+        return driver.drive([pulse.waveform(driver.edge) for pulse in pulses], [p.fired for p in pulses])

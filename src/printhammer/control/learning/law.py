@@ -46,9 +46,15 @@ from printhammer.control.table.tuning import tune
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
-from printhammer.printing.dots.long_patterns import STEPS, row_of_dots
 from printhammer.printing.dots.nominal import nominal
-from printhammer.printing.dots.strategy import LEAD_IN, SLOTS, cycle_with_lead_in, slots_of
+from printhammer.printing.dots.strategy import (
+    LEAD_IN,
+    SLOTS,
+    STEPS,
+    cycle_with_lead_in,
+    row_of_dots,
+    slots_of,
+)
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 from printhammer.support.threads import together
 

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from printhammer.control.least_work.descent import (
+from printhammer.control.least_work.search import (
     ARRIVAL,
     LOST,
     best_of,

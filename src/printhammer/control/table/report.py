@@ -12,9 +12,8 @@ from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Limits
-from printhammer.printing.dots.long_patterns import KINDS, long_patterns
 from printhammer.printing.dots.nominal import Nominal, nominal
-from printhammer.printing.dots.strategy import Strategy, open_loop, slots_of
+from printhammer.printing.dots.strategy import KINDS, Strategy, long_patterns, open_loop, slots_of
 from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.safe_rate import from_rest, multipliers
 from printhammer.printing.rates.variability import Perturbation, perturbed

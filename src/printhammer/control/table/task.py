@@ -11,8 +11,7 @@ import numpy as np
 
 from printhammer.control.table.drive import fading
 from printhammer.drive.trains import Drive, PulseTrain
-from printhammer.drive.waveforms.chain import TAIL
-from printhammer.drive.waveforms.shapes import Waveform
+from printhammer.drive.waveforms.shapes import TAIL, Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.hammer.hammer import Hammer

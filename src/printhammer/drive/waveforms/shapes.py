@@ -1,21 +1,156 @@
-"""Shapes of a current or force pulse.
+"""Shapes of a current or force pulse, and chains of pulses.
 
 The paper gives no formula for its current pulse. The four shapes in this module are those of common hammer
 drivers: a half sine, a rectangle whose current rises and decays with the time constant L/R of a coil, a
 trapezoid, and a measured record. `SHAPES` maps the name in a file to the class.
+
+A `Chain` is composed of consecutive waveforms, such as a print pulse and a later brake pulse.
 """
 
 from __future__ import annotations
 
-from typing import ClassVar, Final, Self
+import math
+from typing import Any, ClassVar, Final, Self
+
+import numpy as np
+from pydantic import model_validator
 
 from printhammer.drive import tables
+from printhammer.drive.input import read_number
+from printhammer.drive.segments import evaluate, largest, table
 from printhammer.drive.tables import DECAY_TIMES
-from printhammer.drive.waveforms.base import QUANTITY_UNITS, QuantityName, Waveform
-from printhammer.drive.waveforms.chain import Chain
+from printhammer.drive.waveforms.base import QUANTITY_UNITS, QuantityName, Supply, Waveform
 from printhammer.drive.waveforms.drivers import DRIVERS, Switched
 from printhammer.drive.waveforms.sampled import Sampled
+from printhammer.errors import InputError
+from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import quantity
+
+TAIL: Final = 1e-3
+"""Largest remainder of a decaying waveform that the next one may cut off, as a fraction of its peak."""
+
+_SAMPLES: Final = 257  # Samples of the remaining waveform; arbitrary
+_ROUNDING: Final = 1e-14  # Relative difference of times that counts as rounding
+
+
+class Chain(Waveform):
+    """Several consecutive waveforms in one firing, each at an offset; the drive is zero between them.
+
+    `parts` holds pairs of the offset, s or a string with a unit, and the waveform, in ascending order; all
+    are currents or all are forces. A part may begin once the part before has ended or decayed to `TAIL` of
+    its peak; the remainder is cut off. The edges of a part lie at the rounded sums of offset and edge.
+    """
+
+    shape: ClassVar[str] = "chain"
+    parts: tuple[tuple[float, Waveform], ...]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_parts(cls, data: Any) -> Any:
+        """Validate the parts one by one; the chain drives the same quantity as its parts."""
+        if not isinstance(data, dict) or "parts" not in data:
+            return data
+        parts = _validate(data["parts"])
+        driven = parts[0][1].quantity
+        if data.get("quantity", driven) != driven:
+            raise InputError.of("quantity", data["quantity"], f"that of the parts, {driven!r}")
+        return {**data, "parts": parts, "quantity": driven}
+
+    @property
+    def replaces(self) -> bool:
+        """Whether the parts belong to a driver, which has a single output stage."""
+        return self.parts[0][1].replaces
+
+    @property
+    def support(self) -> float:
+        """Time from the firing to the end of the last part, s; the current in a coil may last longer."""
+        offset, last = self.parts[-1]
+        return offset + last.support
+
+    def supply(self) -> Supply:
+        """Return the supply of the first waveform of the chain."""
+        return self.parts[0][1].supply()
+
+    def segments(self) -> FloatArray:
+        """Return the segment tables of the parts in sequence, with zeros in between."""
+        rows: list[tuple[float, ...]] = []
+        for offset, part in self.parts:
+            own = [tuple(float(number) for number in row) for row in part.segments()]
+            while rows and offset <= rows[-1][0]:
+                # The remainder of the previous part is cut off here.
+                rows.pop()
+            rows += [(offset + start, *rest) for start, *rest in own]
+        return table(rows[:-1], rows[-1][0])
+
+    def scaled(self, factor: float) -> Self:
+        """Return a copy with all parts scaled by `factor`."""
+        return type(self)(parts=tuple((offset, part.scaled(factor)) for offset, part in self.parts))
+
+
+def _validate(parts: object) -> tuple[tuple[float, Waveform], ...]:
+    """Return the validated offsets, s, and waveforms; each begins after the previous one is over."""
+    try:
+        pairs = [tuple(pair) for pair in parts]  # type: ignore[attr-defined]
+    except TypeError:
+        pairs = []
+    if not pairs or any(len(pair) != 2 for pair in pairs):
+        raise InputError.of("parts", parts, "pairs of an offset and a waveform")
+    checked: list[tuple[float, Waveform]] = []
+    for number, (begin, waveform) in enumerate(pairs):
+        if not isinstance(waveform, Waveform):
+            raise InputError(f"parts[{number}]: {waveform!r}", expected="a waveform", key=f"parts[{number}]")
+        if waveform.quantity != pairs[0][1].quantity:
+            raise InputError(
+                f"parts[{number}] is a {waveform.quantity}",
+                key=f"parts[{number}]",
+                expected=f"a {pairs[0][1].quantity} like the first",
+            )
+        if not math.isfinite(waveform.support):
+            raise InputError(
+                f"parts[{number}] is a {waveform.shape}",
+                key=f"parts[{number}]",
+                expected="a waveform that ends",
+            )
+        offset = _offset(begin, number)
+        if not (_is_over(*checked[-1], offset) if checked else offset >= 0.0):
+            sooner = f"parts[{number - 1}] is over" if checked else "the firing"
+            raise InputError(
+                f"parts[{number}] begins at {offset:.9g} s",
+                key=f"parts[{number}]",
+                value=offset,
+                expected=f"a time not before {sooner}",
+            )
+        checked.append((offset, waveform))
+    return tuple(checked)
+
+
+def _is_over(begun: float, waveform: Waveform, time: float) -> bool:
+    """Whether a waveform that began at `begun`, s, has ended or decayed to its tail by `time`, s."""
+    segments = waveform.segments()
+    # The circuit of the coil remains after the supply of a driver ends.
+    end = waveform.support
+    # Rounding may place the end slightly after the beginning of the next part.
+    if time >= begun + end or math.isclose(time, begun + end, rel_tol=_ROUNDING):
+        return True
+    if time <= begun or waveform.replaces:
+        return False
+    edges, tau = segments[:, 0], time - begun
+    times = np.concatenate([np.linspace(tau, end, _SAMPLES), edges[edges > tau]])
+    return bool(np.abs(evaluate(segments, times)).max() <= TAIL * largest(segments))
+
+
+def _offset(written: object, number: int) -> float:
+    """Parse the offset of a part: a number in s, or a string with a unit."""
+    if isinstance(written, str):
+        return read_number(written, "s", f"parts[{number}]")
+    if isinstance(written, bool) or not isinstance(written, float | int) or not math.isfinite(written):
+        raise InputError(
+            f"parts[{number}]: offset {written!r}",
+            expected="a finite number in s",
+            key=f"parts[{number}]",
+        )
+    return float(written)
+
 
 __all__ = [
     "DECAY_TIMES",

@@ -11,13 +11,15 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from functools import wraps
 from textwrap import wrap
-from typing import Any, Final, Literal, ParamSpec
-
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING, Any, Final, Literal, ParamSpec
 
 from printhammer.hammer.hammer import Hammer
 from printhammer.results.summary import worded
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 
 _P = ParamSpec("_P")
 _Layout = Literal["constrained", "none"]

@@ -14,7 +14,7 @@ from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.nominal import pulse_of
-from printhammer.printing.dots.pieces import PiecewiseMotion
+from printhammer.printing.dots.paper import PiecewiseMotion
 from printhammer.results import Declared, part, scalar
 from printhammer.run.contacts import Contact
 from printhammer.run.motion import Motion

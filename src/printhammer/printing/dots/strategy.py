@@ -1,14 +1,19 @@
-"""Drive strategies: functions that map a requested dot pattern to a drive.
+"""Drive strategies, which map a requested dot pattern to a drive, and long test patterns for drives.
 
 The open loop is defined here; compensation tables and feedback are strategies too. A pattern is a row of
 slots, one period apart in time, each with or without a requested dot.
+
+The long test patterns are the de Bruijn cycle, rows of dots, and a line of text. The cycle holds every word
+of eight slots, but at most eight dots in a row. An error may grow from dot to dot and show only in a longer
+row, so rows have 200 slots, with a dot in every slot, every second or every third. The text holds all letters
+and digits in the built-in font, one pattern per wire of the head.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from typing import Final, Protocol
+from typing import Final, Literal, NamedTuple, Protocol, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +23,7 @@ from printhammer.drive.trains import Drive
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
+from printhammer.printing.dots.lettering import lettered
 from printhammer.printing.dots.nominal import pulse_of
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
@@ -161,3 +167,41 @@ def name_of(strategy: Strategy) -> str:
     """Return the name of a drive strategy, such as "open loop"."""
     name = getattr(strategy, "name", None) or getattr(strategy, "__name__", type(strategy).__name__)
     return str(name).replace("_", " ")
+
+
+ROW: Final = 200  # Number of slots of a row of dots
+
+STEPS: Final = (1, 2, 3)  # Slots from one dot to the next in the rows
+
+TEXT: Final = "Pack my box with five dozen liquor jugs 0123456789"
+"""The line of text: every letter of the alphabet and every digit."""
+
+Kind = Literal["cycle", "row", "text"]
+KINDS: Final = get_args(Kind)
+
+
+class LongPattern(NamedTuple):
+    """A long test pattern: its kind, the slots of its dots, and the first slot that is evaluated."""
+
+    kind: Kind
+    slots: tuple[int, ...]
+    judged_from: int = 0
+
+
+def row_of_dots(step: int = 1) -> tuple[int, ...]:
+    """Return the slots with a dot in a row of `ROW` slots, of which every `step`-th slot has a dot."""
+    return tuple(range(0, ROW, step))
+
+
+@cache
+def long_patterns() -> tuple[LongPattern, ...]:
+    """Return the long test patterns: cycle with lead-in, rows, and the line of text, one pattern per wire.
+
+    Patterns of the same kind are consecutive.
+    """
+    wires = [slots_of(wire) for wire in lettered(TEXT, columns=len(TEXT))[0]]
+    return (
+        LongPattern("cycle", slots_of(cycle_with_lead_in()), LEAD_IN),
+        *(LongPattern("row", row_of_dots(step)) for step in STEPS),
+        *(LongPattern("text", slots) for slots in wires if slots),
+    )

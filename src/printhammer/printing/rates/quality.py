@@ -16,8 +16,7 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import DOT_MATRIX_SPREAD, ENGRAVED_SPREAD, FAULTS, Limits, judge
 from printhammer.printing.dots.nominal import Nominal
 from printhammer.printing.dots.nominal import nominal as single_pulse
-from printhammer.printing.dots.paper import Paper
-from printhammer.printing.dots.pieces import PiecewiseMotion, simulate_pieces
+from printhammer.printing.dots.paper import Paper, PiecewiseMotion, simulate_pieces
 from printhammer.printing.dots.settling import Wear, wear_of
 from printhammer.printing.dots.strategy import (
     LEAD_IN,

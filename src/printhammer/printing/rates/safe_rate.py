@@ -25,14 +25,15 @@ from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import FAULTS, Limits
-from printhammer.printing.dots.long_patterns import Kind, long_patterns
 from printhammer.printing.dots.nominal import SinglePulse
 from printhammer.printing.dots.nominal import nominal as single_pulse
 from printhammer.printing.dots.settling import undisturbed_rate
 from printhammer.printing.dots.strategy import (
     SLOTS,
+    Kind,
     Strategy,
     eight_slot_patterns,
+    long_patterns,
     name_of,
     open_loop,
     slots_of,

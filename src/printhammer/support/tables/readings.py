@@ -22,8 +22,7 @@ from printhammer.errors import InputError, located
 from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.tables.columns import Columns, Source, columns_beside, read_columns
 from printhammer.support.tables.layout import Table, layout_of
-from printhammer.support.tables.marks import GAPS, OVER
-from printhammer.support.tables.text import read_any
+from printhammer.support.tables.text import GAPS, OVER, read_any
 from printhammer.units import all_to_si, describe, is_unit_of, parse, to_si
 
 _NONE: Final[Mapping[str, str]] = MappingProxyType({})

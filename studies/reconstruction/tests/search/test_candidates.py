@@ -7,7 +7,7 @@ from studies.reconstruction.search.space import PRINT_FORCE, geometry, hammer_of
 from studies.reconstruction.tests.samples import near_points, random_points, some_candidates
 
 from printhammer.claims import Context, claims, judge
-from printhammer.claims.definition import within
+from printhammer.claims.judging import within
 from printhammer.hammer.equilibrium import rest_state
 
 

@@ -27,7 +27,7 @@ from studies.reconstruction.tests.samples import constants_in, values_in
 from tests.hammers import CRUDE
 
 import printhammer as ph
-from printhammer.claims.definition import claims
+from printhammer.claims.judging import claims
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.hammer.static_force import StaticForce
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.errors import refused
 
-from printhammer.control.feedback.estimator.sensor import PositionSensor, normal, run_key
+from printhammer.control.feedback.sensor import PositionSensor, normal, run_key
 
 STROKE = 150e-6
 

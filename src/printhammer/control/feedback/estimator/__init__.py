@@ -1,1 +1,0 @@
-"""The estimator: an observer and a Kalman filter for noisy and delayed position samples."""
