@@ -14,8 +14,6 @@ export async function shelfOf(text) {
   return {
     names, hammers, limits, vocabulary, start: {}, version, sentences, stateFile, noFiles: sentences.files,
     readers: readersOf(limits, vocabulary),
-    // State with which the page opens where its address contains none.
-    start: {},
     /** The compiled module of a hammer; each is compiled once. */
     module(name) {
       const { module } = hammers[name];
