@@ -49,7 +49,7 @@ COLDEST: Final = REFERENCE - 1.0 / COPPER
 """Temperature at which the linear law of resistance reaches zero, degC."""
 
 FEEDS: Final = ("voltage", "current", "energy")
-"""Quantities of which a driver keeps one constant as the coil warms."""
+"""Names of the quantities that a driver may keep constant as the coil warms."""
 
 
 @dataclass(frozen=True)

@@ -175,7 +175,7 @@ def _acceleration(problem: Problem, row: FloatArray, *without: int) -> float:
 
 
 class Changes(Declared):
-    """Derivatives of the quantities of dots and run by the scaled constants, ``value / scale``."""
+    """Derivatives of the quantities of dots and run with respect to scaled constants, ``value / scale``."""
 
     dots: FloatArray = part(
         "derivatives of `DOT_QUANTITIES`, shape (dots, quantities, n)",
@@ -225,7 +225,7 @@ class _Look:
     rows: dict[int, int]
 
     def columns(self, t: float) -> tuple[FloatArray, FloatArray]:
-        """Return the state and the columns of derivatives at a mark, by its time, s."""
+        """Return the state and its derivatives with respect to the constants, at a recorded time, s."""
         row = int(np.searchsorted(self.marks, t))
         return self.flow.states[row], self.flow.changes[row]
 

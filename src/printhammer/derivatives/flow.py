@@ -19,11 +19,11 @@ from printhammer.run.problem import Problem, Record, Stretch
 from printhammer.support.arrays import FloatArray
 
 _VALUE_SPACING: Final = 1e-3
-"""Step of the difference quotient of force by drive value, as a fraction of the largest pulse."""
+"""Drive step of the finite difference d(force)/d(drive), as a fraction of the largest pulse."""
 
 
 class Flow(Declared):
-    """Columns of the variational equations along a run, at given times (marks)."""
+    """Columns of the variational equations along a run, at requested times, the marks."""
 
     states: FloatArray = part(
         "displacement, m, velocity, m/s, mode and latest local maximum, m, at the marks, shape (m, 4); with a"
@@ -61,7 +61,7 @@ def carry_columns(
     nodes: Sequence[int] = (),
     renormalise: bool = False,
 ) -> Flow:
-    """Integrate columns along a run, from the first mark to the last; NaN after an early end of the run.
+    """Integrate columns along a run, at the times `marks`; NaN after an early end of the run.
 
     Parameters
     ----------

@@ -94,7 +94,7 @@ def parameters(hammer: Hammer, drive: Drive, names: Sequence[str]) -> list[Param
 
 
 def rest_changes(hammer: Hammer, wanted: Sequence[Parameter]) -> FloatArray:
-    """Compute the derivatives of the rest displacement, m, by each scaled constant, shape (n,)."""
+    """Compute the gradient of the rest displacement, m, with respect to the scaled constants, shape (n,)."""
     changes = np.zeros(len(wanted))
     for k, parameter in enumerate(wanted):
         # The supply does not affect the state of rest.
@@ -206,7 +206,7 @@ def _table_change(made: Callable[[float], Waveform], value: float, scale: float,
 
 
 def _difference(function: Callable[[float], FloatArray], value: float, scale: float, name: str) -> FloatArray:
-    """Compute the derivative of an array by a scaled constant, ``value / scale``; infinite entries give 0."""
+    """Differentiate an array with respect to a scaled constant, ``value / scale``; 0 for infinite entries."""
     for offsets, weights in _STENCILS:
         try:
             middle = function(value)

@@ -348,7 +348,7 @@ def _strobes(
 
 
 def follow(problem: Problem, marks: FloatArray, initial: FloatArray, *, renormalise: bool) -> Flow:
-    """Simulate a problem up to the last mark, with perturbations integrated from the first mark.
+    """Simulate a problem up to the last of the times `marks`, with perturbations integrated from the first.
 
     The record is processed in segments, so that memory does not grow with the length of the run.
     """

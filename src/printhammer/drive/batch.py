@@ -112,7 +112,7 @@ class Ragged:
 
 
 def starts_of(counts: IntArray) -> IntArray:
-    """Return the start index of each row, and the total, from the lengths of the rows."""
+    """Return the start index of each row, and the total length, from the lengths of the rows."""
     starts = np.zeros(len(counts) + 1, np.int64)
     np.cumsum(counts, out=starts[1:])
     return starts

@@ -27,11 +27,11 @@ EVEN: Final = 1025
 """Number of evenly spaced points of a search grid."""
 
 DECADE: Final = 12.0
-"""Number of points per decade of a cluster of a search grid."""
+"""Number of grid points per decade of distance from an anchor, where the search grid is refined."""
 
 RESTS, CRUSHED, LIFTED, UNSTABLE, EMPTY = range(5)
-"""Outcomes of the search for a rest position: found; the backstop is crushed down to the end of the law of
-the magnet; the force at the backstop is not negative; no stable equilibrium; an empty range."""
+"""Outcomes of the search for a rest position: found; the backstop is compressed beyond the range of the
+magnet law; the force at the backstop is not negative; no stable equilibrium; an empty range."""
 
 MOST_PLACES: Final = 8192
 """Largest number of points of a search grid."""
@@ -143,13 +143,13 @@ def spacing(x: float) -> float:
 
 
 def is_stable(x: float, before: float, after: float, s: Statics) -> bool:
-    """Whether the force points to a root from both sides; a rigid backstop supports it from below."""
+    """Whether the force points to a root from both sides; a rigid backstop stands in for the lower side."""
     held = before > 0.0 or (s.rigid and x == limits_of(s)[0])
     return held and after < 0.0
 
 
 def put_cluster(anchor: float, sign: float, limit: float, grid: Any, count: int) -> int:
-    """Append an anchor and points at distances in a geometric sequence; return the new number of points."""
+    """Append an anchor and points at geometrically growing distances from it; return the new point count."""
     grid[count] = anchor
     if limit <= NEAREST:
         grid[count + 1] = anchor + sign * limit

@@ -163,13 +163,13 @@ class Report(Declared):
 
     @property
     def statements(self) -> tuple[int, int]:
-        """Number of statements of the paper that hold, and in total; each panel of Fig. 11 is a statement."""
+        """Number of the paper's statements that hold, and of all of them; each panel of Fig. 11 is one."""
         pairs = [result.statements for result in self.results]
         return sum(held for held, _ in pairs), sum(made for _, made in pairs)
 
     @property
     def reconstructed(self) -> bool:
-        """Whether the hammer is the reconstructed one."""
+        """Whether the hammer is the reconstruction of the hammer of the paper."""
         return self.search is not None
 
     @property

@@ -103,7 +103,7 @@ def panels_view(report: Report) -> list[dict[str, Any]]:
 
 
 def schemes_view(report: Report) -> dict[str, Any] | None:
-    """Return the effect of the integrators of 1983; None if the data belong to another hammer."""
+    """Return the effect of the integrators of 1983 on Fig. 11; None if the data belong to another hammer."""
     found = report.reconstruction.schemes
     if found is None or found.shipped != report.hammer.fingerprint:
         return None

@@ -1,4 +1,4 @@
-"""Energies of a run: work of the coil, and the ledger of all works, losses and stored energies.
+"""Energies of a run: work of the coil, and the ledger of work, losses and stored energies.
 
 The ledger sums the work of the coil, the losses in pack and backstop, and the stored energy.
 """
@@ -104,7 +104,7 @@ def _gauss(drive: Drive, ends: FloatArray) -> float:
 
 
 def _stretches(problem: Problem, record: Record) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Split steps where the coil power changes sign; return step index, start and end, s, of each part."""
+    """Split steps where the coil power changes sign; return step index, start and end, s, of each piece."""
     begins, finishes = record.nodes[:-1, 0], record.nodes[1:, 0]
     rows = np.flatnonzero(finishes > begins)
     begins, finishes = begins[rows], finishes[rows]
@@ -140,7 +140,7 @@ _POINTS, _PIECES = 10, 8
 
 
 class Ledger(Declared):
-    """Energy ledger of a run, J: works, losses, and changes of kinetic and stored energy."""
+    """Energy ledger of a run, J: work, losses, and changes of kinetic and stored energy."""
 
     coil_work: float = scalar("J", "integral of (Fm(x, I) - Fm(x, 0)) v dt")
     drive_work: float = scalar("J", "work of a drive that is a force")

@@ -348,7 +348,7 @@ class Problem:
         return out
 
     def quadratures(self, record: Record, steps: Any, starts: FloatArray, ends: FloatArray) -> FloatArray:
-        """Integrate works (coil, drive), losses (pack, backstop, damping) over intervals, J, shape (n, 5)."""
+        """Integrate work (coil, drive), losses (pack, backstop, damping) over intervals, J, shape (n, 5)."""
         out = np.empty((len(steps), 9 if self.laws.circuit else 5))
         self.kernel.quadratures(
             np.ascontiguousarray(steps, np.int64),

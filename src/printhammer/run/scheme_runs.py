@@ -207,7 +207,7 @@ class SchemeProblem(Problem):
         starts: FloatArray,
         ends: FloatArray,
     ) -> FloatArray:
-        """Integrate works (coil, drive), losses (pack, backstop, damping) over intervals, J, shape (n, 5)."""
+        """Integrate work (coil, drive), losses (pack, backstop, damping) over intervals, J, shape (n, 5)."""
         points, weights = _GAUSS
         half = 0.5 * (np.asarray(ends) - np.asarray(starts))
         times = (np.asarray(starts) + half)[:, None] + half[:, None] * points

@@ -164,7 +164,7 @@ def state_to_begin(
 
 
 def check_branch(hammer: Hammer, state: Sequence[float]) -> None:
-    """Check a start inside the pack: displacement, velocity, code of the branch, memory.
+    """Check the initial state of an armature in the pack: (displacement, velocity, branch code, memory).
 
     Raises
     ------

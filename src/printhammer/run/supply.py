@@ -43,7 +43,7 @@ def supply_of(drive: Drive) -> Supply:
 
 
 def winding_of(hammer: Hammer) -> Winding:
-    """Return the winding of a hammer that a voltage drives.
+    """Return the winding of a voltage-driven hammer.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def winding_of(hammer: Hammer) -> Winding:
 
 
 def coil_of(hammer: Hammer) -> Coil:
-    """Return the functions and constants of the coil of a hammer that a voltage drives."""
+    """Return the functions and constants of the coil of a voltage-driven hammer."""
     winding = winding_of(hammer)
     return Coil(
         _law(hammer, "magnet_linkage"),

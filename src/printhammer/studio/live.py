@@ -72,7 +72,7 @@ _SENTENCES: Final = {
     "sampled": "a measured pulse is computed by `printhammer run` on a computer with Python",
     "kinds": "another kind of drive is computed by `printhammer run` on a computer with Python",
 }
-"""What the page says of work that only Python does, by name."""
+"""Messages of the page about computations that only Python performs, by name."""
 
 VIEWS: Final = ("motion", "forces", "loops", "phase", "sketch", "map", "strobe", "energy", "line")
 """Names of the views that a page can display."""

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Progress = Callable[[float, int, int], None]
-"""Progress callback, called with the numbers of members done, done before this run, and in total."""
+"""Progress callback; arguments: members done, members done before this run, total number of members."""
 
 
 def sweep(

@@ -133,7 +133,7 @@ def _from_ensemble(
 
 
 def _moments(members: Members, outputs: Outputs) -> tuple[list[FloatArray] | None, list[Any], list[int]]:
-    """Return strobe times of each member, range of the firings among them, and index of the end."""
+    """Return, per member, the output times, and the indices in them of the firings and of the end time."""
     strobes, final = outputs.wants(*STROBES), outputs.wants(*FINAL)
     if not strobes and not final:
         return None, [], []

@@ -157,7 +157,7 @@ SAMPLE: Final = 256
 """Maximum number of cells recomputed at a tenth of the tolerance, and at most an eighth of all cells."""
 
 FIRINGS: Final = 200
-"""Default number of firings per round of the basin computation."""
+"""Default number of firings per round, i.e. between two tests for an attractor."""
 
 ROUNDS: Final = 20
 """Default maximum number of rounds per cell; a cell without an attractor after them is undecided."""

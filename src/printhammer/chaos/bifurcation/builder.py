@@ -264,7 +264,7 @@ class DiagramBuilder:
         return False
 
     def trial(self, rows: Sequence[int], states: FloatArray) -> tuple[Any, Any, Any]:
-        """Run trains from given states without storing them; return states, periods, distances."""
+        """Run trains from given states; return table columns, periods, and distances from periodicity."""
         regimes = [self.table.regimes[row] for row in rows]
         done = self.done
         effort = replace(self.effort, progress=lambda part, _all: self.report_progress(done + part))

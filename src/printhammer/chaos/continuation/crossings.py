@@ -35,7 +35,7 @@ _BRACKET: Final = 1e-5
 _DIFFERENCE: Final = 1e-3
 """Scaled step of the second differences; between 1e-4 and 1e-2 the kinds found in the tests are the same."""
 _FLAT: Final = 1e-6
-"""Mixed second derivative, relative to the largest one, below which the other tangent is undetermined."""
+"""Relative mixed second derivative below which the tangent of the crossing curve is undetermined."""
 _UPRIGHT: Final = 0.01
 """Component of a tangent along the parameter below which a curve turns back; arbitrary."""
 _AMPLITUDE: Final = 1e-2

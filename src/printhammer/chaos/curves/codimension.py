@@ -231,5 +231,5 @@ def _missed(
 
 
 def resonance_test(passages: int) -> Callable[[FloatArray], float]:
-    """Return the test function of a resonant grazing: element (1, 2) of the derivative to the power n."""
+    """Return the test function of a resonant grazing: element (1, 2) of A^n, A: derivative of the map."""
     return lambda jacobian: float(np.linalg.matrix_power(jacobian, passages)[0, 1])

@@ -80,7 +80,7 @@ class LyapunovChart(Result, rows="period"):
         return f"Lyapunov exponents of {self.hammer.name}"
 
     def summary(self) -> Summary:
-        """Tabulate exponents and classifications of each train, and count how often both tests agree."""
+        """Tabulate exponents and classifications of trains; count how often exponent and 0-1 test agree."""
         from printhammer.chaos.exponents.lyapunov import dimension_text, verdict_text
 
         pairs = list(zip(self.growth, self.zero_one, strict=True))

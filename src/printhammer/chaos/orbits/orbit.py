@@ -280,7 +280,7 @@ def no_orbit(regime: Regime, firings: int, tolerance: float, status: str) -> Orb
 
 
 def orbit_of(regime: Regime, closing: Closing, tolerance: float) -> Orbit:
-    """Compute the properties of a converged orbit; with a failure, return a result without numbers."""
+    """Compute the properties of a converged orbit; after a failure, return a result with the reason."""
     firings = int(closing.firings.sum())
     if not closing.closed:
         return no_orbit(regime, firings, tolerance, closing.reason)

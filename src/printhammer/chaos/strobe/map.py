@@ -283,7 +283,7 @@ def is_on_impact(regime: Regime, state: FloatArray, firings: int, tolerance: flo
 def _around(
     regime: Regime, state: FloatArray, firings: int, tolerance: float
 ) -> tuple[Problem, Record, FloatArray] | None:
-    """Integrate an orbit from a section; return problem, record, and phases with open contacts, s."""
+    """Integrate an orbit; return problem, record, and the times in the period with an open contact, s."""
     train, _ = regime.train(firings + 1)
     begin, *_, end = (float(time) for time in regime.moments(train, firings))
     try:

@@ -21,7 +21,7 @@ from printhammer.results import Declared, part
 from printhammer.support.arrays import FloatArray, IntArray
 
 LARGEST_PERIOD: Final = 64
-"""Largest period of a train that is searched for, in firings."""
+"""Largest orbit period that is searched for, in firings."""
 
 AGREEMENT: Final = 1e-6
 """Distance, in half-widths of the strobe window, within which two states agree."""

@@ -159,8 +159,8 @@ _count = partial(opt.whole, panel=_BASINS)
             "Velocity range and number of points, e.g. '-1 m/s, 1 m/s, 128' (default: strobe window).",
             panel=_BASINS,
         ),
-        "firings": _count("Number of firings per round of simulation (default: 200)."),
-        "rounds": _count("Maximum number of rounds per grid cell (default: 20)."),
+        "firings": _count("Number of firings simulated between tests for an attractor (default: 200)."),
+        "rounds": _count("Maximum number of tests for an attractor per grid cell (default: 20)."),
         "gaps": opt.span(
             "Range of times between the firings (default: '0.5 ms, 0.9 ms, 128'; longer for a slow device).",
             panel=_QUENCH,

@@ -54,7 +54,7 @@ def map_(
         positive=True,
     ),
     rates: int | None = _count("Number of rates (default: 512)."),
-    times: int | None = _count("Number of sampling times (default: 512)."),
+    times: int | None = _count("Number of points on the time axis of the map (default: 512)."),
     measured: Path | None = opt.source(
         "Measured map to compare with (CSV or NetCDF); supplies the rates and times unless options set them."
     ),

@@ -249,13 +249,13 @@ def learn(
     offset: float | None = opt.quantity(
         "s",
         "TIME",
-        "Constant time error of the sensor, unknown to the learner (default: 0).",
+        "Time offset of the sensor, unknown to the learner (default: 0).",
         panel=_PANEL,
     ),
     offset_spread: float | None = opt.quantity(
         "s",
         "TIME",
-        "Standard deviation of the constant time error between units (default: none simulated; the learner"
+        "Unit-to-unit standard deviation of the sensor's time offset (default: none simulated; the learner"
         " assumes 25 us).",
         panel=_PANEL,
     ),

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 AHEAD: Final = 1e-6  # Time before the touch at which the simulations of a map begin, s
 PUSHED, FREE = 0, 1
-"""Kinds of touch: with the coil on, or in free flight."""
+"""Kinds of pack touch: with the coil current on, or in free flight."""
 
 ALWAYS: Final = 2e-3  # Width that stands for a push that is still on at the next touch, s
 # Speeds of the touches, as fractions of the single pulse's impact speed

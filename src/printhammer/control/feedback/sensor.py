@@ -77,7 +77,7 @@ class PositionSensor(Declared):
         return max(1, round(time / self.interval))
 
     def numbers(self, since: FloatArray, until: FloatArray, most: int) -> IntArray:
-        """Return the indices of the latest samples in time spans, s, one per run; shape (M, most).
+        """Return the indices of the latest samples of each run in its time span, shape (M, most).
 
         `until` is the time at which the samples are needed, so the latest was taken one delay earlier. The
         indices ascend, padded with -1 at the front.

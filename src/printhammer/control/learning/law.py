@@ -94,7 +94,7 @@ class Adjustable:
 
     @cached_property
     def inputs(self) -> IntArray:
-        """Row and column in the settings of each learned input, shape (2, inputs)."""
+        """Row and column of each learned input in the array of table settings, shape (2, inputs)."""
         numbers = [number_of(each, self.task.reach) for each in histories(self.task.gaps, self.task.reach)]
         cells = [(row, number) for row in (ADVANCE, WIDTH) for number in numbers]
         cells += [(BRAKE, number) for number in numbers if self.base[BRAKE, number] > 0.0]
@@ -382,7 +382,7 @@ class LearningLaw:
         return Verdict(gains, loops[chosen], float(np.fmax.reduce(growth)), float(good.mean()), every)
 
     def _leads(self, share: FloatArray, others: FloatArray) -> bool:
-        """Whether a drive leads all others on average, and trails on at most a fraction `doubt` of all."""
+        """Whether a drive leads all others on average, and trails on at most the share `doubt` of hammers."""
         harmless = np.quantile(share - others.max(axis=0), self.doubt) >= 0.0
         return bool(harmless and share.mean() - others.mean(axis=1).max() >= _GAIN)
 

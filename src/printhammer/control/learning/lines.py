@@ -82,12 +82,12 @@ class Surrogate:
         return np.asarray(self.constant + rows @ self.slope + bent)
 
     def gradient(self, rows: FloatArray) -> FloatArray:
-        """Compute the derivatives of the predicted reading by the constants, shape (M, constants)."""
+        """Compute the gradient of the reading with respect to the constants, shape (M, constants)."""
         return np.asarray(self.slope + rows @ self.curvature)
 
 
 DOTS: Final = 9
-"""Number of dots of the ladder of test pulses."""
+"""Number of dots in the ladder, the sequence of test pulses that is printed first."""
 
 # Widths of single pulses and of both pulses of a pair, as fractions of the nominal width
 _SINGLE: Final = (0.7, 0.85, 1.0, 1.15, 1.3, 1.45)

@@ -254,7 +254,7 @@ class LeastWork(Result, rows="node"):
         return f"burst of least work of {self.hammer.name}"
 
     def summary(self) -> Summary:
-        """Summarise dots, currents, works and losses of the burst."""
+        """Summarise dots, currents, work and losses of the burst."""
         work, ledger = self.work, self.ledger
         weakest = (
             f", the weakest with {self.forces.min():.4f} of the single pulse's force" if self.contacts else ""
@@ -294,7 +294,7 @@ class LeastWork(Result, rows="node"):
         )
 
     def notes(self) -> dict[str, Any]:
-        """Return coil works and energy ledger, as attributes of the Dataset."""
+        """Return the work of the coil and the energy ledger, as attributes of the Dataset."""
         work, ledger = self.work, self.ledger
         return {
             "interpolation": "linear between nodes; a current held from node to node prints fewer dots",

@@ -103,7 +103,7 @@ class TableReport(Result, rows=_AXES):
         return f"compensation table for {self.hammer.name} beside open loop"
 
     def summary(self) -> Summary:
-        """Tabulate good and lost dots of both strategies, one row per hammer."""
+        """Tabulate good and lost dots of open loop and table, one row per hammer."""
         rates = self.rates
         span = f"{rates[0]:g} Hz" if rates.size == 1 else f"{rates.min():g} Hz to {rates.max():g} Hz"
         share, lost = 100.0 * self.good.mean(axis=(2, 3)), self.lost.sum(axis=(2, 3))

@@ -47,7 +47,7 @@ class Chain(Waveform):
     @model_validator(mode="before")
     @classmethod
     def _read_parts(cls, data: Any) -> Any:
-        """Validate the parts one by one; the chain drives the same quantity as its parts."""
+        """Validate the waveforms one by one; the chain drives the same quantity as its waveforms."""
         if not isinstance(data, dict) or "parts" not in data:
             return data
         parts = _validate(data["parts"])
@@ -58,12 +58,12 @@ class Chain(Waveform):
 
     @property
     def replaces(self) -> bool:
-        """Whether the parts belong to a driver, which has a single output stage."""
+        """Whether the waveforms belong to a driver, which has a single output stage."""
         return self.parts[0][1].replaces
 
     @property
     def support(self) -> float:
-        """Time from the firing to the end of the last part, s; the current in a coil may last longer."""
+        """Time from the firing to the end of the last waveform, s; the current in a coil may last longer."""
         offset, last = self.parts[-1]
         return offset + last.support
 
@@ -72,18 +72,18 @@ class Chain(Waveform):
         return self.parts[0][1].supply()
 
     def segments(self) -> FloatArray:
-        """Return the segment tables of the parts in sequence, with zeros in between."""
+        """Return the segment tables of the waveforms in sequence, with zeros in between."""
         rows: list[tuple[float, ...]] = []
         for offset, part in self.parts:
             own = [tuple(float(number) for number in row) for row in part.segments()]
             while rows and offset <= rows[-1][0]:
-                # The remainder of the previous part is cut off here.
+                # The remainder of the previous waveform is cut off here.
                 rows.pop()
             rows += [(offset + start, *rest) for start, *rest in own]
         return table(rows[:-1], rows[-1][0])
 
     def scaled(self, factor: float) -> Self:
-        """Return a copy with all parts scaled by `factor`."""
+        """Return a copy with all waveforms scaled by `factor`."""
         return type(self)(parts=tuple((offset, part.scaled(factor)) for offset, part in self.parts))
 
 
@@ -129,7 +129,7 @@ def _is_over(begun: float, waveform: Waveform, time: float) -> bool:
     segments = waveform.segments()
     # The circuit of the coil remains after the supply of a driver ends.
     end = waveform.support
-    # Rounding may place the end slightly after the beginning of the next part.
+    # Rounding may place the end slightly after the beginning of the next one.
     if time >= begun + end or math.isclose(time, begun + end, rel_tol=_ROUNDING):
         return True
     if time <= begun or waveform.replaces:
@@ -140,7 +140,7 @@ def _is_over(begun: float, waveform: Waveform, time: float) -> bool:
 
 
 def _offset(written: object, number: int) -> float:
-    """Parse the offset of a part: a number in s, or a string with a unit."""
+    """Parse the offset of a waveform: a number in s, or a string with a unit."""
     if isinstance(written, str):
         return read_number(written, "s", f"parts[{number}]")
     if isinstance(written, bool) or not isinstance(written, float | int) or not math.isfinite(written):

@@ -280,7 +280,7 @@ class Code(File):
         return code
 
     def _announce(self) -> None:
-        """Report what is about to be compiled, the expected time, and what may be compiled next."""
+        """Report the code about to be compiled, the expected time, and code that may be compiled next."""
         folders = self._read
         for folder in folders:
             if reason := records.mismatch(folder):

@@ -67,9 +67,9 @@ X = 1
 """Row of the displacement [m]; in the contact pool, w = sqrt(b - x) [m^0.5]."""
 V = 2
 A = 3
-"""Row of the acceleration [m/s^2]; in the contact pool, dv/ds."""
+"""Row of the acceleration [m/s^2]; in the contact pool, dv/ds with the regularised variable s."""
 H = 4
-"""Row of the next step size: in seconds, or in the regularised variable s in the contact pool."""
+"""Row of the next step size: time [s] or, in the contact pool, regularised variable s."""
 NEXT = 5
 """Row of the time of the next edge of the drive or of the end of the run, whichever is earlier [s]."""
 SAMPLE = 6
@@ -123,12 +123,12 @@ FREE_STEP = 3
 PACK_STEP = 4
 CONTACT_STEP = 5
 UNIT = 6
-"""Column of the scale of the variable s in a backstop contact; 0 if the run began in this contact."""
+"""Column of the scale of the regularised variable s in a contact; 0 if the run began in this contact."""
 DOT = 7
 """Column of the row of dot data of the open pack contact; -1 if no pack contact is open."""
 END = 8
 CAREFUL = 9
-"""Column of the flag that the scalar kernel locates the next switching event."""
+"""Column of a flag: 1 if the scalar kernel has to locate the next switching event, else 0."""
 ATTEMPTS = 10
 SAVED_STEP = 11
 NEXT_TIME = 12

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.pulses import Drive
 
 ContactState = Any
-"""State in the backstop: time [s], w = sqrt(compression) [m^0.5], velocity [m/s], and dv/ds."""
+"""State in the backstop: time [s], w = sqrt(compression) [m^0.5], velocity v [m/s], and dv/ds, where s is
+the regularised variable."""
 
 PHASE_LIMIT = 2.0
 """Largest phase advance [rad] of the contact oscillation in one step; DOP853 is unstable beyond about 5."""

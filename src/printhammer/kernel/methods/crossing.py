@@ -201,7 +201,7 @@ def contact_gap(w: float, v: float, electric: Electric, hammer: Hammer, live: An
 def contact_gap_and_change(
     t: float, w: float, v: float, kv: float, electric: Electric, h: float, hammer: Hammer, live: Any
 ) -> tuple[float, float]:
-    """Evaluate the current path's event function in the backstop, and `h` times its derivative by s."""
+    """Evaluate the event function of the current path in the backstop, and `h` times its s-derivative."""
     gap = contact_gap(w, v, electric, hammer, live)
     pause = SHARE * h
     pace = 2.0 * w * pause

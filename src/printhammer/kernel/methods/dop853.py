@@ -176,7 +176,7 @@ def time_slope(t: float, y: Point, law: ForceLaw) -> Point:
 
 @(called if HAS_CIRCUIT else inlined)
 def contact_slope(y: Point, hammer: Hammer, drive: Drive) -> Point:
-    """Return the derivative of the state vector by the regularised variable s in the backstop."""
+    """Return the derivative of the state vector in the backstop with respect to s, where dt = 2 w ds."""
     pace = 2.0 * y[1]
     if HAS_CIRCUIT:
         electric, live = electric_of(y), drive[0]
@@ -199,7 +199,7 @@ def slope_at(y: Point, place_rate: float, rate: float, law: ForceLaw) -> Point:
 
 @inlined
 def contact_slope_at(y: Point, rate: float, hammer: Hammer, drive: Drive) -> Point:
-    """Return the derivative by s at the start of a backstop step, reusing the known `rate` dv/ds."""
+    """Return the s-derivative of the state at the start of a backstop step, from the known dv/ds (`rate`)."""
     pace = 2.0 * y[1]
     if HAS_CIRCUIT:
         x = hammer[POSITION] - y[1] * y[1]

@@ -83,7 +83,7 @@ def circuit_is_quiet(state: State, setup: Setup) -> bool:
 
 @inlined
 def backstop_step(state: State, setup: Setup, t_next: float, still: float, nodes: Any) -> int:
-    """Integrate over one step in the backstop, in regularised variables; return the event that ends it."""
+    """Integrate one step in the backstop, in regularised variables; return the event that ends the step."""
     hammer, control, live = setup.hammer, setup.control, setup.train.live
     if state[C.ENTERED] != 0.0:
         rate_in_backstop(state, setup)
@@ -148,7 +148,7 @@ def reverse(state: State, setup: Setup) -> None:
 
 @inlined
 def wait(state: State, setup: Setup, t_next: float, still: float, nodes: Any) -> int:
-    """Advance the time of an armature that stays at rest; return the event that ends it, or `HOLDS`."""
+    """Advance the time of an armature at rest; return the event that ends the rest, or `HOLDS`."""
     mode, t, x = int(state[C.MODE]), state[C.TIME], state[C.POSITION_NOW]
     time_scale = setup.control[0] / setup.control[1]
     pause = t_next - t
@@ -176,7 +176,7 @@ def wait(state: State, setup: Setup, t_next: float, still: float, nodes: Any) ->
 
 @inlined
 def step_at_rest(state: State, setup: Setup, t_next: float, nodes: Any) -> int:
-    """Integrate the coil circuit for one step with the armature at rest; return the event that ends it."""
+    """Integrate the coil circuit for one step, armature at rest; return the event that ends the step."""
     mode, x = int(state[C.MODE]), state[C.POSITION_NOW]
     held = mode
     if mode != M.RESTING:

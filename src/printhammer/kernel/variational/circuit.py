@@ -131,7 +131,7 @@ def current_slopes(x: float, electric: Electric, hammer: Hammer, live: Any) -> t
 
 @inlined
 def whole_field_slope(x: float, y: Any, setting: Setting) -> float:
-    """Return the derivative of magnet and spring force with displacement [N/m], at fixed flux linkage."""
+    """Return d(magnet and spring force)/d(displacement) [N/m], at fixed flux linkage."""
     scales, bounds, hammer, live, _forcing = setting
     value = value_at(y[V.TIME], x, hammer, driven(live, electric_in(y)))
     field = field_slope(x, value, scales, bounds, hammer)

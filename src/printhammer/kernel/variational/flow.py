@@ -129,7 +129,7 @@ def orthonormalise(columns: Any, scales: Any, grown: Any) -> None:
 
 @compiled
 def note_mark(node: Any, initial: Any, setting: Setting, carried: Carried) -> None:
-    """Store state, tangent columns and their growth at a mark; at the first mark, initialise the columns."""
+    """Store state, tangent columns and growth at an output time; initialise the columns at the first one."""
     columns, work, track, states, changes, growth, _passed = carried
     hammer = setting.hammer
     mode = int(node[3])
@@ -190,7 +190,7 @@ def flow(
     initial: Any,
     carried: Carried,
 ) -> None:
-    """Propagate tangent columns along a segment of a run, from the first mark to the last.
+    """Propagate tangent columns along a segment of a run, from the first output time to the last.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Forcing of the variational equations: derivatives of the forces with constants, at a fixed state.
+"""Forcing of the variational equations: derivatives of forces with respect to constants, at a fixed state.
 
 The derivative a_c of the acceleration with respect to a constant is added to the rate of dv, and the
 derivative of each power to the rate of its energy. In the backstop, the force is a function of w = sqrt(b -
@@ -83,7 +83,7 @@ def set_live_moves(first: int, last: int, train: Train, forcing: Forcing) -> Non
 
 @inlined
 def drive_change(t: float, drive: Drive, delayed: Any) -> float:
-    """Return the derivative of the drive with a constant, whose row of `live_moves` is `delayed`."""
+    """Return the derivative of the drive with respect to the constant of row `delayed` of `live_moves`."""
     total = 0.0
     i, j = 1, 0
     for _ in range(int(drive[0])):
@@ -222,7 +222,7 @@ def rebound_change(v_in: float, k: int, forcing: Forcing) -> float:
 
 @compiled
 def stored_change(x: float, dx: float, k: int, hammer: Hammer, forcing: Forcing) -> float:
-    """Return the derivative of the energy stored in the backstop with constant k; `x` changes by `dx`."""
+    """Return the derivative of the energy stored in the backstop with respect to constant k; `dx`: of `x`."""
     varied, moves, of_hammer = forcing.varied, forcing.moves, forcing.of_hammer
     w = math.sqrt(max(hammer[POSITION] - x, 0.0))
     change = backstop_elastic(hammer[BACKSTOP_PART:MAGNET], w) * (moves[k, POSITION] - dx)

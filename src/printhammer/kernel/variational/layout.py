@@ -33,11 +33,11 @@ FIRST_COLUMN = TIME + 1
 
 # Indices in `track`.
 DUE = 0
-"""Index of the element that counts the marks already passed."""
+"""Index of the element that counts the output times already passed."""
 SMOOTH = 1
 """Index of a flag: 1 if the present state depends differentiably on the initial state, else 0."""
 GROWN = 2
-"""Index of the first column's logarithm of growth since the latest mark; further columns follow."""
+"""Index of the first column's logarithm of growth since the latest output time; other columns follow."""
 
 # Forcing: a constant may change the parameter array of the hammer, the firing times and the waveforms.
 SPACING = 1e-3
@@ -49,7 +49,7 @@ VARIED = 9
 FIELD_MOVES, PACK_MOVES, BACKSTOP_MOVES, DAMPING_MOVES, CIRCUIT_MOVES = 1, 2, 4, 8, 16
 """Bits of `of_hammer` for the laws that a constant changes; mass and backstop position belong to no law."""
 DELAYED = 5
-"""Number of values stored per active pulse: delay of the active piece, and the changes of p0 to p3."""
+"""Number of values per active pulse: changes of the waveform piece's start and of coefficients p0 to p3."""
 
 
 class Forcing(NamedTuple):
@@ -81,7 +81,7 @@ class Forcing(NamedTuple):
 
 
 class Carried(NamedTuple):
-    """Tangent columns during their propagation along a run, and their values at marks and requested nodes.
+    """Tangent columns during their propagation along a run, and their values at requested times and nodes.
 
     A column has r = 3 rows without forcing and 8 rows with forcing; a circuit adds four rows.
 

@@ -107,7 +107,7 @@ def damping_slope(v: float, scales: Any, hammer: Hammer) -> float:
 def pack_slopes(
     x: float, v: float, mode: int, memory: float, peak: float, scales: Any, hammer: Hammer
 ) -> tuple[float, float]:
-    """Return the derivatives of the pack force with displacement [N/m] and velocity [N s/m].
+    """Return the derivatives of the pack force with respect to displacement [N/m] and velocity [N s/m].
 
     On an unloading branch, the step size is limited by the depth of its local maximum `peak`: the branch
     contains so high a power of the depth that, in a shallow contact, points far beyond the maximum would
@@ -184,7 +184,7 @@ def contact_force(w: float, v: float, hammer: Hammer) -> float:
 
 @compiled
 def contact_slopes(w: float, v: float, scales: Any, hammer: Hammer) -> tuple[float, float, float, float]:
-    """Return the derivatives of the backstop force with w [N/m^0.5] and with velocity [N s/m].
+    """Return the derivatives of the backstop force with respect to w [N/m^0.5] and velocity [N s/m].
 
     The third and fourth values are the derivatives of the viscous force; without forcing they are not
     computed.

@@ -120,7 +120,7 @@ def rates_at(node: Any, setting: Setting) -> tuple[float, float, float]:
 
 @called
 def move_edge(node: Any, before: Any, pulse: int, piece: int, columns: Any, setting: Setting) -> None:
-    """Propagate the columns through a driver edge whose time varies; `before` holds the rates before it."""
+    """Propagate the columns through a driver edge whose time varies; `before`: rates before the edge."""
     live, forcing = setting.drive, setting.forcing
     behind = rates_at(node, setting)
     off_time = kind_of(live) == SWITCHED_PIECE and live[7] < 0.0

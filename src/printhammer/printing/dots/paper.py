@@ -250,7 +250,7 @@ def simulate_pieces(
 
 
 def _merge(first: Contact, then: Contact) -> Contact:
-    """Merge the two parts of a contact that was split between segments."""
+    """Merge the two pieces of a contact that was split between segments."""
     higher = then if then.depth > first.depth else first
     return replace(
         first,

@@ -151,7 +151,7 @@ class ToleranceYield(Result):
 
     @property
     def share_error(self) -> float:
-        """Standard error of the fraction, as for a random sample; with the Sobol sequence it is smaller."""
+        """Standard error of the fraction for a random sample; an upper estimate for the Sobol sequence."""
         count = len(self.passed)
         # At 0 or 1 the plain binomial formula would report no error at all.
         share = (self.passed.sum() + 0.5) / (count + 1.0)

@@ -296,7 +296,7 @@ def begin_window(about: Any, rest: float, front: float, out: Any) -> int:
 
 
 def judge_window(status: int, contacts: Any, nodes: Any, places: Any, wait: float, out: Any) -> int:
-    """Return whether a window is long enough for a single pulse from rest; the caller doubles it if not.
+    """Return whether a window is long enough for a single pulse from rest; the caller doubles a shorter one.
 
     Parameters
     ----------

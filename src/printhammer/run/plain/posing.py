@@ -83,7 +83,7 @@ def write_half_widths(way: float, speed: float, position: float, front: float, o
 
 
 class Coil(NamedTuple):
-    """Functions and constants of a coil that a voltage drives."""
+    """Functions and constants of a voltage-driven coil."""
 
     magnet_linkage: Any
     magnet_inductance: Any

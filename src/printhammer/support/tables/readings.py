@@ -258,7 +258,7 @@ def _levels(table: Table) -> set[int]:
 def _by_heading(
     table: Table, numbers: Mapping[str, str], text: Mapping[str, tuple[str, ...]], wanted: str
 ) -> tuple[dict[str, Source], dict[str, int]]:
-    """Assign columns by the names in the heading, or by a unit that occurs once."""
+    """Assign columns to quantities by the names in the heading, or by a unit that occurs once."""
     where = f"{table.where}: {_line(table)}".rstrip(": ")
     sources: dict[str, Source] = {}
     words: dict[str, int] = {}
