@@ -1,6 +1,7 @@
 """The page as a file: the state with which it opens, the folder that keeps it, its parts, the widget."""
 
 import json
+import random
 import re
 import shutil
 import subprocess
@@ -14,7 +15,7 @@ from tests.studio.reading import without_modules
 
 from printhammer.hammer.hammer import load
 from printhammer.studio import Shelf, launch, live_page, widget
-from printhammer.studio.bundle import merged, page_files, sources, style
+from printhammer.studio.bundle import deltas, merged, page_files, sources, style
 
 TEXT = CRUDE.read_text("utf-8")
 
@@ -86,7 +87,7 @@ def test_hammers_of_ones_own_come_first() -> None:
 def test_the_state_of_a_page_cannot_end_its_script(monkeypatch: pytest.MonkeyPatch) -> None:
     without_modules(monkeypatch)
     page = live_page(Shelf(load(CRUDE), only=True), {"line": "</script><script>alert(1)"})
-    assert page.count("</script>") == 4
+    assert page.count("</script>") == 3
     (start,) = re.findall(r'id="start">(.*?)</script>', page)
     assert json.loads(start)["state"]["line"] == "</script><script>alert(1)"
 
@@ -106,9 +107,8 @@ def test_pages_are_kept_under_their_content_and_the_oldest_go(
 
 @pytest.mark.parametrize("last", ["engine/page.js", "engine/worker.js"])
 def test_a_bundle_holds_every_part_before_it_is_needed(last: str) -> None:
-    listed = json.loads(sources(last).partition("const sources = ")[2].partition(";\nconst places")[0])
     seen: list[str] = []
-    for name, text in listed:
+    for name, text in sources(last):
         needed = re.findall(r'from "\./([\w./]+)"', text)
         assert set(needed) <= set(seen), name
         seen.append(name)
@@ -116,12 +116,31 @@ def test_a_bundle_holds_every_part_before_it_is_needed(last: str) -> None:
 
 
 def test_every_script_of_the_page_is_used() -> None:
-    used = {
-        name
-        for last in ("engine/page.js", "engine/worker.js")
-        for name, _ in json.loads(sources(last).partition("const sources = ")[2].partition(";\nconst")[0])
-    }
+    used = {name for last in ("engine/page.js", "engine/worker.js") for name, _ in sources(last)}
     assert used == {name for name in page_files() if name.endswith(".js")} - {"vendor/uPlot.iife.min.js"}
+
+
+def test_copies_are_undone_by_the_page() -> None:
+    draw = random.Random(1)
+    pieces = [bytes(range(k, 200 + k)) for k in range(5)] + [b"ab" * 300, b"", b"x"]
+    contents = [
+        b"".join(
+            draw.choice(pieces) if draw.random() < 0.7 else draw.randbytes(draw.randrange(60))
+            for _ in range(draw.randrange(12))
+        )
+        for _ in range(200)
+    ]
+    script = merged("engine/shelf.js") + (
+        f"console.log(JSON.stringify({json.dumps([(deltas(each).hex(), len(each)) for each in contents])}"
+        '.map(([hex, size]) => Buffer.from(unpack(Buffer.from(hex, "hex"), size)).toString("hex"))));'
+    )
+    done = subprocess.run(["node"], input=script, check=True, capture_output=True, text=True)
+    assert [bytes.fromhex(each) for each in json.loads(done.stdout)] == contents
+
+
+def test_what_is_repeated_far_apart_is_packed_once() -> None:
+    part, between = random.Random(1).randbytes(50_000), random.Random(2).randbytes(100_000)
+    assert len(deltas(part + between + part)) < 151_000
 
 
 def test_nothing_is_fetched_from_elsewhere() -> None:

@@ -14,14 +14,9 @@ _IMPORT: Final = re.compile(r'from "(\.{1,2}/[\w./]+)"')
 _IMPORTS: Final = re.compile(r'^import .* from ".*";$\n?', re.MULTILINE)
 _EXPORT: Final = re.compile(r"^export (?=(async )?function|const|let|class)", re.MULTILINE)
 
-_SOURCES: Final = """
-const sources = %s;
-const places = {};
-for (const [name, text] of sources) {
-  const whole = text.replace(/from "\\.\\/([\\w.\\/]+)"/g, (_all, part) => `from "${places[part]}"`);
-  places[name] = URL.createObjectURL(new Blob([whole], { type: "text/javascript" }));
-}
-"""
+_BLOCK: Final = 16
+_SHORTEST: Final = 32
+"""Bytes of a block that is looked up, and of the shortest copy: smaller ones give no smaller page."""
 
 
 @lru_cache
@@ -39,11 +34,6 @@ def page_files() -> dict[str, bytes]:
     return contents
 
 
-def sources(wanted: str) -> str:
-    """Return a script that creates a module of the page and its dependencies."""
-    return _SOURCES % inside(_ordered(wanted))
-
-
 def inside(content: object) -> str:
     """Return JSON in which no text resembles the end of a script."""
     return json.dumps(content).replace("<", "\\u003c")
@@ -51,10 +41,10 @@ def inside(content: object) -> str:
 
 def merged(wanted: str) -> str:
     """Return a module of the page and its dependencies as one script without imports, as workers need it."""
-    return "\n".join(_EXPORT.sub("", _IMPORTS.sub("", text)) for _, text in _ordered(wanted))
+    return "\n".join(_EXPORT.sub("", _IMPORTS.sub("", text)) for _, text in sources(wanted))
 
 
-def _ordered(wanted: str) -> list[tuple[str, str]]:
+def sources(wanted: str) -> list[tuple[str, str]]:
     """Return a module and its dependencies, each before those that import it, by name from the root."""
     texts = {name: data.decode() for name, data in page_files().items() if name.endswith(".js")}
     ordered: dict[str, str] = {}
@@ -79,3 +69,59 @@ def _ordered(wanted: str) -> list[tuple[str, str]]:
 def style() -> str:
     """Return all style sheets of the page as one text."""
     return "\n".join(page_files()[name].decode() for name in ("vendor/uPlot.min.css", "studio.css"))
+
+
+def deltas(content: bytes) -> bytes:
+    """Replace what has occurred before by copies, at any distance; gzip only looks back by 32 kB.
+
+    Returns
+    -------
+    bytes
+        Numbers of seven bits a byte, the lowest first: count of literals, the literals, length and distance
+        of a copy, and so on until all are written; ``unpack`` in ``web/engine/shelf.js`` undoes it.
+    """
+    places: dict[bytes, int] = {}
+    packed = bytearray()
+    begin = at = known = 0
+    while at + _BLOCK <= len(content):
+        while known + _BLOCK <= at:
+            places.setdefault(content[known : known + _BLOCK], known)
+            known += _BLOCK
+        source = places.get(content[at : at + _BLOCK])
+        if source is None:
+            at += 1
+            continue
+        distance = at - source
+        first = at
+        while first > begin and first > distance and content[first - 1] == content[first - 1 - distance]:
+            first -= 1
+        last = _common_end(content, at, distance)
+        # A copy may not overlap its source.
+        last = min(last, first + distance)
+        if last - first < _SHORTEST:
+            at += 1
+            continue
+        packed += _number(first - begin) + content[begin:first] + _number(last - first) + _number(distance)
+        begin = at = last
+    return bytes(packed + _number(len(content) - begin) + content[begin:])
+
+
+def _common_end(content: bytes, at: int, distance: int) -> int:
+    """Return the end of what equals the bytes at a distance before it."""
+    step = 4096
+    while step and at < len(content):
+        step = min(step, len(content) - at)
+        if content[at : at + step] == content[at - distance : at - distance + step]:
+            at += step
+        else:
+            step //= 2
+    return at
+
+
+def _number(value: int) -> bytes:
+    """Write a number in bytes of seven bits, the lowest first."""
+    written = bytearray()
+    while value > 127:
+        written.append(value & 127 | 128)
+        value >>= 7
+    return bytes([*written, value])

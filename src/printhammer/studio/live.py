@@ -10,7 +10,8 @@ from __future__ import annotations
 import gzip
 import json
 import math
-from base64 import b64encode
+import struct
+from base64 import b64decode, b64encode
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, Final, get_args
 
@@ -25,7 +26,7 @@ from printhammer.run.plain.page import REFUSALS
 from printhammer.run.problem import TOLERANCE, Problem, fresh_carry
 from printhammer.run.start import initial_state
 from printhammer.studio import bounds
-from printhammer.studio.bundle import inside, merged, page_files, sources, style
+from printhammer.studio.bundle import deltas, inside, merged, page_files, sources, style
 from printhammer.studio.coil import by_voltage, open_constants
 from printhammer.studio.controls import describe, vocabulary
 from printhammer.studio.launch import FORMAT, KIND
@@ -55,10 +56,20 @@ form-action 'none'">
 <noscript>The studio needs JavaScript.</noscript>
 <script type="application/json" id="start">{start}</script>
 <script type="text/plain" id="content">{content}</script>
-<script type="text/plain" id="worker">{worker}</script>
-<script type="module">{sources}
+<script type="module">
+const text = atob(document.getElementById("content").textContent);
+const packed = Uint8Array.from(text, (sign) => sign.charCodeAt(0));
+const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
+const end = 4 + new DataView(bytes.buffer).getUint32(0, true);
+const content = JSON.parse(new TextDecoder().decode(bytes.subarray(4, end)));
+const places = {{}};
+for (const [name, text] of content.scripts) {{
+  const whole = text.replace(/from "\\.\\/([\\w.\\/]+)"/g, (_all, part) => `from "${{places[part]}}"`);
+  places[name] = URL.createObjectURL(new Blob([whole], {{ type: "text/javascript" }}));
+}}
 const {{ begin }} = await import(places["engine/page.js"]);
-begin();
+begin(content, bytes.subarray(end));
 </script>
 </body>
 </html>
@@ -94,14 +105,20 @@ def live_page(shelf: Shelf, start: Mapping[str, Any] | str = "") -> str:
     InputError
         A module is neither in the wheel nor can be linked: the extra `page` is not installed.
     """
-    text = json.dumps(content_of(shelf), allow_nan=False, separators=(",", ":"))
+    content = content_of(shelf)
+    modules = [gzip.decompress(b64decode(module)) for module in content.pop("modules")]
+    content |= {
+        "sizes": [len(module) for module in modules],
+        "scripts": sources("engine/page.js"),
+        "worker": merged("engine/worker.js"),
+    }
+    text = json.dumps(content, allow_nan=False, separators=(",", ":")).encode()
+    packed = gzip.compress(struct.pack("<I", len(text)) + text + deltas(b"".join(modules)), 9, mtime=0)
     return _PAGE.format(
         style=style(),
         icon=b64encode(page_files()["icon.svg"]).decode(),
         start=inside({"text": start} if isinstance(start, str) else {"state": start}),
-        content=_packed(text.encode()),
-        worker=inside(merged("engine/worker.js")),
-        sources=sources("engine/page.js"),
+        content=b64encode(packed).decode(),
     )
 
 
@@ -132,11 +149,6 @@ def _plain(value: Any) -> Any:
         return [_plain(entry) for entry in value]
     value = value.item() if hasattr(value, "item") else value
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _packed(content: bytes) -> str:
-    """Compress with gzip and encode in base 64, as the page reads it."""
-    return b64encode(gzip.compress(content, 9, mtime=0)).decode()
 
 
 def _limits() -> dict[str, Any]:
@@ -209,7 +221,7 @@ def _numbers(hammer: Hammer, wave: Waveform, modules: dict[str, str]) -> dict[st
     problem = Problem(hammer, drive, initial_state(hammer, None), 0.0, DISPLAY_TOLERANCE)
     module = problem.page_module
     if module.name not in modules:
-        modules[module.name] = b64encode(gzip.compress(module.content(), 9, mtime=0)).decode()
+        modules[module.name] = b64encode(gzip.compress(module.content(), 1)).decode()
     return {
         "module": list(modules).index(module.name),
         "circuit": problem.laws.circuit,

@@ -3,18 +3,17 @@ import { mount } from "../mount.js";
 import { engineOf } from "./engine.js";
 import { shelfOf } from "./shelf.js";
 
-/** Unpack what is embedded, and begin. */
-export async function begin() {
+/** Begin with the content of the page, and the modules of its hammers as they are packed. */
+export function begin(content, modules) {
   // As it was before anything was built, for a page to keep.
   const html = `<!doctype html>\n${document.documentElement.outerHTML}`;
-  const text = (id) => document.getElementById(id).textContent;
-  const shelf = await shelfOf(text("content"));
-  const start = JSON.parse(text("start"));
+  const shelf = shelfOf(content, modules);
+  const start = JSON.parse(document.getElementById("start").textContent);
   shelf.start = start.state ?? {};
   // In a notebook the page has no address of its own; its frame knows the state.
   const framed = location.protocol === "about:";
   let [page, told] = [null, ""];
-  const send = engineOf(shelf, JSON.parse(text("worker")), (frame) => page.accept(frame), () => html);
+  const send = engineOf(shelf, content.worker, (frame) => page.accept(frame), () => html);
   page = mount(document.getElementById("studio"), send, {
     read: () => (framed ? window.name : location.hash.slice(1)) || (start.text ?? ""),
     write: (hash) => {

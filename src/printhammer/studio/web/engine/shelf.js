@@ -1,23 +1,42 @@
-// The hammers of the page with their modules, unpacked from the text in which Python has embedded them.
+// The hammers of the page with their modules, unpacked from what Python has embedded.
 import { readersOf } from "./read.js";
 
-async function unpacked(text) {
-  const packed = Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0));
-  return new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip")));
+/** Undo `deltas` of printhammer/studio/bundle.py: literals, and copies of what came before. */
+export function unpack(bytes, size) {
+  const whole = new Uint8Array(size);
+  let [from, to] = [0, 0];
+  const number = () => {
+    let value = 0;
+    for (let factor = 1; ; factor *= 128) {
+      const next = bytes[from];
+      from += 1;
+      value += (next & 127) * factor;
+      if (next < 128) return value;
+    }
+  };
+  for (;;) {
+    const literals = number();
+    whole.set(bytes.subarray(from, from + literals), to);
+    [from, to] = [from + literals, to + literals];
+    if (to >= size) return whole;
+    const [length, distance] = [number(), number()];
+    whole.copyWithin(to, to - distance, to - distance + length);
+    to += length;
+  }
 }
 
-/** Unpack the content of the page. */
-export async function shelfOf(text) {
-  const content = await (await unpacked(text)).json();
-  const { names, hammers, modules, limits, vocabulary, version, sentences, stateFile } = content;
-  const compiled = modules.map(() => null);
+/** The shelf of the content of the page and its packed modules. */
+export function shelfOf({ names, hammers, sizes, limits, vocabulary, version, sentences, stateFile }, packed) {
+  const whole = unpack(packed, sizes.reduce((sum, size) => sum + size, 0));
+  const ends = sizes.map((_, k) => sizes.slice(0, k + 1).reduce((sum, size) => sum + size, 0));
+  const compiled = sizes.map(() => null);
   return {
-    names, hammers, limits, vocabulary, start: {}, version, sentences, stateFile, noFiles: sentences.files,
+    names, hammers, limits, vocabulary, version, sentences, stateFile, noFiles: sentences.files,
     readers: readersOf(limits, vocabulary),
     /** The compiled module of a hammer; each is compiled once. */
     module(name) {
       const { module } = hammers[name];
-      compiled[module] ??= unpacked(modules[module]).then((response) => response.arrayBuffer()).then((bytes) => WebAssembly.compile(bytes));
+      compiled[module] ??= WebAssembly.compile(whole.subarray(ends[module] - sizes[module], ends[module]));
       return compiled[module];
     },
   };
