@@ -8,7 +8,15 @@ from tests.hammers import crude
 import printhammer as ph
 from printhammer.control.table.compensation import CompensationTable
 from printhammer.control.table.drive import COLUMNS, driven_by, print_pulse
-from printhammer.control.table.report import PERTURBATIONS, SETS, STRATEGIES, between, random_patterns
+from printhammer.control.table.report import (
+    PERTURBATIONS,
+    SETS,
+    STRATEGIES,
+    TableReport,
+    between,
+    random_patterns,
+)
+from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import nominal
 from printhammer.printing.dots.strategy import slot_times
 from printhammer.printing.rates.variability import Perturbation
@@ -138,6 +146,34 @@ def test_report(table: CompensationTable) -> None:
     # The worst dot of the cycle is in the numbers and among the dots kept for the histogram.
     worst = np.abs(report.force_deviation[1]).max()
     assert worst == pytest.approx(report.force[1, 0, 0, 1], rel=1e-12)
+
+
+def test_a_table_with_unstable_rows_does_not_pass(table: CompensationTable) -> None:
+    """Even if the rows that were simulated keep to the limits: an error grows 3.45 times a dot."""
+    shape = len(STRATEGIES), 1, 1, len(SETS)
+    good = {name: np.zeros(shape) for name in ("force", "arrival", "lost", "extra")}
+    dots = dict.fromkeys(("force_deviation", "arrival_deviation"), np.zeros((2, 4)))
+
+    def report(growth: float) -> TableReport:
+        return TableReport(
+            table=table,
+            hammer=quick(),
+            hammers=("nominal",),
+            rates=np.array([RATE]),
+            limits=Limits(),
+            good=np.ones(shape),
+            multiplier=np.full(shape[:3], growth),
+            seed=1,
+            tolerance=1e-8,
+            **good,
+            **dots,
+        )
+
+    for growth in (-0.9, np.nan):
+        assert report(growth).passed.all()
+        assert "grows" not in report(growth).summary().text()
+    assert report(-3.45).passed.tolist() == [[[True]], [[False]]]
+    assert "grows" in report(-3.45).summary().text()
 
 
 def test_what_is_judged_by_default(table: CompensationTable) -> None:

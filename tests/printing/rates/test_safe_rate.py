@@ -4,6 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from tests.errors import refused
 from tests.hammers import made_of, preload
 
@@ -12,7 +14,7 @@ from printhammer.drive.trains import Drive
 from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import nominal, single_pulses
 from printhammer.printing.dots.strategy import FIRST_SLOT, open_loop
-from printhammer.printing.dots.trial import Case, attempt
+from printhammer.printing.dots.trial import Case, attempt, words_of
 from printhammer.printing.rates.safe_rate import from_rest, rate_grid, safe_rate
 from printhammer.printing.rates.variability import Perturbation, perturbed
 
@@ -245,3 +247,32 @@ def test_drives_may_fire_waveforms_of_their_own(hammer: "ph.Hammer") -> None:
         theirs.failure.slot,
         theirs.failure.fault,
     )
+
+
+@pytest.mark.slow
+def test_words_give_the_rate_and_the_deviations_of_all_patterns(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A relay comes to rest between dots two slots apart; the patterns themselves are run beside."""
+    hammer = ph.load("relay-5v")
+    brief = safe_rate(hammer, first=30.1)
+    assert len(brief.rates) > 1
+    monkeypatch.setattr("printhammer.printing.rates.safe_rate.attempt_words", lambda *_, **__: None)
+    whole = safe_rate(hammer, first=30.1)
+    assert (brief.rate, brief.failure) == (whole.rate, whole.failure)
+    assert (brief.passed == whole.passed).all()
+    assert (brief.long_run == whole.long_run).all()
+    for side in ("force_low", "force_high", "arrival_low", "arrival_high"):
+        np.testing.assert_allclose(getattr(brief, side), getattr(whole, side), rtol=1e-6, atol=1e-9)
+
+
+@given(st.sets(st.integers(0, 40), min_size=1), st.integers(1, 4))
+def test_every_dot_of_a_pattern_has_its_history_in_a_word(chosen: set[int], gap: int) -> None:
+    slots = sorted(chosen)
+    words = words_of([slots], gap)
+    for number, slot in enumerate(slots):
+        begin = number
+        while begin and slots[begin] - slots[begin - 1] < gap:
+            begin -= 1
+        history = tuple(each - slots[begin] for each in slots[begin : number + 1])
+        assert any(word[: len(history)] == history for word in words)
+        assert slot - slots[begin] == history[-1]
+    assert all(word[0] == 0 for word in words)

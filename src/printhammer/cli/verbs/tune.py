@@ -163,7 +163,7 @@ def tune(
     files["report"] = Content.of(report)
     good = report.passed[1, 0]
     off = ", ".join(f"{each:g} Hz" for each in report.rates[~good].tolist())
-    complaint = f"with the table some dots are beyond the limits at {off}"
+    complaint = f"with the table some dots are beyond the limits, or rows are unstable, at {off}"
     return Answer(
         ["", *render(report.summary(), units)], files=files, complaints=[] if good.all() else [complaint]
     )

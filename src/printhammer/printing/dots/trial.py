@@ -1,9 +1,16 @@
-"""Trial printing: simulate patterns under a strategy as one ensemble, and compare the dots with limits."""
+"""Trial printing: simulate patterns under a strategy as one ensemble, and compare the dots with limits.
+
+A slow device with a rigid backstop is exactly at rest some slots after a dot. A pattern is then a sequence of
+*words*, the dots between such gaps, that do not affect each other. The words of all test patterns are few:
+for dots that affect only the next slot they are rows of one to eight dots, and a row of 200.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple, Unpack
+import itertools
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any, Final, NamedTuple, Unpack
 
 import numpy as np
 
@@ -13,13 +20,27 @@ from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Judgement, Limits, judge
 from printhammer.printing.dots.nominal import SinglePulse
-from printhammer.printing.dots.strategy import FIRST_SLOT, Strategy, checked_drives, open_loop
+from printhammer.printing.dots.strategy import (
+    FIRST_SLOT,
+    Strategy,
+    checked_drives,
+    long_patterns,
+    open_loop,
+)
 from printhammer.results import Declared, column, part
 from printhammer.run.effort import DEFAULT, Effort, Keywords, computation
 from printhammer.run.ensemble import DotTable, Ensemble, ExtraDots
 from printhammer.run.waits import waits_of
 from printhammer.run.window import longest_of
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
+
+_MOST_SLOTS: Final = 3  # Largest number of slots to rest for which patterns are split; arbitrary
+
+_ROW: Final = 24  # Number of dots to which rows are shortened if their last dots are equal; arbitrary
+_SAME: Final = 4  # Number of dots at the end of a shortened row that have to be equal; arbitrary
+
+# Relative difference below which two dots are equal; arbitrary, above the errors of integration
+_EQUAL: Final = 1e-6
 
 
 class Case(NamedTuple):
@@ -114,3 +135,102 @@ def fired_of(strategy: Strategy, hammer: Hammer, drive: Drive) -> Waveform:
     """Return the waveform that sets the simulation length: that of the strategy, hammer or drive."""
     own = getattr(strategy, "waveform", None)
     return own if isinstance(own, Waveform) else hammer.waveform or longest_of(drive)
+
+
+def attempt_long(cases: Sequence[Case], strategy: Strategy = open_loop, **options: Any) -> Trial:
+    """Simulate the long patterns in all cases (hammer and rate); options as for `attempt`."""
+    patterns = long_patterns()
+    begin = [pattern.judged_from for pattern in patterns]
+    return attempt(cases, [pattern.slots for pattern in patterns], strategy, judged_from=begin, **options)
+
+
+def attempt_patterns(
+    cases: Sequence[Case],
+    patterns: Sequence[tuple[int, ...]],
+    strategy: Strategy,
+    *,
+    long: bool,
+    stop: bool,
+    **options: Any,
+) -> list[list[tuple[Trial, int]]]:
+    """Simulate patterns in cases, and with `long` also the long patterns where all patterns pass.
+
+    With `stop`, the long patterns are simulated only up to the first case that fails. The result holds for
+    each case its one or two trials, with the index of the case in the trial.
+    """
+    trial = attempt(cases, patterns, strategy, **options)
+    runs = [[(trial, k)] for k in range(len(cases))]
+    good = np.flatnonzero(trial.passed).tolist()
+    if stop and not trial.passed.all():
+        good = [k for k in good if k < np.argmin(trial.passed)]
+    if long and good:
+        lasting = attempt_long([cases[k] for k in good], strategy, **options)
+        for place, k in enumerate(good):
+            runs[k].append((lasting, place))
+    return runs
+
+
+def words_of(patterns: Iterable[Sequence[int]], gap: int) -> list[tuple[int, ...]]:
+    """List the words of patterns, each once: slots from 0 on, with all distances below `gap` slots.
+
+    Patterns are split where consecutive dots are `gap` slots or more apart.
+    """
+    words = set()
+    for slots in patterns:
+        ends = [k + 1 for k, (a, b) in enumerate(itertools.pairwise(slots)) if b - a >= gap]
+        for begin, end in itertools.pairwise([0, *ends, len(slots)]):
+            words.add(tuple(slot - slots[begin] for slot in slots[begin:end]))
+    return sorted(words)
+
+
+def attempt_words(
+    cases: Sequence[Case],
+    patterns: Iterable[Sequence[int]],
+    undisturbed: float,
+    strategy: Strategy,
+    **options: Any,
+) -> tuple[Trial, int] | None:
+    """Simulate the words of patterns in cases (hammer and rate), in order of rate.
+
+    Each word is followed by one more dot, which has to equal the first dot of the word, from rest: only then
+    is the word separate from what follows. Of a row only the first dots are simulated, and the last of these
+    have to be equal: the row has then reached its periodic orbit.
+
+    Parameters
+    ----------
+    cases, patterns, strategy, options
+        As for `attempt`.
+    undisturbed : float
+        Rate up to which each pulse finds the device at rest, Hz.
+
+    Returns
+    -------
+    tuple or None
+        The trial, and the number of leading cases in which every dot of the patterns is within limits.
+        None where the patterns are not split, since dots affect each other over too many slots.
+    """
+    if not undisturbed > 0.0:
+        return None
+    gap = max(math.ceil(max(case.rate for case in cases) / undisturbed), 1)
+    if gap > _MOST_SLOTS:
+        return None
+    words = sorted({_shortened(word) for word in words_of(patterns, gap)})
+    trial = attempt(cases, [(*word, word[-1] + gap) for word in words], strategy, **options)
+    passed = trial.passed
+    for values in (trial.dots.flight_time, trial.dots.peak_force):
+        by_case = values.reshape(len(cases), len(words), -1)
+        for k, word in enumerate(words):
+            passed = passed & _are_equal(by_case[:, k, [0, len(word)]])
+            if len(word) == _ROW:
+                passed = passed & _are_equal(by_case[:, k, _ROW - _SAME : _ROW])
+    return trial, len(cases) if passed.all() else int(np.argmin(passed))
+
+
+def _shortened(word: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the first `_ROW` dots of a longer row of equally spaced dots; other words are unchanged."""
+    return word[:_ROW] if len(word) > _ROW and len(set(np.diff(word).tolist())) == 1 else word
+
+
+def _are_equal(values: FloatArray) -> BoolArray:
+    """Whether the values of each row equal the first within `_EQUAL`; False where one is NaN."""
+    return np.asarray(np.isclose(values, values[:, :1], rtol=_EQUAL, atol=0.0).all(axis=1))

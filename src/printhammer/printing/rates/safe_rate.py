@@ -38,7 +38,14 @@ from printhammer.printing.dots.strategy import (
     open_loop,
     slots_of,
 )
-from printhammer.printing.dots.trial import Case, Trial, attempt
+from printhammer.printing.dots.trial import (
+    Case,
+    Trial,
+    attempt,
+    attempt_long,
+    attempt_patterns,
+    attempt_words,
+)
 from printhammer.results import Declared, Result, column, coordinate, part, scalar
 from printhammer.results.summary import (
     Facts,
@@ -241,10 +248,13 @@ def safe_rate(
     grid, apart = grid_of(hammer, first, last, step)
     bounds = Limits() if limits is None else limits
     single = single_pulse(hammer, tolerance=effort.tolerance) if nominal is None else nominal
-    if first is None and nominal is None and strategy is open_loop:
-        below = int(np.searchsorted(grid, undisturbed_rate(hammer), side="right"))
+    # In a closed loop, and with a table, dots affect each other wherever the armature is.
+    apart_below = undisturbed_rate(hammer) if strategy is open_loop else 0.0
+    if first is None and nominal is None:
+        below = int(np.searchsorted(grid, apart_below, side="right"))
         grid = grid[max(below - 1, 0) :]
     patterns = from_rest(every=strategy is not open_loop)
+    every = [*patterns, *(pattern.slots for pattern in long_patterns())]
     options: dict[str, Any] = {"limits": bounds, "effort": effort}
     rows: list[dict[str, Any]] = []
     growth: list[FloatArray] = []
@@ -259,24 +269,23 @@ def safe_rate(
             # Most devices fail in the second or third slot: what follows such a rate is not simulated.
             quick = attempt(cases, [each for each in patterns if each[-1] < _FEW], strategy, **options).passed
             cases = cases[: int(np.argmin(quick)) + 1] if not quick.all() else cases
-        trial = attempt(cases, patterns, strategy, **options)
-        rates = [case.rate for case in cases]
-        growth.append(multipliers([hammer] * len(cases), rates, strategy, effort.quiet))
-        good = np.flatnonzero(trial.passed)
-        if stop and failure is None and not trial.passed.all():
-            good = good[good < np.argmin(trial.passed)]
-        lasting = None
-        if long and good.size:
-            lasting = attempt_long([cases[k] for k in good], strategy, **options)
-        for k, case in enumerate(cases):
-            runs = [(trial, k)]
-            if lasting is not None and k in good:
-                runs.append((lasting, int(np.searchsorted(good, k))))
-            rows.append(_row(runs))
+        brief = attempt_words(cases, every, apart_below, strategy, **options) if long else None
+        runs = [] if brief is None else [[(brief[0], k)] for k in range(brief[1])]
+        left = cases[len(runs) :]
+        if left:
+            # What fails is reported with the patterns themselves.
+            left = left[:1] if stop and brief is not None else left
+            runs += attempt_patterns(left, patterns, strategy, long=long, stop=stop, **options)
+        cases = cases[: len(runs)]
+        growth.append(
+            multipliers([hammer] * len(cases), [case.rate for case in cases], strategy, effort.quiet)
+        )
+        for case, own in zip(cases, runs, strict=True):
+            rows.append(_row(own, long=len(own) > 1 or (brief is not None and own[0][0] is brief[0])))
             if failure is None and rows[-1]["passed"]:
-                safe, best = case.rate, runs
+                safe, best = case.rate, own
             elif failure is None:
-                failure = _failure(*runs[-1], long=len(runs) > 1)
+                failure = _failure(*own[-1], long=len(own) > 1)
                 if stop:
                     break
         if progress is not None:
@@ -356,13 +365,6 @@ def from_rest(*, every: bool) -> list[tuple[int, ...]]:
     return [slots for slots in patterns if every or slots[0] == 0]
 
 
-def attempt_long(cases: Sequence[Case], strategy: Strategy = open_loop, **options: Any) -> Trial:
-    """Simulate the long patterns in all cases (hammer and rate); options as for `trial.attempt`."""
-    patterns = long_patterns()
-    begin = [pattern.judged_from for pattern in patterns]
-    return attempt(cases, [pattern.slots for pattern in patterns], strategy, judged_from=begin, **options)
-
-
 def multipliers(
     hammers: Sequence[Hammer],
     rates: Sequence[float],
@@ -382,7 +384,7 @@ def multipliers(
     return row_multipliers(hammers, drives, effort)
 
 
-def _row(runs: Sequence[tuple[Trial, int]]) -> dict[str, Any]:
+def _row(runs: Sequence[tuple[Trial, int]], *, long: bool) -> dict[str, Any]:
     """Return the columns of `SafeRate` at one slot rate, from the trials at that rate."""
 
     def joined(name: str) -> npt.NDArray[Any]:
@@ -394,7 +396,7 @@ def _row(runs: Sequence[tuple[Trial, int]]) -> dict[str, Any]:
         "passed": bool(joined("passed").all()),
         "lost": int(joined("lost").sum()),
         "extra_contacts": int(joined("extra_contacts").sum()),
-        "long_run": len(runs) > 1,
+        "long_run": long,
     }
     for name in ("force", "arrival"):
         values = joined(f"{name}_deviation")
