@@ -367,14 +367,14 @@ def ended_early(statuses: Iterable[object], total: int | None = None) -> list[st
 
 
 def period_text(hammer: Hammer, period: float) -> str:
-    """Scale a firing period of the paper's hammer, s, to the time scale of a device; return it as text."""
+    """Scale a firing period of the paper's hammer, s, to the time scale of a device, as text."""
     from printhammer.run.window import time_scale
 
     return f"{1e3 * period * time_scale(hammer):.4g} ms"
 
 
 def rate_text(hammer: Hammer, rate: float) -> str:
-    """Scale a firing rate of the paper's hammer, Hz, to the time scale of a device; return it as text."""
+    """Scale a firing rate of the paper's hammer, Hz, to the time scale of a device, as text."""
     from printhammer.run.window import scaled_rate
 
     return f"{scaled_rate(hammer, rate):.4g} Hz"

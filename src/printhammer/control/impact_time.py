@@ -284,7 +284,7 @@ def _largest_current(hammer: Hammer) -> float:
 
 
 def unit_record(unit: Hammer, estimator: ImpactEstimator, probe: Sampling) -> tuple[FloatArray, float]:
-    """Simulate the probe signal, A or V, of one dot of a unit; return it with the true impact time, s."""
+    """Simulate the probe signal of one dot of a unit; return signal, A or V, and true impact time, s."""
     each = PHASES if probe.delay or probe.bandwidth is not None else 1
     times = np.asarray(estimator.step / each * np.arange(each * estimator.count), np.float64)
     motion = simulate(

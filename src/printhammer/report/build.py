@@ -35,7 +35,7 @@ _PICTURE: Final = re.compile(r"figure\d\d\.(svg|pdf|png)")
 
 
 def check_place(out: str | Path) -> None:
-    """Check that a folder holds no files in the way of a report, except an earlier report to be replaced."""
+    """Check that a report would overwrite no files of a folder, except those of an earlier report."""
     folder = Path(out)
     pictures = folder / PICTURES
     drawn = sorted(pictures.iterdir()) if pictures.is_dir() else []

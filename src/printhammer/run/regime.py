@@ -82,7 +82,7 @@ _FORCE: Final = ("amplitude", "phase")
 
 
 class Firing(TypedDict, total=False):
-    """Keywords that state how a hammer is fired; see `Regime.of`."""
+    """Keyword arguments that specify the firing of a hammer; see `Regime.of`."""
 
     period: float | str | None
     rate: float | str | None
@@ -93,11 +93,11 @@ class Firing(TypedDict, total=False):
 
 
 class Fired(Firing, Keywords):
-    """Keywords that state how a hammer is fired, and the effort."""
+    """Keyword arguments that specify the firing of a hammer and the effort."""
 
 
 class FiredAtFixedTolerance(Firing, AtFixedTolerance):
-    """Keywords that state how a hammer is fired, for functions with fixed tolerances."""
+    """Keyword arguments that specify the firing of a hammer, for functions with fixed tolerances."""
 
 
 class Regime(Declared):

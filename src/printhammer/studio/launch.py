@@ -1,4 +1,4 @@
-"""The page as a file of the user: the state with which it opens, and the folder that keeps it."""
+"""The page as a file of the user: the state with which the page opens, and the folder of its copies."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def keep_page(html: str) -> Path:
 
 
 def _cache() -> Path:
-    """Return the folder for files that the program can write again, by the custom of the system."""
+    """Return the cache folder of the program, by the convention of the operating system."""
     if os.name == "nt":
         base = os.environ.get("LOCALAPPDATA") or str(Path.home() / "AppData" / "Local")
     elif sys.platform == "darwin":

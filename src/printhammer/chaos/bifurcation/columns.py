@@ -217,7 +217,7 @@ def run_in_stretches(
 
 
 def _train(regime: Regime, firings: int, rest: bool) -> tuple[Drive, FloatArray]:
-    """Build the drive of a train; return it with its firing times, including one beyond the last."""
+    """Build the drive of a train; return the drive and its firing times, including one beyond the last."""
     if rest and regime.drive is None:
         drive = regime.pulses(firings + 2)
         return drive, drive.times[: firings + 1]

@@ -41,7 +41,7 @@ LARGEST_MULTIPLIER: Final = 0.99
 
 _SHORT: Final = 301
 _SURE: Final = 5.0
-"""Number of firings for a first estimate of the exponent; standard errors above 0 that make it final."""
+"""Number of firings of a first estimate of the exponent; multiple of its standard error that is decisive."""
 
 
 @computation

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 GROUP: Final = "Fit constants to measurements: CSV tables whose header gives the unit of each column."
 _MEASURED: Final = "printhammer measure all hendriks-1983 --out lab --force &&"
-"""Command that makes the tables that the examples read."""
+"""Command that generates the tables read by the examples."""
 
 EXAMPLE: Final = (
     f"{_MEASURED} printhammer fit magnet lab/magnet.csv --spring lab/spring.csv --hammer hendriks-1983"

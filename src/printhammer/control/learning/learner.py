@@ -187,7 +187,7 @@ def mean(readings: Sequence[FloatArray], noise: FloatArray) -> Mean:
 
 
 def _unknown(law: LearningLaw) -> Verdict:
-    """Return the decision before the first reading: the open-loop drive that is better on the production."""
+    """Return the decision before the first reading: the better open-loop drive of the production."""
     return Verdict(False, law.first, *[float("nan")] * 3)
 
 

@@ -1,4 +1,4 @@
-"""Bursts of least work made of the hammer's own pulses, with optimised times and widths.
+"""Bursts of least work that consist of the hammer's own pulses, with optimised times and widths.
 
 In each slot two pulses are fired: the first brakes the returning armature, the second throws it. From rest
 one pulse is enough. This suits a driver that can only be switched on and off, and whose current follows its

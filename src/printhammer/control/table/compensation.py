@@ -256,7 +256,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return TableStrategy(self, hammer)
 
     def check_hammer(self, hammer: Hammer) -> None:
-        """Check that the table is made for `hammer`; raise `InputError` otherwise."""
+        """Raise `InputError` unless the table was tuned for `hammer`."""
         if hammer.fingerprint != self.fingerprint:
             raise InputError(
                 f"{hammer.path}: the table is made for another hammer, {self.hammer!r} of fingerprint"
@@ -280,7 +280,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
 
     @property
     def title(self) -> str:
-        """One-line title with the name of the hammer that the table is made for."""
+        """One-line title with the name of the hammer for which the table was tuned."""
         return f"compensation table for {self.hammer}"
 
     def summary(self) -> Summary:

@@ -154,12 +154,12 @@ def judge_table(
     """Compare a table with open loop on hammers that differ from its design.
 
     The patterns are those of the safe rate, long ones included, and random patterns. The dots of every hammer
-    are compared with the single-pulse dot of the hammer that the table is made for.
+    are compared with the single-pulse dot of the hammer for which the table was tuned.
 
     Parameters
     ----------
     hammer : Hammer
-        The hammer that the table is made for.
+        The hammer for which the table was tuned.
     table : CompensationTable
         The table.
     rates : sequence of float or str, optional
@@ -180,7 +180,7 @@ def judge_table(
     Raises
     ------
     InputError
-        The table is made for another hammer or not for these rates, or a perturbation does not apply to the
+        The table was tuned for another hammer or other rates, or a perturbation does not apply to the
         hammer.
     """
     strategies: tuple[Strategy, Strategy] = (open_loop, table.strategy(hammer))

@@ -262,7 +262,7 @@ def _number(entry: object, unit: str, name: str) -> Any:
 
 
 def _levels(entries: Any) -> tuple[tuple[Any, ...], str]:
-    """Parse levels, all in A or all in N; return them with their unit."""
+    """Parse levels, all in A or all in N; return the values and the unit."""
     for unit in QUANTITY_UNITS:
         try:
             return tuple(_number(entry, unit, "levels") for entry in entries), unit

@@ -213,7 +213,7 @@ def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, st
 
 
 def applicable(sensor: Sensor, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings that apply to a sensor, without sampling settings if it makes no records."""
+    """Return the settings that apply to a sensor, without sampling settings for a bench without records."""
     kept = dict(settings)
     for role in PARTS:
         if role in kept:

@@ -14,11 +14,11 @@ from printhammer.kernel.model.dots import CONTACTS, FIRING, FORCE, TIME_IN
 from printhammer.kernel.model.modes import OK
 
 X, Y, WANTED_X, WANTED_Y, DARKNESS, FAULT = range(6)
-"""Columns of a dot: its place and its intended place [m], from the middle of slot 0 to the right and from
+"""Columns of a dot: position and intended position [m], from the middle of slot 0 to the right and from
 the topmost wire down; the fraction of light absorbed; the index of its first fault (-1 for a good dot).
 NaN for a lost dot."""
 FORCE_RATIO, PLACEMENT, PRINTED = range(6, 9)
-"""Columns of the peak force over that of the single pulse, the offset from the intended place [m], and
+"""Columns of the peak force over that of the single pulse, the offset from the intended position [m], and
 whether the dot is on the paper."""
 DOT_WIDTH = 9
 NOT_RUN, LOST, EXTRA, WEAK, LATE, GOOD = 0, 1, 2, 3, 4, -1

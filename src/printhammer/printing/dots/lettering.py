@@ -115,7 +115,7 @@ def _opened(path: Path, size: int) -> FreeTypeFont:
 
 @lru_cache(maxsize=16)
 def _load_fitted(path: Path, wires: int, marks: str) -> tuple[FreeTypeFont, int]:
-    """Load the font at the largest size that fits the wires; return it and the wires above the base line."""
+    """Load the font at the largest size that fits the wires; return font and height above the baseline."""
     for size in range(_LARGER * wires, 0, -1):
         font = _opened(path, size)
         boxes = [font.getbbox(mark, mode="1", anchor="ls") for mark in marks]

@@ -28,7 +28,7 @@ FLIGHTS: Final = 3.0
 """Smallest length of a window, in flight times of the single pulse; a later dot may fly longer."""
 
 SETTLED: Final = 0.05
-"""Distance from rest at the end of a window, as a fraction of the way to the pack."""
+"""Distance from rest at the end of a window, as a fraction of the distance to the pack."""
 
 PATIENCE: Final = 16.0
 """Largest window of a device that does not settle, in flight times."""
@@ -53,10 +53,10 @@ PAPER_FRONT: Final = 203.2e-6
 """Front of the pack in Hendriks (1983), m: 0.008 in."""
 
 SAME: Final = 1e-3
-"""Relative difference within which positions are those of the paper."""
+"""Relative difference within which positions equal the positions of the paper."""
 
 PART: Final = 1.0 / 6.0
-"""Half-width of the paper's window, relative to the way from backstop to pack."""
+"""Half-width of the paper's window, relative to the distance from backstop to pack."""
 
 
 def is_the_paper(position: float, front: float) -> bool:
@@ -140,7 +140,7 @@ def linkage_scale(origin: float, current: float, coil: Coil) -> float:
 
 
 def falling_place(low: float, high: float, current: float, coil: Coil) -> tuple[float, float]:
-    """Find a place along the travel at which the flux linkage does not increase with the current.
+    """Find a position along the travel at which the flux linkage does not increase with the current.
 
     Returns
     -------

@@ -185,7 +185,7 @@ class Table:
 
 
 def read_layout(path: Path, what: str, words: Collection[str] = ()) -> Table:
-    """Read the table in a file; `what` names it in messages, `words` are cells allowed beside numbers."""
+    """Read the table in a file; `what` names the file in messages, `words` are cells allowed as text."""
     return layout_of(read_any(path, what), str(path), words)
 
 
