@@ -222,7 +222,7 @@ def rebound_change(v_in: float, k: int, forcing: Forcing) -> float:
 
 @compiled
 def stored_change(x: float, dx: float, k: int, hammer: Hammer, forcing: Forcing) -> float:
-    """Return the derivative of the energy stored in the backstop with respect to constant k; `dx`: of `x`."""
+    """Return d(energy stored in the backstop)/d(constant k); `dx` is the derivative of displacement `x`."""
     varied, moves, of_hammer = forcing.varied, forcing.moves, forcing.of_hammer
     w = math.sqrt(max(hammer[POSITION] - x, 0.0))
     change = backstop_elastic(hammer[BACKSTOP_PART:MAGNET], w) * (moves[k, POSITION] - dx)
