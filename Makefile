@@ -11,11 +11,13 @@ TESTING := $(VENV)/test.stamp
 EVERYTHING := $(VENV)/dev.stamp
 # Each worker would compile every test file anew, and each program that a test starts every module.
 unexport PYTHONDONTWRITEBYTECODE
+# Environments of `make test-numba`, named after their lock in requirements/.
+NUMBAS := build/numba/oldest build/numba/runtime
 CODE := conftest.py hatch_build.py src tests studies $(wildcard benchmarks examples docs)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help .venv test test-fast test-slow test-all lint types contract format paper docs bench lock clean
+.PHONY: help .venv test test-fast test-slow test-numba test-all lint types contract format paper docs bench lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z.-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -43,6 +45,26 @@ test-fast: $(TESTING) ## the fast tests alone
 
 test-slow: $(EVERYTHING) ## the slow tests alone
 	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m slow
+
+test-numba: $(TESTING) $(NUMBAS:=/installed.stamp) ## the wheel with the oldest numba that is allowed and with the newest
+	PRINTHAMMER_PYTHONS=$(subst $(eval) ,:,$(NUMBAS:%=$(CURDIR)/%/bin/python)) $(BIN)/python -m pytest -m slow tests/test_numba.py
+
+# The wheel is built with the oldest LLVM, whose modules later ones can read.
+build/numba/wheel.stamp: build/numba/oldest/packages.stamp pyproject.toml hatch_build.py $(shell find src -type f -not -path '*/__pycache__/*')
+	rm -rf build/numba/wheel
+	build/numba/oldest/bin/python -m hatchling build -t wheel -d build/numba/wheel
+	@touch $@
+
+build/numba/%/packages.stamp: requirements/%.txt
+	$(PYTHON) -m venv build/numba/$*
+	build/numba/$*/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement $<
+	@touch $@
+
+.PRECIOUS: build/numba/%/packages.stamp
+
+build/numba/%/installed.stamp: build/numba/%/packages.stamp build/numba/wheel.stamp
+	build/numba/$*/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall build/numba/wheel/*.whl
+	@touch $@
 
 test-all: test test-slow ## everything
 
