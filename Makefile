@@ -13,11 +13,12 @@ EVERYTHING := $(VENV)/dev.stamp
 unexport PYTHONDONTWRITEBYTECODE
 # Environments of `make test-numba`, named after their lock in requirements/.
 NUMBAS := build/numba/oldest build/numba/runtime
+SOURCES := pyproject.toml hatch_build.py $(shell find src -type f -not -path '*/__pycache__/*')
 CODE := conftest.py hatch_build.py src tests studies $(wildcard benchmarks examples docs)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help .venv test test-fast test-slow test-numba test-all lint types contract format paper docs bench lock clean
+.PHONY: help .venv test test-fast test-slow test-numba test-all wheel lint types contract format paper docs bench lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z.-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -49,10 +50,13 @@ test-slow: $(EVERYTHING) ## the slow tests alone
 test-numba: $(TESTING) $(NUMBAS:=/installed.stamp) ## the wheel with the oldest numba that is allowed and with the newest
 	PRINTHAMMER_PYTHONS=$(subst $(eval) ,:,$(NUMBAS:%=$(CURDIR)/%/bin/python)) $(BIN)/python -m pytest -m slow tests/test_numba.py
 
-# The wheel is built with the oldest LLVM, whose modules later ones can read.
-build/numba/wheel.stamp: build/numba/oldest/packages.stamp pyproject.toml hatch_build.py $(shell find src -type f -not -path '*/__pycache__/*')
-	rm -rf build/numba/wheel
-	build/numba/oldest/bin/python -m hatchling build -t wheel -d build/numba/wheel
+wheel: build/wheel.stamp ## the wheel, into build/wheel; every llvmlite that is allowed can read its modules
+
+# LLVM reads the modules of earlier versions, so the oldest lowers them; the newest compiles the fastest machine code.
+build/wheel.stamp: build/numba/oldest/packages.stamp $(EVERYTHING) $(SOURCES)
+	rm -rf build/numba/modules build/wheel
+	build/numba/oldest/bin/python hatch_build.py build/numba/modules --lower
+	PRINTHAMMER_MODULES=$(CURDIR)/build/numba/modules $(BIN)/python -m hatchling build -t wheel -d build/wheel
 	@touch $@
 
 build/numba/%/packages.stamp: requirements/%.txt
@@ -62,8 +66,8 @@ build/numba/%/packages.stamp: requirements/%.txt
 
 .PRECIOUS: build/numba/%/packages.stamp
 
-build/numba/%/installed.stamp: build/numba/%/packages.stamp build/numba/wheel.stamp
-	build/numba/$*/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall build/numba/wheel/*.whl
+build/numba/%/installed.stamp: build/numba/%/packages.stamp build/wheel.stamp
+	build/numba/$*/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall build/wheel/*.whl
 	@touch $@
 
 test-all: test test-slow ## everything
@@ -104,7 +108,7 @@ lock: ## resolve the pinned requirements again (UPGRADE=--upgrade for the newest
 	$(LOCK) $(UPGRADE) requirements/lock.in --output-file requirements/lock.txt
 	$(LOCK) $(UPGRADE) pyproject.toml requirements/build.in --extra all --output-file requirements/dev.txt
 	$(LOCK) $(UPGRADE) pyproject.toml --extra laws --constraint requirements/dev.txt --output-file requirements/runtime.txt
-	$(LOCK) $(UPGRADE) pyproject.toml requirements/oldest.in --extra laws --extra page --output-file requirements/oldest.txt
+	$(LOCK) $(UPGRADE) pyproject.toml requirements/oldest.in --extra laws --output-file requirements/oldest.txt
 	$(LOCK) $(UPGRADE) requirements/build.in --constraint requirements/dev.txt --output-file requirements/build.txt
 	$(LOCK) $(UPGRADE) pyproject.toml requirements/build.in $(foreach extra,$(TESTED),--extra $(extra)) \
 		--constraint requirements/dev.txt --output-file requirements/test.txt

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tempfile
 from contextlib import suppress
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,14 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    Files = Iterator[tuple[str, Callable[[], bytes | None]]]
+    """Names of generated files, each with a function that returns the content, or None."""
+
 _ABSENT = {"magnet": "", "spring": "", "pack": "", "backstop": "", "absent": "printhammer.parts.absent"}
+_MODULES = "PRINTHAMMER_MODULES"
+"""Environment variable with a folder of lowered modules, which are then not lowered again."""
+_LOWER = "--lower"
+"""Option of this file as a program: write the lowered modules only."""
 _MOST_WORKERS = 8
 """Largest number of processes; each needs up to half a gigabyte of memory."""
 
@@ -46,36 +54,25 @@ class LoweredModules(BuildHookInterface[Any]):
                 build_data["force_include"][str(path)] = f"printhammer/kernel/modules/{path.name}"
 
 
-def files() -> Iterator[tuple[Path, Callable[[], bytes | None]]]:
-    """Yield the path of each generated file in the wheel, and a function that returns its content or None."""
+def lowered_modules() -> Files:
+    """Yield the lowered modules: of all templates, and of the laws of all parts."""
     from numba import TypingError
 
-    from printhammer.drive.trains import PulseTrain, SineForce
-    from printhammer.hammer.hammer import load, shipped
     from printhammer.kernel import schemes_1983
-    from printhammer.kernel.compile import link
     from printhammer.kernel.compile.bindings import bindings_of
-    from printhammer.kernel.compile.cache import sealed
-    from printhammer.kernel.compile.lanes import specialise_lanes, suits
-    from printhammer.kernel.compile.modules import Entry, Module, every_template, laws_of, plain_template
-    from printhammer.kernel.compile.specialise import specialise, variational
+    from printhammer.kernel.compile.modules import Module, every_template, laws_of, plain_template
     from printhammer.kernel.model.laws import LAW_FUNCTIONS, Laws
     from printhammer.parts import PARTS
-    from printhammer.run import problem
-    from printhammer.run.ensemble_group import closed_form
     from printhammer.run.plain import entries
 
-    def lowered(module: Module) -> tuple[Path, Callable[[], bytes | None]]:
+    def lowered(module: Module) -> tuple[str, Callable[[], bytes | None]]:
         def content() -> bytes | None:
             # A law of more constants than a lane has room for never runs in lanes.
             with suppress(TypingError):
                 return lzma.compress(module.content(), preset=9)
             return None
 
-        return module.shipped, content
-
-    def compiled(entry: Entry) -> tuple[Path, Callable[[], bytes]]:
-        return entry.code.shipped, lambda: sealed(entry.code.get(entry.machine_code))
+        return module.shipped.name, content
 
     scheme = plain_template("scheme", schemes_1983.PROGRAM, False)
     yield from map(lowered, (*every_template(), *entries.templates(), scheme))
@@ -84,14 +81,34 @@ def files() -> Iterator[tuple[Path, Callable[[], bytes | None]]]:
         for name in ("", *sorted(parts)):
             bindings = bindings_of(Laws(**{**_ABSENT, role: name}))
             yield from (lowered(laws_of(role, bindings, for_lanes)) for for_lanes in (False, True))
+
+
+def compiled_code() -> Files:
+    """Yield WebAssembly modules and machine code for the laws of the shipped hammers."""
+    from printhammer.drive.trains import PulseTrain, SineForce
+    from printhammer.hammer.hammer import load, shipped
+    from printhammer.kernel.compile import link
+    from printhammer.kernel.compile.cache import sealed
+    from printhammer.kernel.compile.lanes import specialise_lanes, suits
+    from printhammer.kernel.compile.modules import Entry, WebModule
+    from printhammer.kernel.compile.specialise import specialise, variational
+    from printhammer.run import problem
+    from printhammer.run.ensemble_group import closed_form
+    from printhammer.run.plain import entries
+
+    def web(module: WebModule) -> tuple[str, Callable[[], bytes]]:
+        return module.shipped.name, lambda: lzma.compress(module.content(), preset=9)
+
+    def machine(entry: Entry) -> tuple[str, Callable[[], bytes]]:
+        return entry.code.shipped.name, lambda: sealed(entry.code.get(entry.machine_code))
+
     hammers = [load(name) for name in shipped()]
     # A textbook oscillator has no pulse of its own, and is driven by a force.
     drives = [PulseTrain(each.waveform) if each.waveform else SineForce(1.0, 1.0) for each in hammers]
     posed = [(problem.laws_of(*pair), pair[1]) for pair in zip(hammers, drives, strict=True)]
     # The longest compilations, those with a circuit, begin first: the processes then end together.
     posed.sort(key=lambda pair: not pair[0].circuit)
-    for laws, _drive in posed:
-        yield lowered(entries.page_module(laws))
+    yield from (web(entries.page_module(laws)) for laws, _drive in posed)
     # Processors of the level COMMON share their machine code; that of others runs nowhere else.
     if link.processor()[1] != link.COMMON:
         return
@@ -101,23 +118,30 @@ def files() -> Iterator[tuple[Path, Callable[[], bytes | None]]]:
         kernels = [variational(kernel, forced=True), variational(kernel, forced=False), kernel]
         if suits(laws) and kinds is not None:
             kernels.append(specialise_lanes(laws, kinds))
-        yield from (compiled(entry) for each in kernels for entry in each.entries)
+        yield from (machine(entry) for each in kernels for entry in each.entries)
 
 
-def generate(folder: Path) -> None:
-    """Write the generated files that no other process has begun to a folder that the processes share."""
+def generate(folder: Path, files: Files) -> None:
+    """Write the files that no other process has begun to a folder that the processes share."""
     begun = folder / "begun"
-    begun.mkdir(exist_ok=True)
-    for shipped, make in files():
+    begun.mkdir(parents=True, exist_ok=True)
+    for name, make in files:
         try:
-            (begun / shipped.name).touch(exist_ok=False)
+            (begun / name).touch(exist_ok=False)
         except FileExistsError:
             continue
         content = make()
         if content is not None:
-            (folder / shipped.name).write_bytes(content)
+            (folder / name).write_bytes(content)
 
 
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).parent / "src"))
-    generate(Path(sys.argv[1]))
+    from printhammer.kernel.compile import modules
+
+    target, *options = sys.argv[1:]
+    if known := os.environ.get(_MODULES):
+        modules.SHIPPED = Path(known)  # type: ignore[misc]
+    generate(
+        Path(target), lowered_modules() if _LOWER in options else chain(lowered_modules(), compiled_code())
+    )
