@@ -23,6 +23,7 @@ extensions = [
     "key_tables",
     "mathml",
     "measured_tables",
+    "studio_page",
 ]
 exclude_patterns = ["_build", "gallery/*.ipynb", "gallery/*.py"]
 default_role = "code"

@@ -8,6 +8,7 @@ import pytest
 from tests.studio.browser import Page
 
 import printhammer as ph
+from printhammer.studio.live import VIEWS
 
 STATE = "window.studio.studio.store.state"
 
@@ -16,7 +17,7 @@ STATE = "window.studio.studio.store.state"
 def opened(address: str, opened_browser: Any) -> Iterator[Page]:
     page = opened_browser()
     page.size(1440, 900)
-    page.open(f"{address}#hammer=hendriks-1983")
+    page.open(f"{address}#hammer=hendriks-1983&views={'-'.join(VIEWS)}")
     page.wait("window.studio?.studio?.frames.map?.detail === 'full' && window.studio.studio.frames.strobe")
     page.wait("window.studio.studio.frames.dots")
     yield page
