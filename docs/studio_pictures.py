@@ -7,15 +7,16 @@ ROOT = Path(__file__).parents[1]
 IMAGES = ROOT / "docs" / "images" / "studio"
 VIEWS = ("motion", "sketch", "map", "forces", "phase", "strobe", "loops", "energy", "line")
 STORIES = ("one-dot", "figure-6", "buzz", "second-dot-lost", "strange", "hung-up")
+DEVICES = ("bouncing-ball", "relay-5v")
 STATE = "#rate=1250&pulses=9"
 TIMES = (3.9e-4, 1.6e-3, 6.2e-3, 2.5e-3, 1.16e-2, 3.3e-3)
 """Where the time stands in a story, s."""
-SECTION = "window.studio.studio.frames.strobe"
 SETTLED = "!window.studio.studio.busy && !window.studio.studio.stale"
-COMPLETE = (
-    "window.studio?.studio?.frames.strobe?.verdict && window.studio.studio.frames.line"
-    " && window.studio.studio.frames.map?.detail === 'full'"
-)
+SETTLED += " && !document.querySelector('.outdated')"
+OPENED = f"window.studio?.studio?.frames.map?.detail === 'full' && {SETTLED}"
+JUDGED = "(({ frames, store }) => !store.state.views.includes('strobe') || frames.strobe?.verdict)"
+JUDGED += "(window.studio.studio)"
+COMPLETE = f"{OPENED} && {JUDGED}"
 
 
 def main() -> None:
@@ -45,14 +46,26 @@ def main() -> None:
             page.run(f"document.querySelectorAll('.story')[{k}].click()")
             page.wait(SETTLED)
             rest(3000)
-            page.wait(f"{SECTION}.serial === window.studio.studio.serial")
-            page.wait(f"{SECTION}.verdict || {SECTION}.reason")
+            page.wait(f"{SETTLED} && {JUDGED}")
             page.run(f"window.studio.studio.setCursor({TIMES[k]})")
             rest()
             page.picture(IMAGES / f"story-{name}.png", ".stage")
         page.run("document.querySelector('.notice .shut').click()")
+        for name in DEVICES:
+            page.open("about:blank")
+            page.open(f"{address}#hammer={name}")
+            page.wait(COMPLETE)
+            rest()
+            page.picture(IMAGES / f"{name}.png")
+        page.size(390, 844, ratio=2)
         page.open("about:blank")
         page.open(address + STATE)
+        page.wait(COMPLETE)
+        rest()
+        page.picture(IMAGES / "phone.png")
+        page.size(1440, 900)
+        page.open("about:blank")
+        page.open(f"{address}{STATE}&views={'-'.join(VIEWS)}")
         page.wait(COMPLETE)
         # A pinned run behind one with thicker forms.
         page.run("window.studio.studio.pin()")
@@ -66,10 +79,6 @@ def main() -> None:
         page.size(1920, 1080, dark=True)
         rest(800)
         page.picture(IMAGES / "dark.png")
-        page.size(390, 844, ratio=2)
-        rest(800)
-        page.run("scrollTo(0, 0)")
-        page.picture(IMAGES / "phone.png")
         page.size(1500, 1000)
         rest(800)
         for view in VIEWS:

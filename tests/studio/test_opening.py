@@ -5,12 +5,14 @@ from typing import Any
 import pytest
 from tests.studio.browser import Page
 
+from printhammer.studio.live import VIEWS
+
 STATE = "window.studio.studio.store.state"
 SEEN = "!window.studio.studio.busy && !window.studio.studio.stale"
 
 
 @pytest.mark.slow
-def test_the_opening_stands_in_a_column_wider_than_the_others(page: Page) -> None:
+def test_the_map_takes_half_beside_the_column_of_the_opening(page: Page) -> None:
     for size in ((1280, 720), (1440, 900), (1920, 1080)):
         page.size(*size)
         page.wait(f"innerWidth === {size[0]}")
@@ -19,7 +21,9 @@ def test_the_opening_stands_in_a_column_wider_than_the_others(page: Page) -> Non
         )
         assert sketch["x"] == motion["x"] == line["x"]
         assert sketch["y"] < motion["y"] < line["y"]
-        assert motion["width"] > 1.6 * other["width"]
+        assert other["x"] < sketch["x"]
+        assert motion["width"] < other["width"] < 1.3 * motion["width"]
+        assert other["height"] > 0.8 * size[1]
         assert motion["height"] >= sketch["height"]
 
 
@@ -132,6 +136,7 @@ def test_a_tour_marks_what_it_tells(page: Page) -> None:
 
 @pytest.mark.slow
 def test_pictures_tell_their_result_to_those_who_do_not_see_them(page: Page) -> None:
+    page.run(f"window.studio.studio.store.set({{ views: {list(VIEWS)} }}); 1")
     page.wait("[...document.querySelectorAll('.caption')].every((each) => each.textContent)")
     said = page.run(
         "Object.fromEntries([...document.querySelectorAll('.panel')].map((panel) => [panel.classList[1],"

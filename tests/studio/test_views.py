@@ -120,3 +120,13 @@ def test_a_trace_has_offsets_a_name_a_residual_and_an_undo(page: Page) -> None:
     assert page.run(f"{STUDIO}.overlay.data.t.length") > 100
     page.run(f"{STUDIO}.undo(); 1")
     assert page.run(f"{STUDIO}.overlay === null && document.querySelector('.trace').hidden")
+
+
+def test_a_page_that_becomes_wide_or_narrow_shows_what_is_chosen(page: Page) -> None:
+    shown = f"{SHOWN}.map((each) => each.classList[1])"
+    page.size(390, 844)
+    page.wait(f"{shown}.join() === 'view-map'")
+    page.run("document.querySelectorAll('.story')[4].click()")
+    page.wait(f"{shown}.join() === 'view-strobe'")
+    page.size(1440, 900)
+    page.wait(f"{shown}.length === 4 && {shown}.includes('view-strobe')")

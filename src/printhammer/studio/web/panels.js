@@ -162,6 +162,15 @@ export function layout(studio, makers) {
     keepFocus();
   }
   studio.enlarge = enlarge;
+  /** On a phone one view is enlarged, the one that is chosen; a view that is enlarged elsewhere is there. */
+  function fit() {
+    const [large, hero] = [VIEWS.find((name) => panels[name].classList.contains("large")), VIEWS.find((name) => !panels[name].hidden && !BESIDE.includes(name))];
+    if (large && (panels[large].hidden || (!isNarrow() && narrow))) enlarge(large);
+    if (isNarrow() && hero && !grid.classList.contains("one") && grid.classList.contains("with-hero")) enlarge(hero);
+    narrow = isNarrow();
+  }
+  let narrow = false;
+  new ResizeObserver(() => { if (isNarrow() !== narrow) fit(); }).observe(page);
   /** Keys go to what has the focus, which must not be lost with a view that is hidden. */
   function keepFocus() {
     const { activeElement } = document;
@@ -203,7 +212,7 @@ export function layout(studio, makers) {
     const whole = others > 0 && views.length - others === beside;
     // One view beside what moves, its curve and what it prints is the hero: it takes half.
     grid.classList.toggle("with-hero", whole && others === 1);
-    if (whole && others === 1 && isNarrow() && !grid.classList.contains("one")) enlarge(views.find((view) => !BESIDE.includes(view)));
+    fit();
     mark();
     grid.classList.toggle("with-opening", whole);
     grid.style.setProperty("--rows", String(Math.ceil(others / 2)));
