@@ -77,7 +77,7 @@ def test_the_stories_show_what_they_tell(opened_browser: Any, address: str) -> N
             f"[...document.querySelectorAll('.story')].find((each) => each.textContent === '{name}').click()"
         )
         page.wait(SEEN)
-        page.wait("window.studio.studio.frames.dots.serial === window.studio.studio.serial")
+        page.wait("window.studio.studio.frames.dots.serial === window.studio.studio.frames.motion.serial")
         assert name in page.run("document.querySelector('.notice').textContent")
 
     open_story("One dot")
@@ -88,7 +88,7 @@ def test_the_stories_show_what_they_tell(opened_browser: Any, address: str) -> N
     page.run("[...document.querySelectorAll('.switch')][1].click()")
     page.wait(f"Math.abs(1 / {STATE}.rate - 700e-6) < 1e-12")
     page.wait(SEEN)
-    page.wait("window.studio.studio.frames.dots.serial === window.studio.studio.serial")
+    page.wait("window.studio.studio.frames.dots.serial === window.studio.studio.frames.motion.serial")
     assert page.run(struck) == [True, True]
     assert page.run(force)[1] > page.run(force)[0]
     open_story("Buzz printing")
@@ -155,7 +155,7 @@ def click(page: Page, selector: str) -> None:
 
 
 @pytest.mark.slow
-def test_figure_6_takes_two_clicks_and_the_lost_dot_one(opened_browser: Any, address: str) -> None:
+def test_figure_6_takes_two_clicks_and_the_lost_dot_two(opened_browser: Any, address: str) -> None:
     """By the mouse alone, from an empty page."""
     page = opened_browser()
     page.size(1440, 900)
@@ -167,6 +167,7 @@ def test_figure_6_takes_two_clicks_and_the_lost_dot_one(opened_browser: Any, add
     click(page, ".notice .switch:nth-of-type(2)")
     page.wait(f"{struck} === '11'")
     click(page, ".notice .shut")
+    click(page, ".more > summary")
     click(page, ".find-lost")
     page.wait(f"{struck}?.slice(0, 3) === '101'")
     assert page.run(f"{STATE}.rate") == pytest.approx(1473, rel=3e-3)

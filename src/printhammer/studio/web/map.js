@@ -70,9 +70,11 @@ export function mapView(body, studio) {
   let colourKey = "";
   let plane = null;
   let lost = { list: [], first: null };
+  let rendered = null; // the frame of the image
   let finger = null; // where the map is dragged
 
   function render(frame) {
+    rendered = frame;
     const [rows, columns] = frame.data.codes.shape;
     const key = JSON.stringify([frame.low, frame.high, frame.front, colours().dark]);
     if (key !== colourKey) [colourOf, colourKey] = [palette(frame.low, frame.high, frame.front, colours().dark), key];
@@ -96,6 +98,8 @@ export function mapView(body, studio) {
     const c = colours();
     plane = null;
     if (frame.reason) { refusal(pen, width, height, frame.reason); return; }
+    // It may have come while the view was hidden.
+    if (rendered !== frame) render(frame);
     const time = timeUnit(frame.end);
     const x = { low: 0, high: frame.end, label: `time, ${time.name}${frame.pattern ? `, pattern ${frame.pattern.length > 16 ? `${frame.pattern.slice(0, 15)}…` : frame.pattern}` : ""}`, factor: time.factor };
     const y = { low: frame.rates[0], high: frame.rates[1], label: "firing rate, Hz", factor: 1 };
