@@ -1,4 +1,4 @@
-"""Compensation tables over a quantity that firmware knows: rail voltage, temperature, gap or forms."""
+"""Compensation tables along one axis: rail voltage, coil temperature, pack distance or pack thickness."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _MILLIONTH: Final = 1e-6  # Resolution of axis values other than lengths in a C 
 
 @dataclass(frozen=True)
 class Axis:
-    """A quantity, such as the rail voltage, that the firmware knows and that changes the hammer."""
+    """Axis of a family of tables: an operating condition that the firmware knows, e.g. the rail voltage."""
 
     unit: str
     meaning: str
@@ -97,7 +97,7 @@ class AxisTables:
     tables: tuple[CompensationTable, ...]
 
     def at(self, value: float | str) -> CompensationTable:
-        """Interpolate the tables at an axis value; if solution branches differ, the nearer entry is used."""
+        """Interpolate the tables at an axis value; between solution branches, use the nearer entry."""
         asked = read_number(value, AXES[self.axis].unit, self.axis)
         least, most = self.values[0], self.values[-1]
         if not least <= asked <= most:
@@ -114,7 +114,7 @@ class AxisTables:
         return replace(first, **times, deviation=np.full_like(first.deviation, np.nan))
 
     def strategy(self, hammer: Hammer, value: float | str) -> TableStrategy:
-        """Return the drive strategy of the table at an axis value, with the hammer's pulses there."""
+        """Return the drive strategy of the table at an axis value, with the hammer's pulses at that value."""
         table = self.at(value)
         table.check_hammer(hammer)
         place = read_number(value, AXES[self.axis].unit, self.axis)

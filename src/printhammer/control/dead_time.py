@@ -48,7 +48,7 @@ def header_text(
     temperature: FloatArray,
     tables: Mapping[str, FloatArray],
 ) -> str:
-    """Render tables of times as a C header (C99), in mV, tenths of a degree Celsius, and nanoseconds.
+    """Render dead times and pulse widths as a C header (C99); units: mV, 0.1 degC and ns.
 
     `tables` are times, s, by name, over rails, V, and temperatures, degC; NaN becomes 0.
     """
@@ -122,7 +122,7 @@ _SAME: Final = 1e-9  # Relative tolerance of the blow
 
 
 class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
-    """Time from switching on to impact, as a function of rail and coil temperature."""
+    """Time from switching on to impact, as a function of rail voltage and coil temperature."""
 
     hammer: Hammer = part("driven hammer")
     blow: float = scalar("m/s", "impact speed that the solved widths give")
@@ -164,7 +164,7 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
         return f"dead time of {self.hammer.name}"
 
     def summary(self) -> Summary:
-        """Tabulate times and widths by rail and temperature; state where no width gives the impact speed."""
+        """Tabulate times and pulse widths by rail voltage and temperature; list points without a solution."""
         own = f"{quantity(self.own_width, 's')}, impact after {quantity(self.own_time, 's')}"
         rail, coil = np.meshgrid(self.voltage, self.temperature, indexing="ij")
         columns = [
@@ -198,7 +198,7 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
 
     @property
     def reached(self) -> float:
-        """Largest impact speed, m/s, within reach at every grid point where the hammer strikes; 0 if none."""
+        """Largest impact speed, m/s, attainable at all grid points with an impact; 0 without an impact."""
         known = self.strongest[np.isfinite(self.strongest)]
         return float(known.min()) if known.size else 0.0
 
@@ -223,7 +223,7 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
 
 @dataclass(frozen=True)
 class _Fired:
-    """Outcome of a firing from rest: time, s, speed, m/s, current, A, heat, J; NaN without impact."""
+    """Firing from rest: impact time, s, impact speed, m/s, current, A, coil heat, J; NaN without impact."""
 
     time: float = np.nan
     speed: float = np.nan
@@ -242,7 +242,7 @@ def dead_time(
     effort: Effort = DEFAULT,
     **_keywords: Unpack[InOneThread],
 ) -> DeadTime:
-    """Compute the time to impact, and the pulse width of equal impact speed, by rail and temperature.
+    """Compute time to impact and pulse width at equal impact speed, by rail voltage and coil temperature.
 
     Parameters
     ----------
@@ -365,7 +365,7 @@ def _same_blow(
 
 
 def _shortest(pulse: Waveform, width: float) -> float:
-    """Return the smallest valid width of a pulse, s, among `width` times the powers of two."""
+    """Return the smallest valid pulse width, s, in the sequence `width`, 2 `width`, 4 `width`, ..."""
     for doubling in range(2 * _DOUBLINGS):
         with suppress(InputError):
             of_width(pulse, width * 2.0**doubling)

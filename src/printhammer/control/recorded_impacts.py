@@ -155,7 +155,7 @@ def recorded_impacts(
 
 
 def _errors_of_units(estimator: ImpactEstimator, units: Sequence[Hammer]) -> tuple[float, float]:
-    """Return two RMS errors over units, s: of the estimates that are not flagged, and of the nominal time."""
+    """Return the RMS errors, s, of the unflagged estimates and of the nominal flight time over units."""
     records = [unit_record(unit, estimator, estimator.sampling) for unit in units]
     errors, believed = errors_of(estimator, records, len(records), np.random.default_rng(0))
     return root_mean_square(errors[believed]), flight_deviation(estimator, records)

@@ -135,7 +135,7 @@ def thermal_limit(
 
 
 def read_rates(path: Path) -> dict[str, list[float]]:
-    """Read a file of rates with `COLUMNS`, of which the rail is optional, for `thermal_limit`."""
+    """Read a file of rates for `thermal_limit`: columns as in `COLUMNS`, rail voltage optional."""
     from printhammer.support.tables.readings import read_table
 
     wanted = {name: COLUMNS[name] for name in ("ambient", "rate")}

@@ -1,4 +1,4 @@
-"""Simulation of the closed loop: hammers, a position sensor, and a controller that decides before each touch.
+"""Closed-loop simulation: hammers, position sensor, and a controller that decides before pack contacts.
 
 All runs are advanced from decision to decision together. At each decision the controller knows the sensor
 readings so far, and nothing else of the driven hammer. The result is an ordinary drive.
@@ -29,7 +29,7 @@ _BRANCHES: Final = tuple(MODE_NAMES.index(name) for name in ("loading", "unloadi
 
 
 class Leg(NamedTuple):
-    """A stage of the simulation: one hammer and one end time, s, per run."""
+    """Stage of a closed-loop simulation: the hammer and the end time, s, of each run."""
 
     hammers: list[Hammer]
     ends: FloatArray
@@ -92,7 +92,7 @@ class FeedbackStrategy(Declared):
         return loops
 
     def _legs(self, hammer: Hammer, now: Sequence[tuple[Loop, int]], ends: FloatArray) -> list[Leg]:
-        """Split the time up to `ends` into stages; each firing of a dot sets the pack to that of its slot."""
+        """Split runs up to `ends`, s, into stages; the pack changes when the next slot's dot is fired."""
         if self.places is None:
             return [Leg([hammer] * len(now), ends)]
         before = [self.places[loop.slots[max(dot - 1, 0)]] for loop, dot in now]
@@ -103,7 +103,7 @@ class FeedbackStrategy(Declared):
         return [Leg(before, turns), Leg(after, ends)]
 
     def _see_contacts(self, hammer: Hammer, now: Sequence[tuple[Loop, int]]) -> None:
-        """Advance runs until their latest contacts are over, and update the estimates from these contacts."""
+        """Advance runs to the ends of their latest pack contacts; update the estimates from the contacts."""
         loops = [loop for loop, _dot in now]
         starts = np.array([loop.time for loop in loops])
         over = [loop.touched.end if loop.touched is not None else loop.time for loop in loops]
@@ -112,7 +112,7 @@ class FeedbackStrategy(Declared):
         self.controller.learn(loops, contacts)
 
     def _see_flights(self, hammer: Hammer, now: Sequence[tuple[Loop, int]]) -> None:
-        """Advance runs to their next decisions, and estimate the coming touches."""
+        """Advance runs to their next decisions, and estimate the coming pack contacts from the flights."""
         loops = [loop for loop, _dot in now]
         starts = np.array([loop.time for loop in loops])
         touches = np.array([loop.touch - LEADS[loop.kind] for loop in loops])
@@ -123,7 +123,7 @@ class FeedbackStrategy(Declared):
         self.controller.estimate(loops, flights)
 
     def _carry(self, legs: list[Leg], loops: list[Loop], since: FloatArray) -> tuple[Samples, Samples]:
-        """Advance runs through stages; return sensor samples of contacts and, after `since`, of flights."""
+        """Advance runs through stages; return sensor samples of contacts and of flights after `since`, s."""
         controller, sensor, ends = self.controller, self.sensor, legs[-1].ends
         starts = np.array([loop.time for loop in loops])
         # An empty time span for a run without a contact.

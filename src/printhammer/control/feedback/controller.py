@@ -36,8 +36,8 @@ from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.threads import Progress
 
 LEADS: Final = {PUSHED: 30e-6, FREE: 10e-6}
-"""Time between decision and touch, s, by kind of touch; a push may have to end at the touch, and never begins
-before the touch."""
+"""Lead time of a decision before the pack contact, s, by kind of contact; a push may have to end at the
+touch, and never begins before the touch."""
 
 WINDOW: Final = 120e-6  # Length of the time window of samples, s
 # Expected standard deviations at a touch: displacement, as a fraction of the stroke, and speed, m/s
@@ -68,7 +68,7 @@ _POLICIES: Final = 8  # Size of the policy cache; arbitrary
 
 
 class Ahead(NamedTuple):
-    """Predicted consequences of an action: the pulse to fire, and the next touch.
+    """Predicted consequences of a control action: the pulse to fire, and the next pack contact.
 
     Times after a touch, s, of the throw, of departure from the pack and of the next touch; width of the push,
     s; kind and speed, m/s, of the next touch.
@@ -138,14 +138,14 @@ class Controller:
         loop.since = fired + _CLEAR * start.flight
 
     def _fire(self, loop: Loop, time: float, width: float) -> None:
-        """Add a push of `width`, s, that begins at `time`, s."""
+        """Add a firing: full current for `width`, s, from `time`, s, on."""
         pulse = Pulse(time)
         pulse.switch(time, self.driver.current)
         pulse.switch(time + width, 0.0)
         loop.pulses.append(pulse)
 
     def learn(self, loops: Sequence[Loop], samples: Samples) -> None:
-        """Update the estimates of the pack's front from the samples of contacts."""
+        """Update the estimated position of the pack's front from sensor samples of pack contacts."""
         rows = [k for k, loop in enumerate(loops) if loop.alive and loop.touched is not None]
         for loop in loops:
             loop.learned.drift()
@@ -153,7 +153,7 @@ class Controller:
             self._contacts.learn([loops[k] for k in rows], samples.take(rows))
 
     def estimate(self, loops: Sequence[Loop], samples: Samples) -> None:
-        """Estimate the coming touches from the samples of flights."""
+        """Estimate times and speeds of the coming pack contacts from sensor samples of the flights."""
         expected = Expected(
             np.array([loop.touch for loop in loops]),
             np.array([loop.speed for loop in loops]),
@@ -187,7 +187,7 @@ class Controller:
             loop.seen.append((samples.times[k][used], samples.shown[k][used]))
 
     def _prior_covariance(self, loop: Loop) -> FloatArray:
-        """Return the prior covariance of displacement, speed and current scale at a touch."""
+        """Return the prior covariance of displacement, speed and current scale at the next pack contact."""
         # Later launches begin with the residual motion of a landing.
         if loop.launched and len(loop.pulses) == 1:
             start = self.start
@@ -199,7 +199,7 @@ class Controller:
         return np.diag([_PLACE_ERROR * self.stroke, _SPEED_ERROR, loop.learned.scale_error]) ** 2
 
     def decide(self, now: Sequence[tuple[Loop, int]], policy: Policy) -> None:
-        """Choose the pulses of runs after their coming touches; each touch has the index of its dot."""
+        """Choose the pulses that follow the coming pack contacts; `now` pairs each run with a dot index."""
         kind = np.array([loop.kind for loop, _dot in now])
         speed = np.array([loop.speed for loop, _dot in now])
         touch = np.array([loop.touch for loop, _dot in now])
@@ -272,7 +272,7 @@ class Controller:
             self._throw(loop, float(touch[k]), ahead[k])
 
     def _ahead(self, choice: Choice, way: IntArray) -> list[Ahead]:
-        """Predict the consequences of the chosen actions, one per run."""
+        """Predict the consequences of the chosen control actions, one action per run."""
         table, rows = self.fronts.table, np.arange(len(way))
         columns = (
             table.fire[way],
@@ -285,7 +285,7 @@ class Controller:
         return [Ahead(*row) for row in zip(*(column.tolist() for column in columns), strict=True)]
 
     def _throw(self, loop: Loop, touch: float, ahead: Ahead) -> None:
-        """Add a firing that throws the armature at the end of the last pulse."""
+        """Add a firing, at the end of the last pulse, that throws the armature at the pack."""
         self._fire(loop, loop.pulses[-1].at[-1], ahead.width)
         clear = max(ahead.leaves, ahead.fire) if ahead.width != ALWAYS else ahead.leaves
         loop.since = touch + clear
@@ -293,7 +293,7 @@ class Controller:
         loop.touch, loop.speed = touch + ahead.touch, ahead.speed
 
     def _push(self, loop: Loop, pulse: Pulse, release: float, back: float) -> None:
-        """Add a push into the pack from touch to release, if required, followed by the return current."""
+        """Switch on full current from touch to release, if required, and then the return current."""
         if loop.kind == FREE and release > 0.0:
             pulse.switch(max(loop.touch, loop.time), self.driver.current)
         pulse.switch(max(loop.touch + release, loop.time), back)
@@ -315,7 +315,7 @@ class Controller:
             pulse.switch(loop.touch + end, 0.0)
 
     def _landings(self, kind: Any, speed: FloatArray, front: FloatArray) -> list[FloatArray]:
-        """Interpolate, for touches, the release time and the start and width of the brake pulse, s."""
+        """Interpolate release time, brake start and brake width, s, of soft landings after pack contacts."""
         below, share = between(self.fronts.table, kind, speed)
         nearer, farther = between_fronts(front)
         settings = []
@@ -334,7 +334,7 @@ class Controller:
         return self.fronts.landing.settled + self.start.flight
 
     def _before_rest(self, loop: Loop, dot: int) -> int:
-        """Return the number of dots between a dot and the next rest."""
+        """Return the number of dots between a dot and the next time at rest."""
         rests = np.flatnonzero(np.diff(loop.due[dot:]) >= self._rest)
         return int(rests[0]) if rests.size else max(len(loop.due) - dot - 1, 0)
 

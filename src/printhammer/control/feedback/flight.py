@@ -1,4 +1,4 @@
-"""The observer: estimates of the flying armature's state and next touch, from samples and a force model.
+"""The observer: estimates of the armature's state in flight and at the next contact, from a force model.
 
 In flight the acceleration is that of magnet and spring, a known function of displacement and current. Three
 numbers are unknown: displacement X and speed V at a reference time, and the relative deviation s of all
@@ -78,7 +78,7 @@ class FreeForce:
 
 @dataclass(frozen=True)
 class Expected:
-    """Prior expectation of M touches, one element of each array per touch.
+    """Prior mean and covariance of time, speed and current scale at M coming pack contacts.
 
     Time, s, and speed, m/s; `scale`, the relative deviation of all currents from nominal; and the covariance,
     shape (M, 3, 3), of displacement at that time, m, speed, m/s, and scale.
@@ -92,7 +92,7 @@ class Expected:
 
 @dataclass(frozen=True)
 class Flight:
-    """Flights estimated from samples: states, covariances, and the coming touches."""
+    """Flights estimated from sensor samples: states, covariances, and the coming pack contacts."""
 
     # Time, s, and speed, m/s, of the coming touch, (M,)
     touch: FloatArray
@@ -129,7 +129,7 @@ class Flight:
 def flight_from_samples(
     samples: Samples, expected: Expected, front: FloatArray, accelerations: Accelerations
 ) -> Flight:
-    """Estimate flights and coming touches of packs with their fronts at `front`, m, from samples.
+    """Estimate flights from sensor samples, and the coming contacts with packs whose front is at `front`, m.
 
     `accelerations` maps displacements, m, times, s, and scales, all broadcastable to the shape (M, K), to
     accelerations of a flying armature, m/s².
@@ -208,7 +208,7 @@ def least_squares(
 
 
 def _integrate(grid: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Integrate rows once and twice by the trapezoidal rule on equal steps, backwards from the last time."""
+    """Compute first and second time integrals of rows, backwards from the last time (trapezoidal rule)."""
     step = (grid[:, -1:] - grid[:, :1]) / (grid.shape[1] - 1)
 
     def backwards(integrand: FloatArray) -> FloatArray:
@@ -251,7 +251,7 @@ class Contacts:
         self._shifted = {0: plant.hammer}
 
     def learn(self, loops: Sequence[Loop], samples: Samples) -> None:
-        """Update front and scale of each run from the samples of its latest contact."""
+        """Update each run's pack front and current scale from sensor samples of its latest contact."""
         stroke = self._plant.stroke
         touches = [loop.touched for loop in loops if loop.touched is not None]
         places = [round(loop.learned.front / _GRID) for loop in loops]

@@ -52,7 +52,7 @@ _LARGEST_FORCE: Final = 1.15  # Force above which an action is inadmissible, rel
 
 @dataclass(frozen=True)
 class ForceMap:
-    """Peak force for each of T touches, B return currents and R releases."""
+    """Peak force on the pack for each of T touches, B return currents and R release times."""
 
     kind: IntArray  # `PUSHED` or `FREE`, (T,)
     speed: FloatArray  # Speed of the touch, m/s; evenly spaced within a kind, (T,)
@@ -67,7 +67,7 @@ class ForceMap:
         return int(np.argmin(np.abs(self.back)))
 
     def release_for(self, force: float) -> FloatArray:
-        """Return the release that gives a force, shape (T, B), s; NaN if the push is too weak.
+        """Return the release times, s, shape (T, B), that give a peak force; NaN if the current is too weak.
 
         The release is 0 if the touch exceeds the force without a push.
         """
@@ -84,7 +84,7 @@ class ForceMap:
         return float(np.interp(release, self.release, self.force[row, number]))
 
     def state(self, row: int) -> tuple[float, float]:
-        """Return displacement, m, and speed, m/s, just before a touch."""
+        """Return displacement, m, and speed, m/s, just before a pack contact."""
         speed = float(self.speed[row])
         return self.front - AHEAD * speed, speed
 
@@ -112,7 +112,7 @@ class ImpactMap:
 
 
 def force_map(plant: Plant) -> ForceMap:
-    """Simulate the peak force for all touches, return currents and releases."""
+    """Simulate the peak force for all combinations of touch, return current and release time."""
     single, driver = plant.single, plant.driver
     kinds = np.repeat([PUSHED, FREE], [len(_PUSHED_SPEEDS), len(_FREE_SPEEDS)])
     speeds = np.concatenate([_PUSHED_SPEEDS, _FREE_SPEEDS]) * single.impact_speed
@@ -130,7 +130,7 @@ def force_map(plant: Plant) -> ForceMap:
 
 
 def released_forces(plant: Plant, forces: ForceMap, keys: list[tuple[int, float, float]]) -> FloatArray:
-    """Simulate peak forces for triples of touch index, release, s, and return current, A; NaN if failed."""
+    """Simulate peak forces for keys (touch index, release time, s, return current, A); NaN if failed."""
     long = _WATCHED * plant.single.flight_time
     drives = [
         plant.driver.drive([first_pulse(int(forces.kind[row]), release, back, long, plant.driver)])
@@ -198,7 +198,7 @@ def impact_map(
 
 
 def first_pulse(kind: int, release: float, back: float, fire: float, driver: Driver) -> Switched:
-    """Return the current waveform from just before the touch up to the next push."""
+    """Return the current waveform from just before a touch up to the next firing."""
     at, levels = [0.0], [driver.current if kind == PUSHED else 0.0]
     if release > 0.0:
         at.append(AHEAD)

@@ -1,4 +1,4 @@
-"""The plant: the nominal hammer with the driver of its coil, simulations of drives, and the state of a run.
+"""The plant (nominal hammer and coil driver), its simulation, and the state of a closed-loop run.
 
 The driver switches the coil between currents of either sign. A `Loop` is the state of one closed-loop run:
 firings, motion, and the controller's estimates and plan.
@@ -29,7 +29,7 @@ from printhammer.support.threads import Progress
 
 @dataclass(frozen=True)
 class Plant:
-    """Plant: a hammer, the driver of its coil, its single-pulse dot, and the threads for simulations."""
+    """Plant: a hammer, its coil driver, its single-pulse dot, and the number of threads."""
 
     hammer: Hammer
     driver: Driver
@@ -38,7 +38,7 @@ class Plant:
 
     @cached_property
     def front(self) -> float:
-        """Front of the pack, m."""
+        """Position of the pack's front, m."""
         assert self.hammer.front is not None
         return self.hammer.front
 
@@ -48,7 +48,7 @@ class Plant:
         return self.front - self.hammer.origin
 
     def moved(self, offset: float) -> Plant:
-        """Return a copy with the pack farther away, by `offset` as a fraction of the stroke."""
+        """Return a copy whose pack is farther away by `offset`, as a fraction of the stroke."""
         travel = Perturbation(travel=offset * self.stroke)
         return replace(self, hammer=perturbed(self.hammer, travel)) if offset else self
 
@@ -77,7 +77,7 @@ STANDARD: Final = 20e-6  # Time constant if the waveform of a hammer has no deca
 
 
 class Driver(Declared):
-    """A driver that switches the coil between currents."""
+    """Coil driver that switches the current between levels, with a first-order lag."""
 
     current: float = scalar("A", "current limit, of either sign")
     edge: float = scalar("s", "time constant of the current")
@@ -100,7 +100,7 @@ class Driver(Declared):
 
 
 class BoundedSequence(PulseSequence):
-    """Sequence of driver pulses whose largest value is declared, as the current limit, not computed."""
+    """Sequence of driver pulses; the declared largest value is the driver's current limit."""
 
     bounded = True
 
@@ -166,7 +166,7 @@ class Pulse:
 
 @dataclass
 class Learned:
-    """Estimates of a driven hammer: means and standard deviations.
+    """Estimated pack front and current scale of a driven hammer, with standard deviations.
 
     `front` is the distance by which the front of the pack is farther away than nominal, as a fraction of the
     stroke; `scale` is the relative deviation of all currents from nominal.
@@ -178,24 +178,24 @@ class Learned:
     scale_error: float = SCALE_ERROR
 
     def drift(self) -> None:
-        """Add the process noise to the standard deviations of front and scale, up to their prior values."""
+        """Add process noise to the standard deviations of pack front and current scale, up to the priors."""
         self.front_error = float(min(np.hypot(self.front_error, _FRONT_DRIFT), FRONT_ERROR))
         self.scale_error = float(min(np.hypot(self.scale_error, _SCALE_DRIFT), SCALE_ERROR))
 
     def take_scale(self, scale: float, variance: float) -> None:
-        """Adopt an estimate of the scale with its variance, unless it is implausible."""
+        """Adopt an estimate of the current scale and its variance, unless the estimate is implausible."""
         if abs(scale) <= _FARTHEST * SCALE_ERROR and variance > 0.0:
             self.scale, self.scale_error = scale, float(np.sqrt(variance))
 
     def take_front(self, front: float, variance: float) -> None:
-        """Adopt an estimate of the front with its variance, unless it is implausible."""
+        """Adopt an estimate of the pack front and its variance, unless the estimate is implausible."""
         if abs(front) <= _FARTHEST * FRONT_ERROR and variance > 0.0:
             self.front, self.front_error = front, float(np.sqrt(variance))
 
 
 @dataclass
 class Touched:
-    """Contact with the pack, from which the position of the pack's front is estimated.
+    """Pack contact whose sensor samples correct the estimated position of the pack's front.
 
     `start` is before and `end` after the contact, s. At the start, `state` holds displacement, m, speed, m/s,
     and current scale, and `covariance`, shape (3, 3), their covariances.
@@ -209,7 +209,7 @@ class Touched:
 
 @dataclass(frozen=True)
 class Printed:
-    """Contact as predicted when its pulse was chosen, before its samples corrected the estimated front."""
+    """Pack contact as predicted when its pulse was chosen, before samples corrected the pack front."""
 
     # Time, s, speed, m/s, and kind of the touch
     touch: float
@@ -250,7 +250,7 @@ class Loop:
     touches: list[tuple[float, float]] = field(default_factory=list)
 
     def wait(self, dot: int) -> float:
-        """Return the time from a dot to the next one, s; infinite after the last."""
+        """Return the time from a dot to the next dot, s; infinite after the last dot."""
         return float(self.due[dot + 1] - self.due[dot]) if dot + 1 < len(self.due) else np.inf
 
     def drive(self, edge: float) -> PulseSequence:

@@ -43,10 +43,10 @@ OFFSETS: Final = (-0.07, 0.0, 0.07)
 """Distances of the pack beyond nominal, one for each map, as fractions of the stroke; evenly spaced."""
 
 STEPS: Final = 100
-"""Number of progress steps for each distance of the pack."""
+"""Number of steps of the progress bar for each distance of the pack."""
 
 _MAPPING: Final = 70
-"""Number of progress steps, for each distance of the pack, up to the completion of the impact map."""
+"""Number of steps of the progress bar, for each pack distance, up to the end of the impact map."""
 
 MIDDLE: Final = 1  # Index of the nominal distance
 
@@ -94,7 +94,7 @@ def fronts(plant: Plant, forces: ForceMap, start: Launch, progress: Progress | N
 
 
 def front_force(farther: Plant, table: ImpactMap) -> FloatArray:
-    """Compute the derivative of the force with respect to the distance of the front, see `Fronts`.
+    """Compute the derivative of the peak force with respect to the distance of the pack, see `Fronts`.
 
     `farther` has the farthest front; `table` is the map of the nominal hammer.
     """
@@ -111,7 +111,7 @@ def front_force(farther: Plant, table: ImpactMap) -> FloatArray:
 
 
 def between_fronts(front: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Locate M fronts between the maps: index of the map below, weight of the map above.
+    """Locate M pack distances between those of the maps: index of the map below, weight of the map above.
 
     A front is the distance beyond nominal as a fraction of the stroke; values outside the maps are clipped.
     """
@@ -134,7 +134,7 @@ _EFFORT: Final = 0.1  # Cost of the largest return current over a whole period
 
 
 class Committed(NamedTuple):
-    """Actions after M touches that have been taken and cannot be changed.
+    """Return currents and forces of M pack contacts that have begun, which a new choice cannot change.
 
     Return current, A; printed force relative to the single pulse; time since the touch, s.
     """
@@ -176,7 +176,7 @@ class Policy:
         return np.asarray(cost / self.period)
 
     def ahead(self, kind: IntArray, late: FloatArray, speed: FloatArray, costs: FloatArray) -> FloatArray:
-        """Interpolate the cost-to-go of touches, including the cost of the dot made at the touch."""
+        """Interpolate the cost-to-go of pack contacts, including the cost of the dot of each contact."""
         kinds, lates, speeds = np.broadcast_arrays(kind, late, speed)
         total = np.full(kinds.shape, NEVER)
         end = self._late[-1]
@@ -326,13 +326,13 @@ class Choice:
             setattr(self, name, settled.reshape(self.force.shape))
 
     def by_speed(self, values: FloatArray, way: IntArray | None = None) -> FloatArray:
-        """Interpolate a nominal array, shape (T, A), to shape (M, A), or (M,) for one action each."""
+        """Interpolate an array (T, A) of the nominal map in speed; shape (M, A), or (M,) per action."""
         every: Any = slice(None) if way is None else way
         share = self.share[:, np.newaxis] if way is None else self.share
         return blend(values[self.below, every], values[self.below + 1, every], share)
 
     def of(self, name: str, way: IntArray | None = None) -> FloatArray:
-        """Interpolate arrays of all maps, shape (T, A), to shape (M, A), or (M,) for one action each."""
+        """Interpolate arrays (T, A) of all maps in speed and distance; shape (M, A), or (M,) per action."""
         tables = [getattr(table, name) for table in self._fronts.maps]
         shape = (len(self.below), tables[MIDDLE].shape[1]) if way is None else (len(self.below),)
         values = np.empty(shape)
@@ -348,7 +348,7 @@ class Choice:
 
 
 def between(table: ImpactMap, kind: IntArray, speed: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Locate M touches between the rows of the map: index of the row below, weight of the row above."""
+    """Locate M impact speeds between the rows of a map: index of the row below, weight of the row above."""
     below, share = np.zeros(len(kind), np.int64), np.zeros(len(kind))
     for number in range(int(table.kind.max()) + 1):
         rows = np.flatnonzero(table.kind == number)

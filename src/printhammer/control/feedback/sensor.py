@@ -40,7 +40,7 @@ class Samples(NamedTuple):
     error: float
 
     def take(self, which: Any) -> Samples:
-        """Return the samples of selected rows or columns."""
+        """Select rows (runs) or columns (samples)."""
         return Samples(self.times[which], self.shown[which], self.used[which], self.error)
 
 

@@ -37,7 +37,7 @@ _SETTLED: Final = 0.65  # Time after the brake pulse until the armature counts a
 
 @dataclass(frozen=True)
 class Landing:
-    """Best brake pulse for each of the T touches of a map; NaN if the force is not reached."""
+    """Best brake pulse for each of the T touches of a force map; NaN if the print force is not reached."""
 
     release: FloatArray  # Time after the touch at which the push ends, s, (T,)
     force: FloatArray  # Force relative to the single pulse, (T,)
@@ -119,7 +119,7 @@ class Launch:
 
 
 def launch(plant: Plant, forces: ForceMap) -> Launch:
-    """Find the launch whose touch, without a push, has the fraction `_ALMOST` of the single-pulse force.
+    """Find the launch from rest that alone prints with `_ALMOST` times the single-pulse force.
 
     A short push into the pack adds the rest of the force; the length of the push is chosen when the impact
     speed is known.

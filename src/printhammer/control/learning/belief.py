@@ -56,7 +56,7 @@ class Evidence:
     rough: FloatArray  # RMS residual of the quadratic surrogate of a reading
 
     def at(self, level: float) -> FloatArray:
-        """Compute the standard deviations of the readings at a level of the continuation in the noise."""
+        """Compute the standard deviations of the readings at a noise level of the continuation method."""
         return np.asarray(np.hypot(self.noise, level * self.rough))
 
 
@@ -86,7 +86,7 @@ class Belief:
 
     @classmethod
     def of(cls, ends: Sequence[Mode]) -> Belief:
-        """Build a belief from the modes at which searches ended; duplicate modes are merged."""
+        """Build a posterior from the modes at which searches ended; duplicate modes are merged."""
         modes: list[Mode] = []
         for end in sorted(ends, key=lambda end: end.objective):
             if all(mode.apart(end) > 1.0 for mode in modes):
@@ -122,7 +122,7 @@ class Belief:
 def believe(
     evidence: Evidence, starts: Sequence[FloatArray], before: Sequence[FloatArray] = ()
 ) -> Search[Belief]:
-    """Estimate the constants of a unit from its readings; yield the constants whose readings are needed.
+    """Estimate a unit's constants from its readings; yield constants whose readings must be simulated.
 
     Searches begin at the modes `before` of the previous stage. If there are no such modes, or if none of
     these searches ends at the finest level, searches begin at each of `starts` too.

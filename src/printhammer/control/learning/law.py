@@ -79,7 +79,7 @@ class OpenLoop(NamedTuple):
 
 @dataclass(frozen=True)
 class Adjustable:
-    """Entries of a table that are learned: advance, width, and brake width of entries with a brake pulse.
+    """Table entries that are learned: advance and width of print pulses, and width of brake pulses.
 
     `base`, shape (4, entries), are the settings to which corrections are added, in s relative to the slots,
     at a slot rate in Hz, for the hammer with its driver. Corrections are arrays of shape (..., inputs), in
@@ -225,7 +225,7 @@ class _Unit(NamedTuple):
 
 @dataclass(frozen=True)
 class LearningLaw:
-    """Learning law of a production: prior, ladder, update of corrections; stores no readings of a unit."""
+    """Learning law of a production: prior, test pulses, update of corrections; stores no unit's readings."""
 
     entries: Adjustable
     production: Production
@@ -338,7 +338,7 @@ class LearningLaw:
         return np.asarray((sums / np.maximum(np.bincount(shown), 1))[:, wanted]).ravel()
 
     def _off(self, hammers: Sequence[Hammer], corrections: Sequence[FloatArray]) -> Printing[FloatArray]:
-        """Simulate the deviations of arrival and force of `TRIED`, over the limits, shape (M, 2 dots)."""
+        """Simulate normalised deviations of arrival and force on the pattern `TRIED`, shape (M, 2 dots)."""
         press, limits = self.production.press(hammers), self.entries.task.limits
         known = {id(row): self.entries.settings(row) for row in corrections}
         _dots, judgement = yield from press.order_line([known[id(row)] for row in corrections], TRIED)

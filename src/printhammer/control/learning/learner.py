@@ -100,7 +100,7 @@ class Learner:
         return float("nan") if self.belief is None else self.belief.modes[0].misfit
 
     def see(self, ladder: Readings, line: Readings) -> None:
-        """Store the sensor readings of a run: the dots of the ladder, and the dots of the line."""
+        """Store the sensor readings of a run, for the dots of the test pulses and of the test line."""
         self._ladders.append(self._normalise(ladder))
         self._line.append(self._normalise(line))
 

@@ -1,4 +1,4 @@
-"""Test prints of a learner: the ladder, chosen by greedy A-optimal design, and the test line.
+"""Test prints of a learner: test pulses (the ladder), chosen by greedy A-optimal design, and a test line.
 
 The *ladder* is a set of pulses from rest, each called a rung: a single pulse or a pair. The impact times of
 single pulses of different widths separate the strength of the coil from the distance of the pack. They do not
@@ -87,7 +87,7 @@ class Surrogate:
 
 
 DOTS: Final = 9
-"""Number of dots in the ladder, the sequence of test pulses that is printed first."""
+"""Number of dots in the ladder, the sequence of test pulses that is printed before the test lines."""
 
 # Widths of single pulses and of both pulses of a pair, as fractions of the nominal width
 _SINGLE: Final = (0.7, 0.85, 1.0, 1.15, 1.3, 1.45)
@@ -102,7 +102,7 @@ _POINTS: Final = 24  # Number of simulated hammers over which the design is aver
 
 
 class Rung(NamedTuple):
-    """A single pulse, or a pair `later` s apart; widths are fractions of the nominal width."""
+    """Single test pulse, or pair of test pulses `later` s apart; widths as fractions of the nominal width."""
 
     first: float
     later: float = 0.0
@@ -110,12 +110,12 @@ class Rung(NamedTuple):
 
     @property
     def dots(self) -> int:
-        """Number of dots of the rung: 1 for a single pulse, 2 for a pair."""
+        """Number of dots: 1 for a single test pulse, 2 for a pair."""
         return 2 if self.later else 1
 
 
 def candidates(task: Task) -> list[Rung]:
-    """List the candidate rungs of a ladder; no rung fires a pulse while the armature is in the pack."""
+    """List the candidate test pulses, single and paired; none fires while the armature is in the pack."""
     hammer, widest = task.hammers[0], task.widest / task.width
     rungs = [Rung(part) for part in _SINGLE if part <= widest]
     for first in _FIRST:
@@ -146,7 +146,7 @@ def choose(
     noise: float,
     offset: float,
 ) -> list[Rung]:
-    """Select the rungs of a ladder with `DOTS` dots by greedy A-optimal design.
+    """Select test pulses with `DOTS` dots in all by greedy A-optimal design.
 
     Parameters
     ----------
@@ -220,14 +220,14 @@ class Printed(NamedTuple):
 
 @dataclass(frozen=True)
 class Press:
-    """Press: simulates the printing of ladders and lines with hammers, at a slot rate in Hz."""
+    """Simulator of test pulses and test lines, printed with several hammers at a slot rate in Hz."""
 
     task: Task
     rate: float
     hammers: Sequence[Hammer]
 
     def ladder(self, rungs: Sequence[Rung]) -> tuple[FloatArray, FloatArray]:
-        """Simulate a ladder; return flight times, s, and normalised forces, shape (M, dots)."""
+        """Simulate test pulses (a ladder); return flight times, s, and normalised forces, shape (M, dots)."""
         return printed(self.order_ladder(rungs), self.task)
 
     def line(
@@ -236,7 +236,7 @@ class Press:
         slots: Sequence[int] = LINE,
         pulses: Sequence[Waveform] | None = None,
     ) -> tuple[DotTable, Judgement]:
-        """Simulate a line on every hammer; return the dots and their deviations.
+        """Simulate a test line on every hammer; return the dots and their deviations.
 
         `settings` holds one array of shape (4, entries) per hammer. `pulses` are the waveforms, one per
         hammer; the default is the pulse of the task for all hammers.
@@ -244,7 +244,7 @@ class Press:
         return printed(self.order_line(settings, slots, pulses), self.task)
 
     def multipliers(self, settings: FloatArray) -> FloatArray:
-        """Compute the multipliers of rows printed with settings, shape (4, entries), one for each hammer.
+        """Compute each hammer's multiplier of rows of dots printed with settings, shape (4, entries).
 
         A multiplier is the largest absolute Floquet multiplier of two rows, with a dot in every slot and in
         every second slot; see `printhammer.derivatives.rows.row_multipliers`. The result is NaN if neither

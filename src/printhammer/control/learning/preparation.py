@@ -1,4 +1,4 @@
-"""Preparation of learning for a production: the robust starting table, the ladder and the learning law."""
+"""Preparation of learning for a production: robust starting table, test pulses and learning law."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from printhammer.support.threads import together
 FORGETTING: Final = 0.02  # Default of `forgetting`
 DOUBT: Final = 0.0  # Default of `doubt`: no posterior sample may lose
 MEMBERS: Final = 400
-"""Default number of simulated hammers on which a ladder is chosen."""
+"""Default number of simulated hammers on which the sequence of test pulses is chosen."""
 _FEW: Final = 24  # Number of simulated hammers on which the open loops are compared
 
 
@@ -93,7 +93,7 @@ def law_for(
 def _law(
     production: Production, entries: Adjustable, members: int, seed: int, forgetting: float, doubt: float
 ) -> LearningLaw:
-    """Choose the ladder, and fit surrogates of its readings to simulated hammers."""
+    """Choose the test pulses, and fit surrogates of their readings to simulated hammers."""
     task, constants = production.task, production.constants
     drawn = production.variability.draw_rows(production.nominal, members, seed)
     press = production.press([hammer for _row, hammer in drawn])
@@ -124,7 +124,7 @@ def _law(
 
 
 def _own_loop(hammer: Hammer, task: Task, base: FloatArray) -> OpenLoop | None:
-    """Build the open loop of the hammer's own pulse, shifted to arrive when the driver's pulse does."""
+    """Build the open loop of the hammer's own pulse, shifted to the arrival time of the driver's pulse."""
     pulse: Any = hammer.waveform
     if not isinstance(getattr(pulse, "width", None), float):
         return None

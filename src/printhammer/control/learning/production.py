@@ -1,4 +1,4 @@
-"""Prior of a learner: nominal hammer, variability of the production, and errors of the sensor."""
+"""Prior of a learner: nominal hammer, variability of the production, and sensor errors."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Sound takes 20 us for 7 mm of air before a microphone."""
 
 @dataclass(frozen=True)
 class Production:
-    """Hammers of a production, addressed by their constants, and their readings by a sensor.
+    """Model of a production: maps rows of varying constants to hammers and to their sensor readings.
 
     A row holds the constants in prior standard deviations, followed by the errors of the sensor in prior
     standard deviations: gain of its times, gain of its forces if it measures forces, offset of its times.
@@ -56,7 +56,7 @@ class Production:
 
     @property
     def size(self) -> int:
-        """Length of a row: number of constants and sensor errors."""
+        """Length of a parameter row: number of varying constants and of sensor errors."""
         return self.constants + self.measured + 1
 
     @property
@@ -78,17 +78,17 @@ class Production:
         ]
 
     def hammers(self, rows: FloatArray) -> list[Hammer | None]:
-        """Build the hammers of rows, shape (M, size); None for a row with invalid constants."""
+        """Build hammers from parameter rows, shape (M, size); None for a row with invalid constants."""
         return self.variability.hammers(self.nominal, rows[:, : self.constants])
 
     def press(self, hammers: Sequence[Hammer]) -> Press:
-        """Return a press for hammers at the slot rate of the production."""
+        """Return a simulator of test prints for hammers at the slot rate of the production."""
         return Press(self.task, self.rate, hammers)
 
     def readings(
         self, rows: FloatArray, rungs: Sequence[Rung], lines: Sequence[FloatArray]
     ) -> Printing[FloatArray]:
-        """Predict the readings of hammers, shape (M, size): of the ladder, and of lines with settings.
+        """Predict the readings of test pulses and test lines for parameter rows, shape (M, size).
 
         The result, shape (M, measured * dots), is normalised by the limits; NaN where a dot is lost.
         """
@@ -116,6 +116,6 @@ class Production:
 def _readings_of(
     line: Printing[tuple[DotTable, Judgement]], force: float
 ) -> Printing[tuple[FloatArray, FloatArray]]:
-    """Extract from dots of a line the flight times, s, and the forces, normalised by `force`."""
+    """Extract flight times, s, and forces, normalised by `force`, from the dots of a test line."""
     dots, _judgement = yield from line
     return dots.flight_time, dots.peak_force / force

@@ -115,7 +115,7 @@ def _given_back(hammer: Hammer, most: float) -> float:
 
 
 def _indentation(static: StaticForce, single: Nominal, force: float) -> tuple[float, float]:
-    """Return indentation, m, and loading work, J, at which the pack force is `force` single-pulse forces."""
+    """Return the indentation, m, and the loading work, J, at `force` times the single-pulse force."""
     wanted, front = force * single.force, static.front
     deepest = single.indentation
     while -static.pack(front + deepest) < wanted:

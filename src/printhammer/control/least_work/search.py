@@ -154,7 +154,7 @@ def printing_profile(
 
 
 def landing_profile(shares: FloatArray, largest: float, duration: float, nodes: int) -> FloatArray:
-    """Return currents (n, nodes - 1), A, that hold the armature back and let it down on the backstop.
+    """Return currents (n, nodes - 1), A, that brake the armature and lower it onto the backstop.
 
     Like `printing_profile`, for shares (n, `LANDING_SHARES`), without the last node, where the current is
     zero.

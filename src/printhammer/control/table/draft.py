@@ -36,7 +36,7 @@ from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
     Cells = Sequence[tuple[int, History]]
-    """Entries as pairs of row and history."""
+    """Table entries as pairs of rate index and history."""
 
 VALUES: Final = (*COLUMNS, "deviation")  # Names of a table's arrays
 # Length of the row of dots that precedes a history in the dense patterns; arbitrary
@@ -112,7 +112,7 @@ class Draft:
             self._judge_rows()
 
     def _judge_rows(self) -> None:
-        """Set the deviation of equal gaps to infinity where the multiplier of their row is not below 1."""
+        """Set the deviation of histories of equal gaps to infinity where the row of dots is unstable."""
         task = self.task
         known: dict[tuple[float, float, float], Waveform] = {}
         cells = [

@@ -72,7 +72,7 @@ def histories(gaps: int, reach: int) -> list[History]:
 
 
 def numbers_before(history: Sequence[int], reach: int) -> list[int]:
-    """List the history numbers that the preceding dot may have; before a rest, the number of `history`."""
+    """List the possible history numbers of the preceding dot; after a rest, the number of `history`."""
     if not history[0]:
         return [number_of(history, reach)]
     return [number_of((*history[1:], gap), reach) for gap in range(reach + 1)]

@@ -255,7 +255,7 @@ class _Between(NamedTuple):
 
 
 def _over_rates(prefix: str, rates: int) -> _Between:
-    """Return the C code of the interpolation in the period, equivalent to `CompensationTable.at`."""
+    """Return the C code of the interpolation over the slot period, equivalent to `CompensationTable.at`."""
     rate = f"{prefix}_rate"
     share = f"""\
   const unsigned at = {prefix}_rate_at(millihertz), last = {max(rates - 2, 0)}u;
@@ -287,7 +287,7 @@ def _over_axis(prefix: str, axis: str, values: int) -> _Between:
 
 
 def _between(prefix: str, tick: float, over: _Between) -> str:
-    """Return the C function that interpolates, as `printhammer.control.table.compensation.mixed` does."""
+    """Return the C function that interpolates like `printhammer.control.table.compensation.mixed`."""
     ends = "\n".join(
         f"  low[{row}] = {prefix}_{column}{over.place.replace('%', 'below')};\n"
         f"  high[{row}] = {prefix}_{column}{over.place.replace('%', 'above')};"

@@ -71,7 +71,7 @@ _ROUNDING: Final = 1e-12  # Tolerance that includes the end of a range of delays
 
 
 def chosen(task: Task, periods: FloatArray) -> tuple[FloatArray, Ways]:
-    """Choose a candidate for each of the ascending periods, s, from one dot to the next.
+    """Choose a pulse candidate for each of the ascending periods, s, from a dot to the next dot.
 
     Returns the periods at which a candidate exists, and the chosen candidate of each.
     """
@@ -100,7 +100,7 @@ def chosen(task: Task, periods: FloatArray) -> tuple[FloatArray, Ways]:
 
 
 def _is_barred(task: Task, ways: Ways) -> BoolArray:
-    """Mask of the candidates that failed in a previously tuned table."""
+    """Mask of the pulse candidates that failed in a previously tuned table."""
     mask = np.zeros(ways.size, np.bool_)
     for period, delay, brake in task.barred:
         mask |= np.isclose(ways.period, period, 1e-9) & (ways.delay == delay) & (ways.brake == brake)

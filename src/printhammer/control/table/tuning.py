@@ -256,7 +256,7 @@ def tune(
 
 
 def _spread(hammer: Hammer) -> list[Hammer]:
-    """Return the perturbed hammers; perturbations that do not apply to the hammer's laws are skipped."""
+    """Return the perturbed hammers; perturbations that the hammer's laws do not admit are skipped."""
     hammers = []
     for by in SPREAD:
         with suppress(InputError):
