@@ -39,7 +39,7 @@ FEWER = {
     "'2e10 N s/m^2.5' --to '6e10 N s/m^2.5'": "'2e10 N s/m^2.5' --to '6e10 N s/m^2.5' --values 10",
     "--from '1.39 ms' --to '1.41 ms'": "--from '1.39 ms' --to '1.41 ms' --values 20",
     "--steps 111": "--steps 4 --firings 200",
-    "--starts 2000 --guesses 100": "--starts 50 --guesses 10",
+    "--longest 3 --starts 2000 --guesses 100": "--longest 1 --starts 50 --guesses 10",
     "um, 128'": "um, 8'",
     "m/s, 128'": "m/s, 8'",
     "ms, 256'": "ms, 8'",
@@ -51,9 +51,12 @@ FEWER = {
     "learn hendriks-1983-1": "learn hendriks-1983-1 --members 100",
     "--doublings 1": "--doublings 1 --most 20",
     "--second backstop": "--grid 3 --most 5 --second backstop",
+    "--grid 24": "",
+    "'1.23 ms' --to '1.29 ms'": "'1.24 ms' --to '1.26 ms'",
     "--yield 64": "--yield 2",
     "--yield 32": "--yield 2 --first 700Hz --step 100Hz",
     "--damping --step 50Hz": "--damping --first 700Hz --step 200Hz",
+    "--safe-rate --table table.csv": "--safe-rate --table table.csv --first 700Hz --step 100Hz",
     "--safe-rate\n": "--safe-rate --first 700Hz --step 50Hz\n",
 }
 # Pages all of whose commands together take a few seconds with compiled kernels.

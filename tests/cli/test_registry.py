@@ -30,7 +30,18 @@ NEEDED = {
     "fit coil": ("t.csv",),
 }
 # Examples that take more than a few seconds.
-LONG = {"basins", "bifurcation", "continue", "curve", "orbits", "energy", "feedback", "tune", "sweep"}
+LONG = {
+    "basins",
+    "bifurcation",
+    "continue",
+    "curve",
+    "orbits",
+    "energy",
+    "dead-time",
+    "feedback",
+    "tune",
+    "sweep",
+}
 # Examples that are part of other tests, or take minutes.
 ELSEWHERE = {
     "paper": "takes minutes; test_paper.py writes the whole report",

@@ -22,8 +22,20 @@ SLOTS = (0, 1, 2, 4, 5, 8)
 
 
 @pytest.fixture(scope="module")
-def tables() -> AxisTables:
-    return tune_along(ph.load("hendriks-1983-1"), "gap", GAPS, rate=RATE, history=1)
+def steps() -> list[tuple[int, int]]:
+    return []
+
+
+@pytest.fixture(scope="module")
+def tables(steps: list[tuple[int, int]]) -> AxisTables:
+    return tune_along(
+        ph.load("hendriks-1983-1"),
+        "gap",
+        GAPS,
+        rate=RATE,
+        history=1,
+        progress=lambda step, total: steps.append((step, total)),
+    )
 
 
 @pytest.mark.parametrize("gap", [-10e-6, 5e-6, 10e-6])
@@ -38,6 +50,11 @@ def test_dots_are_those_of_the_design(tables: AxisTables, gap: float) -> None:
     late = touched - (1e-3 + np.array(SLOTS) / RATE) - single.flight_time
     assert abs(force).max() < 0.05
     assert abs(late).max() < 15e-6
+
+
+def test_progress_does_not_go_back(tables: AxisTables, steps: list[tuple[int, int]]) -> None:
+    assert steps == sorted(steps)
+    assert 0 < steps[-1][0] <= steps[-1][1]
 
 
 def test_files_and_the_header(tables: AxisTables, tmp_path: Path) -> None:
@@ -152,6 +169,7 @@ def test_bad_axes_are_refused(tables: AxisTables) -> None:
     for axis, values, key in (
         ("weather", GAPS, "axis"),
         ("rail", ("90 V", "100 V"), "rail.axis"),
+        ("temperature", ("20 degC", "80 degC"), "temperature.axis"),
         ("gap", GAPS[:1], "gap"),
         ("gap", GAPS[::-1], "gap"),
     ):
@@ -184,16 +202,10 @@ def test_between_two_rails_dots_are_those_of_the_design(behind_a_rail: ph.Hammer
         assert abs(late).max() < 15e-6
 
 
+@pytest.mark.slow
 def test_a_warm_coil_is_on_longer(behind_a_rail: ph.Hammer) -> None:
-    steps: list[tuple[int, int]] = []
     tables = tune_along(
-        behind_a_rail,
-        "temperature",
-        ["20 degC", "80 degC"],
-        rate="600 Hz",
-        history=1,
-        reach=1,
-        progress=lambda step, total: steps.append((step, total)),
+        behind_a_rail, "temperature", ["20 degC", "80 degC"], rate="600 Hz", history=1, reach=1
     )
     cold, warm = tables.tables
     assert warm.width[0, 0] > cold.width[0, 0] + 3e-6
@@ -202,7 +214,5 @@ def test_a_warm_coil_is_on_longer(behind_a_rail: ph.Hammer) -> None:
     drive = tables.strategy(behind_a_rail, "50 degC")(driven, [(0, 1, 2)], 600.0)[0]
     for dot in ph.simulate(driven, drive).dots:
         assert dot.peak_force == pytest.approx(single.force, rel=0.05)
-    assert steps == sorted(steps)
-    assert steps[-1][0] <= steps[-1][1]
     with refused("rail.waveform"):
         tune_along(behind_a_rail, "rail", ["100 V", "130 V"], rate=RATE, largest_current="2 A")

@@ -70,6 +70,7 @@ def test_a_sample_of_labels_is_compared_at_a_tenth_of_the_tolerance(two: Basins)
     assert two.to_dataset().attrs["compared"] == two.compared
 
 
+@pytest.mark.slow
 def test_labels_that_hang_on_the_tolerance_are_counted(hammer: "ph.Hammer") -> None:
     """The orbit of a coarse tolerance is none at a finer one: pictures differ as the sample says."""
     coarse, fine = (ph.basins(hammer, period=0.98e-3, tolerance=each, **PLANE) for each in (1e-5, 1e-6))

@@ -20,9 +20,9 @@ SMALL = ("--longest", "1", "--starts", "60", "--guesses", "6")
 def test_orbits_on_the_screen_and_in_files(cli: Callable, tmp_path: Path) -> None:
     paths = {kind: tmp_path / f"orbits.{kind}" for kind in ("csv", "nc", "json", "png", "svg")}
     out = [word for path in paths.values() for word in ("--out", path)]
-    done = cli("orbits", "--period", "1.3 ms", *SMALL, *out)
+    done = cli("orbits", "hendriks-1983-1", "--period", "1.3 ms", *SMALL, *out)
     assert done.status == 0
-    found = ph.orbits(ph.load("hendriks-1983"), period=1.3e-3, longest=1, starts=60, guesses=6)
+    found = ph.orbits(ph.load("hendriks-1983-1"), period=1.3e-3, longest=1, starts=60, guesses=6)
     assert found.message in " ".join(done.out.split())
     for one in found:
         assert one.kind in done.out
