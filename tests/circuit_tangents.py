@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from tests.tangents import SHARP, SMALLEST
 
-from printhammer.derivatives.constants import flow, rest_columns
+from printhammer.derivatives.flow import flow, rest_columns
 from printhammer.derivatives.parameters import Parameter, parameter_names, parameters
 from printhammer.derivatives.states import follow, state_rows
 from printhammer.drive.trains import PulseTrain

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from printhammer.derivatives.constants import flow
+from printhammer.derivatives.flow import flow
 from printhammer.derivatives.parameters import parameters
 from printhammer.derivatives.states import problem_between, state_of, state_rows
 from printhammer.kernel.model import modes as M

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from tests.errors import refused
 
 import printhammer as ph
-from printhammer.maps.frequency import rms_difference
-from printhammer.maps.layout import LAYOUT, interpolated, map_dataset
+from printhammer.maps.frequency import LAYOUT, interpolated, map_dataset, rms_difference
 from printhammer.results import save_dataset
 
 STROKE = 234e-6

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from tests.errors import refused
 
 import printhammer as ph
-from printhammer.maps.layout import LAYOUT
+from printhammer.maps.frequency import LAYOUT
 from printhammer.maps.measured import load_measured_map
 from printhammer.results import save_dataset
 

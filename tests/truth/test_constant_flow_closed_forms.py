@@ -14,8 +14,8 @@ from tests.tangents import SHARP
 from tests.truth import oracles
 
 import printhammer as ph
-from printhammer.derivatives.constants import flow, rest_columns
 from printhammer.derivatives.dots import DOT_QUANTITIES
+from printhammer.derivatives.flow import flow, rest_columns
 from printhammer.derivatives.parameters import parameters
 from printhammer.derivatives.states import tangent_map
 from printhammer.drive.waveforms.shapes import Rectangle

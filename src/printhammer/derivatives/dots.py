@@ -14,8 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from printhammer.derivatives.constants import flow, pack_push_changes, pack_push_rate, surface_moves
-from printhammer.derivatives.flow import Flow
+from printhammer.derivatives.flow import Flow, flow, pack_push_changes, pack_push_rate, surface_moves
 from printhammer.derivatives.parameters import Parameter
 from printhammer.results import Declared, part, scalar
 from printhammer.run.contacts import Contact

@@ -1,7 +1,7 @@
 """Sensitivities of flight time, force and energy to each constant of hammer and pulse.
 
 The derivatives come from the tangent flow of the constants along one run
-(`printhammer.derivatives.constants`), not from differences of runs. `Spread` derives from them the effect of
+(`printhammer.derivatives.flow`), not from differences of runs. `Spread` derives from them the effect of
 tolerances on the dots.
 """
 
@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.derivatives.constants import rest_columns, without_current
 from printhammer.derivatives.dots import DOT_QUANTITIES, RUN_QUANTITIES, changes_of, dot_values
+from printhammer.derivatives.flow import rest_columns, without_current
 from printhammer.derivatives.parameters import Parameter, parameter_names, parameters
 from printhammer.drive.input import read_number
 from printhammer.drive.trains import Drive

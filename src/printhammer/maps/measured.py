@@ -25,7 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 from printhammer.errors import InputError, missing_extra
-from printhammer.maps.layout import interpolated, map_dataset
+from printhammer.maps.frequency import interpolated, map_dataset
 from printhammer.results import Declared, column, scalar
 from printhammer.results.files import need_for
 from printhammer.support.arrays import FloatArray

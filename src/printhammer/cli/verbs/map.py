@@ -147,7 +147,7 @@ def _axes(
 
 def _complaints(chart: xr.Dataset) -> list[str]:
     """Return one complaint for each status of runs that stopped early, with the rates of those runs."""
-    from printhammer.maps.layout import failed_rates
+    from printhammer.maps.frequency import failed_rates
 
     complaints = []
     for status, rates in failed_rates(chart).items():

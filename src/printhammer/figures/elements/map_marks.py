@@ -18,7 +18,7 @@ from printhammer.figures.elements.marks import ALONG_Y, beside, legend_above
 from printhammer.figures.elements.scales import Scale, scale
 from printhammer.figures.elements.style import HAIR, INK, MUTED, ORANGE, SMALL, foot
 from printhammer.hammer.hammer import Hammer
-from printhammer.maps.layout import failed_rates, places_of
+from printhammer.maps.frequency import failed_rates, places_of
 from printhammer.support.arrays import FloatArray
 
 COLOURS: Final = "viridis"

@@ -23,8 +23,7 @@ from printhammer.figures.elements.marks import beside, heading
 from printhammer.figures.elements.scales import Scale
 from printhammer.figures.elements.style import BLUE, HAIR, INK, MUTED, SMALL, new_figure, new_panel, styled
 from printhammer.hammer.hammer import Hammer
-from printhammer.maps.frequency import rms_difference
-from printhammer.maps.layout import places_of
+from printhammer.maps.frequency import places_of, rms_difference
 from printhammer.support.arrays import FloatArray
 
 
