@@ -102,21 +102,26 @@ def test_a_flight_too_short_and_a_dot_pushed_again_are_told_apart(modules: Path)
 
 
 WORDS = """
-const { worded, burstText } = await import("./captions.js");
+const { worded, burstText, said } = await import("./captions.js");
 const dots = [{ struck: true }, { struck: false }];
 const burst = burstText({ dots });
-const said = [worded(burst, "closing"), worded("Dot to paper", "hit"), burstText({ dots }, true)];
-console.log(JSON.stringify(said));
+const relay = { strike: "closing", struck: "pole" };
+console.log(JSON.stringify([
+  worded(burst, "closing"), worded("Dot to paper", "hit"), burstText({ dots }, true),
+  said("Dot to paper", relay), said("back at the backstop", { strike: "dot", mover: "ball" }),
+]));
 """
 
 
 def test_a_device_has_its_own_word_and_an_oscillator_loses_no_dot(modules: Path) -> None:
     command = ["node", "--input-type=module", "--eval", WORDS]
     answer = subprocess.run(command, cwd=modules, capture_output=True, text=True, check=True)
-    closing, hit, firings = json.loads(answer.stdout)
+    closing, hit, firings, pole, table = json.loads(answer.stdout)
     assert closing == "Two closings, the second lost"
     assert hit == "Hit to pack"
     assert firings == "Two firings"
+    assert pole == "Closing to pole"
+    assert table == "back at the table"
 
 
 NAMES = """

@@ -1,6 +1,6 @@
 // What each firing did: energies of the dots, and the line that they print.
 import { axes, broken, extent, line, refusal } from "./axes.js";
-import { flightText, worded } from "./captions.js";
+import { flightText, said } from "./captions.js";
 import { surface } from "./pen.js";
 import { colours, FONT } from "./theme.js";
 import { digits, shown, unitOf } from "./units.js";
@@ -97,7 +97,7 @@ function burst(pen, width, height, { dots, quality }, motion, studio, explained)
   const gaps = dots.slice(1).map((dot, k) => X(dot.fired_at) - X(dots[k].fired_at));
   const pitch = Math.min(...gaps, 44);
   const words = explained
-    ? [`${quality.struck} of ${quality.fired} dots struck, ${quality.extra} extra contacts`, quality.struck ? `force ${shown(quality.force_low, "N", 3)} to ${shown(quality.force_high, "N", 3)}` : "", flightText(dots)].map((text) => worded(text, studio.described?.strike))
+    ? [`${quality.struck} of ${quality.fired} dots struck, ${quality.extra} extra contacts`, quality.struck ? `force ${shown(quality.force_low, "N", 3)} to ${shown(quality.force_high, "N", 3)}` : "", flightText(dots)].map((text) => said(text, studio.described))
     : [];
   const middle = 0.5 * (height - 15 * words.length);
   const reach = Math.min(pitch, middle * 1.5);

@@ -143,10 +143,14 @@ export function worded(text, strike = "dot") {
   return text.replace(/\b(d|D)ot(s?)\b/g, (_all, first, plural) => `${first === "D" ? large(strike) : strike}${plural}`).replace(/\bpaper\b/g, "pack").replace("prints nothing", "is not at the pack");
 }
 
+/** Say a sentence in the words of a device: for a strike, for what is struck, and for the stop. */
+export function said(text, described) {
+  return worded(text, described?.strike).replaceAll("backstop", stopOf(described)).replace(/\b(paper|pack)\b/g, (word) => described?.struck || word);
+}
+
 /** Return what a view tells of the frames that are there; nothing before there are any. */
 export function captionOf(name, studio) {
   const { frames, described } = studio;
-  const text = () => worded(TEXTS[name](frames, studio), described?.strike).replaceAll("backstop", stopOf(described)).replace(/\b(paper|pack)\b/g, (word) => described?.struck || word);
   // A number and its unit stay on one line.
-  return frames.motion ? text().replace(/(\d) (?=[%µA-Za-z]{1,3}\b|%)/g, "$1\u00a0") : "";
+  return frames.motion ? said(TEXTS[name](frames, studio), described).replace(/(\d) (?=[%µA-Za-z]{1,3}\b|%)/g, "$1\u00a0") : "";
 }

@@ -1,7 +1,7 @@
 // The frequency-time map: colours of displacement, and a cursor that sets the rate.
 import { axes, line, refusal } from "./axes.js";
 import { printed } from "./bars.js";
-import { worded } from "./captions.js";
+import { said } from "./captions.js";
 import { surface } from "./pen.js";
 import { colours, FONT, SMALL } from "./theme.js";
 import { digits, shown, timeUnit, unitOf } from "./units.js";
@@ -186,7 +186,7 @@ export function mapView(body, studio) {
     pen.textBaseline = "middle";
     pen.fillStyle = c.panel;
     pen.globalAlpha = 0.85;
-    const text = worded("lost dot", studio.described?.strike);
+    const text = said("lost dot", studio.described);
     const wide = pen.measureText(text).width + 20;
     pen.fillRect(box.x + box.w - wide - 2, box.y + 2, wide, 13);
     pen.globalAlpha = 1;

@@ -1,5 +1,5 @@
 // What every view tells at the time of the cursor, which is the same in all.
-import { worded } from "./captions.js";
+import { said } from "./captions.js";
 import { displacementAt, valueAt } from "./curves.js";
 import { shown, unitOf } from "./units.js";
 
@@ -54,5 +54,5 @@ const TEXTS = {
 export function readoutOf(name, studio, wide = false) {
   const { frames, cursor } = studio;
   if (!frames.motion || !(cursor > 0) || !TEXTS[name]) return "";
-  return worded(TEXTS[name](frames, cursor, studio, wide), studio.described?.strike);
+  return said(TEXTS[name](frames, cursor, studio, wide), studio.described);
 }
