@@ -22,7 +22,7 @@ OVERLAPS: Final = get_args(Overlap)
 
 
 class Drive:
-    """Waveform with its firing times, immutable; `printhammer.drive.trains` has the kinds.
+    """Drive: a waveform and its firing times, immutable; `printhammer.drive.trains` has the subclasses.
 
     Two drives are equal if their segment tables, firing times, overlap rules and quantities are equal.
     """
@@ -46,7 +46,7 @@ class Drive:
 
     @property
     def waveform(self) -> Waveform:
-        """Waveform of every firing; of a sequence, the waveform of the first firing."""
+        """Waveform of every firing or, for a sequence, of the first firing."""
         return self._waveform
 
     @property
@@ -105,7 +105,7 @@ class Drive:
 
     @property
     def overlapping(self) -> int:
-        """Largest number of simultaneous pulses; 1 if each firing replaces the pulse before."""
+        """Largest number of simultaneous pulses; 1 if each firing replaces the previous pulse."""
         if self._overlap == "replace":
             return 1
         ended = np.searchsorted(np.sort(self._ends()), self._times, side="right")

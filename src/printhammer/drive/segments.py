@@ -35,7 +35,7 @@ POLYNOMIAL: Final = 0
 EXPONENTIAL: Final = 1
 SINE: Final = 2
 END: Final = 3
-"""Kind of the row that ends each table if the kernel receives several tables in one array."""
+"""Kind of the end row of each segment table if the kernel receives several tables in one array."""
 SWITCHED: Final = 4
 DECAY: Final = 5
 RESERVOIR: Final = 6
@@ -64,7 +64,7 @@ def table(rows: Iterable[Sequence[float]], end: float) -> FloatArray:
 
 
 def stacked(tables: Sequence[FloatArray]) -> tuple[list[int], FloatArray]:
-    """Concatenate segment tables for the kernel, the longest support last, with each end marked.
+    """Concatenate segment tables for the kernel in order of pulse duration, with end rows marked.
 
     Returns
     -------
@@ -112,7 +112,7 @@ def evaluate(segments: FloatArray, t: npt.ArrayLike, fired: npt.ArrayLike = 0.0)
 
 
 def filled(shape: int, fields: Sequence[float]) -> FloatArray:
-    """Build the segment table of a shape, read-only, by its code in `printhammer.drive.tables`."""
+    """Build the segment table of a shape from the shape's code in `printhammer.drive.tables`, read-only."""
     rows = np.empty((ROWS, COLUMNS))
     result = rows[: fill_table(shape, fields, rows)].copy()
     result.flags.writeable = False

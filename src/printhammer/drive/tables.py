@@ -1,4 +1,4 @@
-"""Pulses as plain functions of numbers and arrays: segment tables of the shapes, their values, firing times.
+"""Segment tables of pulse shapes, their values, and firing times, as plain functions of arrays.
 
 A plain function allocates nothing and raises nothing, so that it can be compiled as an entry point, see
 `printhammer.run.plain.entries`. Segment tables are described in `printhammer.drive.segments`; the classes of
@@ -73,7 +73,7 @@ def rate_of(time_constant: float) -> float:
 
 
 def rectangle(fields: Any, table: Any) -> int:
-    """Write the table of a rectangle: amplitude, width, time constants of rise and decay; return its rows."""
+    """Write the table of a rectangle: amplitude, width, rise and decay times; return the number of rows."""
     amplitude, width = fields[0], fields[1]
     up, down = rate_of(fields[2]), rate_of(fields[3])
     if math.isinf(up):

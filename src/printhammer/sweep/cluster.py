@@ -47,7 +47,7 @@ def run_dask(
     tell: Callable[[float], None],
     client: Any,
 ) -> None:
-    """Compute blocks on a cluster, and write each in this process when it is done.
+    """Compute blocks on a cluster, and write each block in this process when the block is done.
 
     The scheduler repeats a task whose worker is killed. A task that it abandons because it killed several
     workers is postponed until all other tasks are done, then computed alone on the cluster, in ever smaller
@@ -102,7 +102,7 @@ class _Tasks:
         return suspects
 
     def alone(self, rows: FloatArray) -> Results:
-        """Compute members one task at a time, in ever smaller pieces if the members kill the worker."""
+        """Compute members one task at a time; if members kill the worker, split the task recursively."""
         import numpy as np
 
         self._submit(rows, ())
@@ -239,7 +239,7 @@ def client_of(dask: Any) -> Iterator[Any]:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Silence the loggers of dask; errors are reported as one sentence of our own."""
+    """Silence the loggers of dask; errors are reported in one sentence instead."""
     loggers = [
         logging.getLogger(name) for name in logging.root.manager.loggerDict if name.startswith("distributed")
     ]

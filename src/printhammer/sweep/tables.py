@@ -50,7 +50,7 @@ ManyQuantities = Annotated[Any, WithJsonSchema(_MANY)]
 
 
 def read_quantity(written: Any, si: str, where: str) -> float:
-    """Parse a quantity into SI: "1.2 kHz", { value = 1.2, unit = "kHz" }, or a plain pure number."""
+    """Parse a quantity into SI: "1.2 kHz", { value = 1.2, unit = "kHz" }, or a dimensionless number."""
     with located(where, key=where):
         if isinstance(written, str):
             return parse(written, si)

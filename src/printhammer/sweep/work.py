@@ -133,7 +133,7 @@ def _from_ensemble(
 
 
 def _moments(members: Members, outputs: Outputs) -> tuple[list[FloatArray] | None, list[Any], list[int]]:
-    """Return, per member, the output times, and the indices in them of the firings and of the end time."""
+    """Return each member's output times, and the indices of the firings and of the end time in the array."""
     strobes, final = outputs.wants(*STROBES), outputs.wants(*FINAL)
     if not strobes and not final:
         return None, [], []
@@ -202,7 +202,7 @@ def run_local(
     tell: Callable[[float], None],
     threads: int | None = None,
 ) -> None:
-    """Compute blocks in threads, by default one per core, and write each when it is done.
+    """Compute blocks in threads, by default one per core; write each block when the block is done.
 
     `write` receives the index of a block in the chunk grid and its results, in this thread; `tell` is called
     from time to time with the number of members done in unfinished blocks, possibly fractional.

@@ -149,7 +149,7 @@ def constants_table(hammer: Hammer, sources: list[str]) -> Table:
 
 
 def statics(hammer: Hammer, picture: EquilibriumPicture) -> Summary:
-    """Return the facts on statics: rest state, equilibria, release current and holding margin."""
+    """Return the static properties: rest state, equilibria, release current and holding margin."""
     from printhammer.hammer.equilibrium import holding_margin
     from printhammer.results.summary import FactRow, Facts, Summary, judged, quantity, styled
 

@@ -27,7 +27,7 @@ from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import quantity
 
 TAIL: Final = 1e-3
-"""Largest remainder of a decaying waveform that the next one may cut off, as a fraction of its peak."""
+"""Largest remainder of a decaying waveform that the next waveform may cut off, relative to the peak."""
 
 _SAMPLES: Final = 257  # Samples of the remaining waveform; arbitrary
 _ROUNDING: Final = 1e-14  # Relative difference of times that counts as rounding
@@ -88,7 +88,7 @@ class Chain(Waveform):
 
 
 def _validate(parts: object) -> tuple[tuple[float, Waveform], ...]:
-    """Return the validated offsets, s, and waveforms; each begins after the previous one is over."""
+    """Return the validated offsets, s, and waveforms; no waveform begins before the previous one is over."""
     try:
         pairs = [tuple(pair) for pair in parts]  # type: ignore[attr-defined]
     except TypeError:

@@ -44,7 +44,7 @@ _DELAY_STEP: Final = 2e-6
 _DELAYS: Final = 400  # Maximum number of delays searched; a slow hammer gets a wider spacing instead
 
 PATIENCE: Final = 3.0
-"""Time to wait for a dot, as a multiple of the single pulse's time from firing to departure from the pack."""
+"""Waiting time for a dot, as a multiple of the single pulse's time from firing to the end of contact."""
 
 _ZOOMS, _PER_ZOOM = 2, 4  # Number of refinements, and factor on the spacing of each
 
@@ -100,7 +100,7 @@ class BuzzTrain(Run):
 
 
 class BuzzSearch(Declared):
-    """Result of a search for a buzz printing train: the best train, or the reason for the failure."""
+    """Result of the search for a buzz-printing train: the best train, or the reason why none was found."""
 
     train: BuzzTrain | None = part("the best train, if it prints enough dots; otherwise None")
     reason: str = part("why no train prints enough dots, in one sentence; otherwise empty")
@@ -253,7 +253,7 @@ def _run(hammer: Hammer, times: Sequence[float], patience: float | None) -> Moti
 
 
 def _departure(motion: Motion) -> float | None:
-    """Return the time, s, at which the dot of the first firing ends; None if the firing makes no dot."""
+    """Return the time, s, at which the pack contact of the first firing ends; None without a contact."""
     dot = motion.dots[0]
     if dot.flight_time is None or dot.contact_time is None or not dot.peak_force:
         return None
@@ -318,7 +318,7 @@ class _Search:
         return self.best is not None and self.best.clear and self.best.count >= self.fewest
 
     def _scan(self, grid: np.ndarray, trial: Callable[[Sequence[float]], list[BuzzTrain]]) -> None:
-        """Simulate a grid of trains and, unless one is good enough, finer grids around the best three."""
+        """Simulate a grid of trains and, unless a train is good enough, finer grids around the best three."""
         trains = {train.interval: train for train in trial(grid.tolist())}
         step, known = float(grid[1] - grid[0]), set(grid.tolist())
         for _ in range(_ZOOMS):

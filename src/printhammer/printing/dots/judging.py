@@ -58,7 +58,7 @@ class Judgement(Declared):
 
     @property
     def good(self) -> BoolArray:
-        """Mask of the requested dots that are within limits."""
+        """Mask of the requested dots whose force and arrival are within limits."""
         return np.asarray(self.wanted & (self.faults < 0))
 
     @property

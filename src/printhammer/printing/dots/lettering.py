@@ -1,4 +1,4 @@
-"""Text to dots: text is broken into print lines and set in the built-in font or a TrueType font.
+"""Conversion of text to dots: line breaking and rendering in the built-in font or a TrueType font.
 
 The built-in font has nine wires and all printable ASCII characters; it was drawn for this program. Characters
 are five columns wide and six columns apart: ten characters per inch at a column pitch of 1/60 in. Every
@@ -31,7 +31,7 @@ from printhammer.support.arrays import BoolArray
 NAME: Final = "nine-wire"
 WIRES: Final = 9  # Number of wires of the built-in font
 ADVANCE: Final = 6
-"""Columns from the start of one character to the start of the next."""
+"""Character pitch: number of columns from the start of a character to the start of the next character."""
 
 _COLUMNS: Final = 5  # Number of columns of a character
 _STEP: Final = 7  # Columns from character to character in the font file

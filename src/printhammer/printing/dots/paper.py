@@ -107,7 +107,7 @@ class Paper(Declared):
         return np.asarray(np.clip(off, -_WIDEST, _WIDEST))
 
     def hammers(self, hammer: Hammer, slots: int, pitch: float) -> tuple[Hammer, ...]:
-        """Return the hammer with the pack at each slot, for a slot pitch in m; the platen does not move."""
+        """Return one hammer per slot, with the slot's pack, for a slot pitch in m; the platen is fixed."""
         spread = {"pack.stiffness": self.stiffness, "pack.front": self.front}
         for key, value in spread.items():
             if value and key not in hammer.constants:
@@ -135,7 +135,7 @@ _LATER: Final = 5e-6  # Step by which a segment is extended while the armature i
 
 
 class PiecewiseMotion:
-    """Piecewise simulation with the contacts, dots and energy of a `printhammer.run.motion.Motion`."""
+    """Motion simulated in segments, with contacts, dots and energy as in `printhammer.run.motion.Motion`."""
 
     def __init__(self, hammer: Hammer, drive: Drive, pieces: Sequence[Motion]) -> None:
         self.hammer = hammer

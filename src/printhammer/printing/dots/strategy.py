@@ -76,7 +76,7 @@ def de_bruijn(order: int = SLOTS) -> BoolArray:
 
 
 def cycle_with_lead_in(order: int = SLOTS, lead_in: int = LEAD_IN) -> BoolArray:
-    """Return one turn of the de Bruijn cycle, preceded by the last `lead_in` slots of the cycle.
+    """Return one period of the de Bruijn cycle, preceded by the last `lead_in` slots of the cycle.
 
     The run begins at rest with the lead-in, so that every evaluated slot, from index `lead_in` onward, has
     the same last `lead_in` slots before it as in an endless cycle.
@@ -118,7 +118,7 @@ def open_loop(hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) 
 
 
 class OpenLoop:
-    """The open loop with an optional waveform in place of the hammer's own; see `open_loop`.
+    """Open-loop strategy, with an optional waveform in place of the hammer's own waveform; see `open_loop`.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ ROW: Final = 200  # Number of slots of a row of dots
 STEPS: Final = (1, 2, 3)  # Slots from one dot to the next in the rows
 
 TEXT: Final = "Pack my box with five dozen liquor jugs 0123456789"
-"""The line of text: every letter of the alphabet and every digit."""
+"""Text of the test line: every letter of the alphabet and every digit."""
 
 Kind = Literal["cycle", "row", "text"]
 KINDS: Final = get_args(Kind)

@@ -44,7 +44,7 @@ _EQUAL: Final = 1e-6
 
 
 class Case(NamedTuple):
-    """A hammer, the single-pulse dot to which its dots are compared, and a slot rate, Hz."""
+    """Case of a trial: hammer, single-pulse dot for comparison, and slot rate, Hz."""
 
     hammer: Hammer
     nominal: SinglePulse
@@ -132,7 +132,7 @@ def attempt(
 
 
 def fired_of(strategy: Strategy, hammer: Hammer, drive: Drive) -> Waveform:
-    """Return the waveform that sets the simulation length: that of the strategy, hammer or drive."""
+    """Return the waveform whose length sets the simulation time: from the strategy, hammer or drive."""
     own = getattr(strategy, "waveform", None)
     return own if isinstance(own, Waveform) else hammer.waveform or longest_of(drive)
 
@@ -153,7 +153,7 @@ def attempt_patterns(
     stop: bool,
     **options: Any,
 ) -> list[list[tuple[Trial, int]]]:
-    """Simulate patterns in cases, and with `long` also the long patterns where all patterns pass.
+    """Simulate patterns in all cases and, with `long`, the long patterns in the cases that pass.
 
     With `stop`, the long patterns are simulated only up to the first case that fails. The result holds for
     each case its one or two trials, with the index of the case in the trial.
@@ -171,7 +171,7 @@ def attempt_patterns(
 
 
 def words_of(patterns: Iterable[Sequence[int]], gap: int) -> list[tuple[int, ...]]:
-    """List the words of patterns, each once: slots from 0 on, with all distances below `gap` slots.
+    """Split patterns into words of dots less than `gap` slots apart; list the distinct words, from slot 0.
 
     Patterns are split where consecutive dots are `gap` slots or more apart.
     """
@@ -190,7 +190,7 @@ def attempt_words(
     strategy: Strategy,
     **options: Any,
 ) -> tuple[Trial, int] | None:
-    """Simulate the words of patterns in cases (hammer and rate), in order of rate.
+    """Simulate the words (groups of close dots) of patterns in all cases (hammer and rate), by rate.
 
     Each word is followed by one more dot, which has to equal the first dot of the word, from rest: only then
     is the word separate from what follows. Of a row only the first dots are simulated, and the last of these
@@ -232,5 +232,5 @@ def _shortened(word: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def _are_equal(values: FloatArray) -> BoolArray:
-    """Whether the values of each row equal the first within `_EQUAL`; False where one is NaN."""
+    """Whether all values of a row equal its first value within `_EQUAL`; False for a row with NaN."""
     return np.asarray(np.isclose(values, values[:, :1], rtol=_EQUAL, atol=0.0).all(axis=1))

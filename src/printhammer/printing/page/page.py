@@ -137,7 +137,7 @@ _MOST_DOTS: Final = 5_000_000  # Largest number of dots of a page; arbitrary, bo
 
 
 class Page(Result, rows="dot"):
-    """A printed page: every requested dot, every extra contact, every simulation."""
+    """Printed page: the requested dots, the extra contacts, and the simulations of all wires."""
 
     hammer: Hammer = part("hammer of every wire")
     pattern: Pattern = part("requested dots")
@@ -236,7 +236,7 @@ class Page(Result, rows="dot"):
         }
 
     def entries(self) -> Entries:
-        """Return the dot columns: the fields, the faults by name, and the positions on the paper."""
+        """Return the columns of the dot table: declared fields, fault names, and positions on the paper."""
         (x, y), (extra_x, extra_y) = self.places, self.extra_places
         more = (
             ("fault", "1", "first fault, by the limits", "dot", _FAULTS[self.fault]),
@@ -318,7 +318,7 @@ class Page(Result, rows="dot"):
         return {name: int((self.fault == number).sum()) for number, name in enumerate(FAULTS)}
 
     def worst_place(self, slots: int) -> tuple[int, int]:
-        """Locate the worst print: return the print line and first slot of the worst window of `slots` slots.
+        """Locate the window of `slots` slots with the largest print error; return its line and first slot.
 
         The measure is summed over the window: a lost dot counts 1, a printed dot its placement error in slots
         plus its deviation in density, an extra contact its density. Both indices count from 0; the first
@@ -430,7 +430,7 @@ def print_page(
 
 
 def _dots_of(trial: Trial) -> dict[str, Any]:
-    """Collect the page columns of the dots and extra contacts of a trial, wire after wire."""
+    """Assemble the columns of a page from the dots and extra contacts of a trial, wire by wire."""
     ((_hammer, single, _rate),) = trial.cases
     dots, extra, judged, wanted = trial.dots, trial.extra, trial.judgement, trial.slots >= 0
     assert extra is not None

@@ -1,4 +1,4 @@
-"""Dot patterns: the dots requested of each wire in each slot of each print line, and pattern files.
+"""Dot patterns: masks of the requested dots by print line, wire and slot, and pattern files.
 
 Patterns are read from and written to TOML or bitmap files.
 
@@ -42,7 +42,7 @@ FORMAT: Final = 1  # Version of the pattern file format
 
 BITMAPS: Final = {".png": "PNG", ".pbm": "PPM", ".bmp": "BMP"}
 SUFFIXES: Final = (".toml", *BITMAPS)
-"""File suffixes of bitmaps, and of all pattern files."""
+"""File suffixes of bitmaps (`BITMAPS`), and of all pattern files (`SUFFIXES`)."""
 
 _KEYS: Final = ("format", "name", "wires", "rows")
 _DOT, _EMPTY = "#", "."
@@ -182,7 +182,7 @@ def write_pattern(path: str | Path, name: str, dots: BoolArray) -> None:
 
 MOST_WIRES: Final = 1000
 MOST_CELLS: Final = 50_000_000
-"""Largest number of wires of a head, and of cells of a pattern; arbitrary."""
+"""Limits on the number of wires of a head, and on the number of cells of a pattern; arbitrary."""
 
 _TITLE: Final = 60  # Largest length of a title in a picture; arbitrary
 

@@ -73,7 +73,7 @@ class Material(Declared):
 
 
 def materials(hammer: Hammer, single: Nominal) -> list[Material]:
-    """List the default materials for a hammer and its single-pulse dot.
+    """List the default replacement materials for a hammer and its single-pulse dot.
 
     Hard backstops have other constants of equations (6) and (7); elastomers follow the law of Kuwabara and
     Kono; packs are softer or harder by equation (5), or a spring with a dashpot. The stiffness of such a

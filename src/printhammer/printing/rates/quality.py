@@ -54,7 +54,7 @@ MOST_SLOTS: Final = 20_000  # Largest number of slots in a pattern; arbitrary
 
 
 class Spread(Declared):
-    """Statistics of a sample; all but the count are NaN if the sample is empty."""
+    """Statistics of a sample; all statistics except the count are NaN if the sample is empty."""
 
     count: int = part("sample size")
     mean: float = part("mean")
@@ -165,7 +165,7 @@ class Quality(Result):
         return Summary([Facts(rows)])
 
     def notes(self) -> dict[str, Any]:
-        """Return the key figures of the report; each name ends in the unit."""
+        """Return the key figures of the report, as attributes of the Dataset; each name ends in the unit."""
         spreads = {
             f"{name}_{measure}_{unit}": getattr(getattr(self, f"{name}_spread"), measure)
             for name, unit in _SPREADS.items()
@@ -230,7 +230,7 @@ class Quality(Result):
     @property
     @derived("1", "whether the arrivals meet the dot-matrix tolerance", name="dot_matrix_tolerance")
     def dot_matrix(self) -> bool:
-        """Whether no dot is lost and the arrivals vary by at most 200 us, as dot matrix printing needs.
+        """Whether no dot is lost and arrivals vary by at most 200 us, the limit for dot matrix printing.
 
         If every dot is fired at its slot, arrivals vary as the flight times do, for which the paper states
         the limit.
@@ -240,7 +240,7 @@ class Quality(Result):
     @property
     @derived("1", "whether the arrivals meet the engraved-character tolerance", name="engraved_tolerance")
     def engraved(self) -> bool:
-        """Whether no dot is lost and the arrivals vary by at most 30 us, as engraved characters need."""
+        """Whether no dot is lost and arrivals vary by at most 30 us, the limit for engraved characters."""
         return self._within(ENGRAVED_SPREAD)
 
     def _within(self, peak_to_peak: float) -> bool:

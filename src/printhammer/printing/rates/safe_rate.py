@@ -71,7 +71,7 @@ _HAMMERS_AT_ONCE: Final = 32  # Number of hammers per ensemble; arbitrary
 
 
 class Failure(Declared):
-    """The first dot outside the limits at the first rate that does not pass."""
+    """First dot outside the limits at the lowest slot rate that fails."""
 
     rate: float = scalar("Hz", "slot rate")
     pattern: str = part(

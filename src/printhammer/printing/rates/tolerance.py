@@ -36,14 +36,14 @@ MOST: Final = 100_000  # Largest number of hammers in a yield; arbitrary
 
 Judged = Literal["own", "design"]
 GAP: Final = "pack.front"
-"""The position whose spread applies to its distance from the backstop, since the origin of x is arbitrary."""
+"""Position whose spread is relative to the distance from the backstop (the origin of x is arbitrary)."""
 
 FIXED: Final = ("backstop.position", "platen")
-"""Constants without a default spread: the origin of x, and the platen, which no force depends on."""
+"""Constants without a default spread: the origin of x and the platen; no force depends on either."""
 
 
 _SHARES: Final = (0.95, 0.5)
-"""Fractions of the hammers for which a summary reports the largest rate that they all reach."""
+"""Fractions of the hammers; a summary reports the largest rate that each of these fractions reaches."""
 
 
 class ToleranceYield(Result):
@@ -179,7 +179,7 @@ def tolerance_yield(
     effort: Effort = DISPLAY,
     **_keywords: Unpack[Keywords],
 ) -> ToleranceYield:
-    """Draw hammers whose constants vary about a design, and determine which of them print within limits.
+    """Draw hammers whose constants vary about a design, and determine which hammers print within limits.
 
     Every constant is uniform within its spread, drawn by a scrambled Sobol sequence.
 

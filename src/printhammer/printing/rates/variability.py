@@ -146,7 +146,7 @@ CONSTANTS: Final = {
     "travel": (("pack.front",),),
     "paper": (("pack.stiffness",),),
 }
-"""Constants that each standard deviation applies to: the first of the groups that the hammer has."""
+"""Constants that each standard deviation varies: the first listed group that the hammer has."""
 
 _TRIES: Final = 10  # Maximum number of batches drawn, each of the requested size; arbitrary
 WIDEST: Final = 3.0
@@ -247,7 +247,7 @@ class Variability(Declared):
         )
 
     def sigma_points(self, hammer: Hammer) -> list[Hammer]:
-        """Return the sigma points: hammers with a single constant shifted by plus or minus its deviation."""
+        """Return the sigma points: hammers with one constant shifted by plus or minus its deviation."""
         own = np.eye(len(self.constants(hammer)))
         points = self.hammers(hammer, np.concatenate([own, -own]))
         return [point for point in points if point is not None]
