@@ -1,4 +1,4 @@
-"""Nonsmooth dynamics of pulse trains: strobe maps, orbits, continuation, exponents, bifurcations, basins."""
+"""Nonsmooth dynamics of pulse trains: strobe maps, orbits, continuation, Lyapunov exponents, basins."""
 
 from printhammer.chaos.basins.basins import BasinEntropy, Basins, basin_entropy, basins
 from printhammer.chaos.basins.quench import QuenchMap, quench_map

@@ -1,4 +1,4 @@
-"""Impact maps, Poincaré sections at the touches of backstop or pack, and statistics of impact trains.
+"""Impact maps, Poincaré sections at the impacts on backstop or pack, and statistics of impact trains.
 
 At a touch the displacement is that of the surface. The remaining state is the velocity and the time since the
 last firing; from touch to touch these two are an iterated map, like the strobe map from firing to firing,
@@ -41,13 +41,13 @@ Surface = Literal["pack", "backstop"]
 SURFACES: Final = get_args(Surface)
 
 TOUCHES: Final = 1000
-"""Default number of touches of a section."""
+"""Default number of impacts in a Poincaré section."""
 
 _FIRINGS_A_TOUCH: Final = 10  # Default maximum number of firings per requested touch
 
 
 class Section(Result):
-    """Poincaré section: states of a hammer at the touches of a surface."""
+    """Poincaré section: states of a hammer at its impacts on one surface."""
 
     hammer: Hammer = part("the hammer")
     drive: Drive = part("the drive")
@@ -85,7 +85,7 @@ class Section(Result):
     @property
     @derived("1", "number of the touch", "touch", kind="coordinate", dtype=np.int32)
     def touch(self) -> IntArray:
-        """Numbers of the touches, counted from 1."""
+        """Numbers of the impacts, counted from 1."""
         return np.arange(1, len(self.t) + 1)
 
     @property
@@ -95,7 +95,7 @@ class Section(Result):
 
     @property
     def per_firing(self) -> float:
-        """Mean number of touches per firing; NaN if only one firing is covered."""
+        """Mean number of impacts per firing; NaN if only one firing is covered."""
         fired = self.last - self.first
         return int((self.firing < self.last).sum()) / fired if fired else float("nan")
 

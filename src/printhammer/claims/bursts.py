@@ -159,7 +159,7 @@ def _exceeds(drive: Drive, limit: float) -> bool:
 
 
 def hang_up_range(context: Context) -> tuple[float | None, list[Motion], float]:
-    """Return the lowest rate at which bursts hang up, the motions from there up, and the highest rate.
+    """Return the lowest rate at which bursts hang up, the motions from this rate on, and the highest rate.
 
     The rates are in Hz; the highest is the last rate of the claim, or the one that the current limit permits.
     """
@@ -336,7 +336,7 @@ def map_sensitivity(context: Context, claim: Claim) -> Measured:
 def erratic_pairs(
     struck: BoolArray, flight_time: FloatArray, settings: Mapping[str, Any]
 ) -> tuple[BoolArray, BoolArray]:
-    """Mask the pairs of neighbouring rates between which a late dot changes, and rates at which dots vary.
+    """Return masks of neighbouring rates between which a later dot changes, and of rates with unequal dots.
 
     A dot changes if it is printed at only one of the two rates, or if its flight times, s, differ by more
     than `flight_time_change_s`; dots before `first_dot` do not count. Dots vary if one is lost, or if their
@@ -353,7 +353,7 @@ def erratic_pairs(
 def erratic_share(
     rates: FloatArray, erratic: BoolArray, varies: BoolArray, hang_up: float | None
 ) -> tuple[float | None, float | None]:
-    """Return the fraction of erratic pairs between the first varying rate and hang-up, and that first rate.
+    """Return the fraction of erratic pairs from the first rate with unequal dots to hang-up, and that rate.
 
     Rates are in Hz; the pairs are from `erratic_pairs`. None if dots vary at no rate, or only after hang-up.
     """
@@ -366,7 +366,7 @@ def erratic_share(
 
 @measures("chaotic_region", *WHOLE)
 def chaotic_region(context: Context, claim: Claim) -> Measured:
-    """Measure the fraction of neighbouring rates between which a late dot changes, before hang-up."""
+    """Measure the fraction of neighbouring rates below hang-up between which a later dot changes."""
     rates = rates_of(claim.settings)
     pulses = claim.settings["pulses"]
     dots = context.dots([PulseTrain(context.waveform, rate=rate, pulses=pulses) for rate in rates])

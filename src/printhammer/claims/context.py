@@ -23,7 +23,7 @@ CYCLE: Final = 20e-3
 TAIL: Final = 4e-3
 """Time simulated after the last firing of a train, s, so that its dot is included."""
 
-_IDLE: Final = 1e-3  # Firing time of a motion at rest, which ends before it, s; arbitrary
+_IDLE: Final = 1e-3  # Firing time after the end of a motion at rest, s; arbitrary
 
 _T = TypeVar("_T")
 
@@ -67,7 +67,7 @@ class Context:
 
     @property
     def waveform(self) -> Waveform:
-        """The standard waveform of the hammer."""
+        """Standard waveform of the hammer."""
         own: Waveform = self.need("waveform")
         return own
 

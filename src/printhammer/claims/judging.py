@@ -35,7 +35,7 @@ _PRINTED_DIGITS: Final = 1e-9  # Relative difference up to which numbers are equ
 
 
 class Claim(Declared):
-    """Claim of the paper that can be checked: what to measure, and the band of allowed values."""
+    """Claim of the paper that can be checked, with the bands of allowed values of measured quantities."""
 
     name: str = part("name")
     kind: Kind = part('"stated", "typical" or "shape"')
@@ -120,7 +120,7 @@ class JudgedClaim(Declared):
 
     @property
     def statements(self) -> tuple[int, int]:
-        """Number of statements that hold, and total number; each entry of a list is a statement."""
+        """Numbers of statements that hold and of all statements; each entry of a list is one statement."""
         value = self.value or {}
         lists = {name: band for name, band in self.claim.band.items() if _is_texts(band)}
         if not lists:

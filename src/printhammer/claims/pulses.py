@@ -49,7 +49,7 @@ def single_pulse_stroke(context: Context, _claim: Claim) -> Measured:
 
 @measures("settle_out", *WHOLE)
 def settle_out(context: Context, _claim: Claim) -> Measured:
-    """Measure height and duration of the rebounds after the first backstop touch of a single pulse."""
+    """Measure height and duration of the rebounds from the backstop after a single pulse."""
     motion, stroke = context.single, context.stroke
     times, x = motion.maxima
     after = x[times > context.returns[0].t_in] - context.position
@@ -71,7 +71,7 @@ def settle_out(context: Context, _claim: Claim) -> Measured:
 
 @measures("low_restitution", *WHOLE)
 def low_restitution(context: Context, _claim: Claim) -> Measured:
-    """Measure the ratio of rebound speed to impact speed for each backstop touch of a single pulse."""
+    """Measure the ratio of rebound speed to impact speed for each backstop impact after a single pulse."""
     left = [(c.v_in, c.v_out) for c in touches(context.single) if c.v_out is not None and c.v_in != 0.0]
     if not left:
         raise NotMeasurableError("The armature never leaves the backstop again after a single pulse")
@@ -88,7 +88,7 @@ def low_restitution(context: Context, _claim: Claim) -> Measured:
 
 @measures("backstop_force_dominates", *WHOLE)
 def backstop_force_dominates(context: Context, _claim: Claim) -> Measured:
-    """Measure the largest total force during backstop touches, and outside them, after a single pulse."""
+    """Measure the largest total force during and outside backstop contacts, after a single pulse."""
     motion = context.single
 
     def total(t: FloatArray) -> FloatArray:
@@ -108,7 +108,7 @@ def backstop_force_dominates(context: Context, _claim: Claim) -> Measured:
 
 @measures("quiet_look_loud_force", *WHOLE)
 def quiet_look_loud_force(context: Context, claim: Claim) -> Measured:
-    """Measure the largest backstop force in touches that follow a rebound too low to be seen."""
+    """Measure the largest backstop force of the impacts after rebounds too low to be seen."""
     static = float(context.idle.forces_at(0.0)["backstop"][0])
     quiet = claim.settings["quiet_rebound_over_stroke"] * context.stroke
     late = {bounce.end for bounce in rebounds(context.single, context.position) if bounce.height < quiet}
@@ -278,7 +278,7 @@ def _described(train: BuzzTrain) -> str:
 
 @measures("buzz_printing", *WHOLE)
 def buzz_printing(context: Context, claim: Claim) -> Measured:
-    """Measure number and relative force of the dots that the best train prints without a backstop touch."""
+    """Measure number and relative force of the best train of dots without backstop contacts in between."""
     search = buzz_search(context)
     train = search.best
     if train is None or not train.count:

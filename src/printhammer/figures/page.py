@@ -242,7 +242,7 @@ def _zoom_title(page: Page) -> str:
 
 
 def _dots(page: Page) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return positions across and down, m, and densities of all dots on the paper, with extra contacts."""
+    """Return positions across and down, m, and densities of all dots on paper, with extra contacts."""
     printed, extra = (*page.places, page.density), (*page.extra_places, page.extra_density)
     across, down, density = (
         np.concatenate([values[page.printed], more]) for values, more in zip(printed, extra, strict=True)

@@ -158,7 +158,7 @@ TAIL: Final = 1e-3
 """Default time shown after the last firing at the lowest rate, s; arbitrary. Longer for slow devices."""
 
 MOST_CELLS: Final = 200_000_000
-"""Largest number of displacements in a map; arbitrary, catches typing errors in rates and times."""
+"""Largest number of cells of a map; arbitrary, catches typing errors in rates and times."""
 
 
 @computation

@@ -114,7 +114,7 @@ def percent(part: float) -> str:
     shown = 100.0 * part
     # Enough digits to distinguish the fraction from all or none.
     text = f"{shown:.2g}" if shown < 10.0 else f"{shown:.{max(0, math.ceil(-math.log10(100.0 - shown)))}f}"
-    # Without an exponent.
+    # Format without an exponent.
     return f"{Decimal(text):f}\N{NO-BREAK SPACE}%"
 
 
@@ -163,7 +163,7 @@ class Report(Declared):
 
     @property
     def statements(self) -> tuple[int, int]:
-        """Number of the paper's statements that hold, and of all of them; each panel of Fig. 11 is one."""
+        """Numbers of the paper's statements that hold and of all statements; Fig. 11 counts one per panel."""
         pairs = [result.statements for result in self.results]
         return sum(held for held, _ in pairs), sum(made for _, made in pairs)
 
@@ -240,7 +240,7 @@ def misses(claim: Claim, value: Mapping[str, Any] | None) -> list[Miss]:
 
 
 def agreement(value: Any, band: list[str]) -> str:
-    """Format the number of words in a list that equal those in the band, such as "9 of 12 as printed"."""
+    """Format the number of classifications that agree with the paper, such as "9 of 12 as printed"."""
     words = value if isinstance(value, (list, tuple)) else []
     same = sum(one == other for one, other in zip(words, band, strict=False))
     return f"{same} of {len(band)} as printed"

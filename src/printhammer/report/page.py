@@ -1,4 +1,4 @@
-"""HTML page of a report: one self-contained file, with its data as text and positions on scales."""
+"""HTML page of a report: one self-contained file, rendered from texts and positions on scales."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ def schemes_view(report: Report) -> dict[str, Any] | None:
 
 
 def predictions_view(report: Report) -> dict[str, Any] | None:
-    """Return the predictions of the search on the stated claims alone; None without data."""
+    """Return the predictions of hammers found by searching on the stated claims alone; None without data."""
     predictions = report.reconstruction.predictions
     if predictions is None or not report.reconstructed:
         return None
@@ -273,7 +273,7 @@ def _dots(values: Iterable[float], ends: tuple[float, float] | None = None) -> l
 
 
 def _member(member: FamilyMember, names: list[str]) -> dict[str, Any]:
-    """Return a hammer with its verdicts and consequences."""
+    """Return the table row of a hammer of the family: counts of claims that hold, and conclusions."""
     kinds = {name: claim.kind for name, claim in every_claim().items()}
     verdicts = list(member.verdicts.values())
     stated = [verdict for name, verdict in member.verdicts.items() if kinds[name] == "stated"]

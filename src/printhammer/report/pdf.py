@@ -88,7 +88,7 @@ def _contents(report: Report) -> dict[str, Any]:
 
 
 def _plain(entry: Any) -> Any:
-    """Convert an object of a view to plain JSON data."""
+    """Convert a value of the report's data to plain JSON data."""
     if isinstance(entry, JudgedClaim):
         claim = {
             name: getattr(entry.claim, name) for name in ("name", "kind", "source", "says", "reading", "note")

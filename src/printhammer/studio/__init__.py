@@ -1,4 +1,4 @@
-"""Studio: hammer, drive and all their pictures in one HTML file that computes in the browser.
+"""Studio: an HTML file that simulates hammers in the browser and plots their motions.
 
 `live_page` returns the page, `widget` shows it in a notebook and needs the extra `notebook`.
 """

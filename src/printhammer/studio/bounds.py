@@ -14,7 +14,7 @@ MOST_DOTS: Final = 200
 """Largest number of dots in a dotted TOML key of a file dropped on the page."""
 
 LONGEST_REASON: Final = 500
-"""Largest length of the reason of a refusal, characters."""
+"""Largest length of an error message about a refused input, characters."""
 
 MOST_PULSES: Final = 64
 """Largest number of firings of a drive, and of slots of a pattern."""
@@ -73,4 +73,4 @@ GAP: Final = 65535
 """Integer code of a map cell without a displacement."""
 
 POINTS_OF_SECTION: Final = (25, 50, 100, 150, 200, 300, 400)
-"""Numbers of strobe points that are shown one after the other."""
+"""Numbers of strobe points after which the section is redrawn during its computation."""

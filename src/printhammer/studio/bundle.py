@@ -16,7 +16,7 @@ _EXPORT: Final = re.compile(r"^export (?=(async )?function|const|let|class)", re
 
 _BLOCK: Final = 16
 _SHORTEST: Final = 32
-"""Bytes of a block that is looked up, and of the shortest copy: smaller ones give no smaller page."""
+"""Length of a hashed block and of the shortest copy, bytes; smaller lengths give no smaller page."""
 
 
 @lru_cache
@@ -35,17 +35,17 @@ def page_files() -> dict[str, bytes]:
 
 
 def inside(content: object) -> str:
-    """Return JSON in which no text resembles the end of a script."""
+    """Return JSON in which "<" is escaped, so that no text ends the enclosing script element."""
     return json.dumps(content).replace("<", "\\u003c")
 
 
 def merged(wanted: str) -> str:
-    """Return a module of the page and its dependencies as one script without imports, as workers need it."""
+    """Return a module of the page and its dependencies as one script without imports, for web workers."""
     return "\n".join(_EXPORT.sub("", _IMPORTS.sub("", text)) for _, text in sources(wanted))
 
 
 def sources(wanted: str) -> list[tuple[str, str]]:
-    """Return a module and its dependencies, each before those that import it, by name from the root."""
+    """Return a module and its dependencies in order of import, as pairs of path and text."""
     texts = {name: data.decode() for name, data in page_files().items() if name.endswith(".js")}
     ordered: dict[str, str] = {}
 
@@ -72,13 +72,13 @@ def style() -> str:
 
 
 def deltas(content: bytes) -> bytes:
-    """Replace what has occurred before by copies, at any distance; gzip only looks back by 32 kB.
+    """Compress repeated bytes by LZ77 copies at any distance, since gzip looks back by 32 kB only.
 
     Returns
     -------
     bytes
-        Numbers of seven bits a byte, the lowest first: count of literals, the literals, length and distance
-        of a copy, and so on until all are written; ``unpack`` in ``web/engine/shelf.js`` undoes it.
+        Blocks of: number of literals, the literals, length and distance of a copy. Numbers are stored with
+        seven bits per byte, least significant first; ``unpack`` in ``web/engine/shelf.js`` is the decoder.
     """
     places: dict[bytes, int] = {}
     packed = bytearray()
@@ -107,7 +107,7 @@ def deltas(content: bytes) -> bytes:
 
 
 def _common_end(content: bytes, at: int, distance: int) -> int:
-    """Return the end of what equals the bytes at a distance before it."""
+    """Return the end of the longest match between the bytes from `at` on and those `distance` earlier."""
     step = 4096
     while step and at < len(content):
         step = min(step, len(content) - at)
@@ -119,7 +119,7 @@ def _common_end(content: bytes, at: int, distance: int) -> int:
 
 
 def _number(value: int) -> bytes:
-    """Write a number in bytes of seven bits, the lowest first."""
+    """Encode a number with seven bits per byte, least significant first (LEB128)."""
     written = bytearray()
     while value > 127:
         written.append(value & 127 | 128)

@@ -1,4 +1,4 @@
-"""Constants of a coil that a hammer file leaves open: its temperature, or the whole winding.
+"""Coil constants that a hammer file does not specify: the temperature, or all constants of the winding.
 
 A hammer whose file states no resistance is driven by a current. If the user selects a driver by voltage for
 it, winding and rail are chosen such that the current rises to about the same peak in the same time.
@@ -40,7 +40,7 @@ def has_rail(hammer: Hammer) -> bool:
 
 @lru_cache(maxsize=16)
 def open_constants(hammer: Hammer) -> dict[str, tuple[Constant, Range]]:
-    """Return the coil constants that a hammer file leaves open and a control sets, by dotted key."""
+    """Return the coil constants that a hammer file does not specify and a control sets, by dotted key."""
     if not has_rail(hammer):
         return {}
     from printhammer.parts.coil import REFERENCE, Winding
@@ -74,7 +74,7 @@ TEMPERATURES: Final = Range(-40.0, 180.0, logarithmic=False)
 
 
 def span_of(hammer: Hammer, key: str, factor: float) -> Range | None:
-    """Return the control range of a constant, including open coil constants; None if it does not exist."""
+    """Return the control range of a constant or an unspecified coil constant; None for an unknown key."""
     if key.startswith("waveform."):
         return None
     if (further := open_constants(hammer).get(key)) is not None:

@@ -52,9 +52,9 @@ EQUATIONS: Final = {
     "coil.winding": "dλ/dt = u - R i, R = R20 (1 + 0.00393 (T - 20 °C))",
     "backstop.hertz": "Fb = k δ^1.5 (6), Fe = -l v δ^1.5 (7), δ = b - x",
 }
-"""Equations of the laws of the paper; others are in the first line of their part."""
+"""Equations of the laws of the paper; other laws show the first line of their module docstring."""
 
-# A hop lasts about as long as a period.
+# A hop of the ball lasts about one period.
 _HOPS: Final[dict[str, Any]] = {
     "waveform": {"shape": "half-sine", "amplitude": 0.5, "width": 3e-4, "quantity": "force"},
     "rate": 50.0,
@@ -88,7 +88,7 @@ OPENINGS: Final[dict[str, dict[str, Any]]] = {
     "pot-magnet": {"rate": 10.0, "pulses": 1, "low": 10.0, "high": 20.0, "line": ""},
     "relay-5v": {"rate": 20.0, "pulses": 3, "low": 10.0, "high": 40.0, "line": ""},
 }
-"""Opening states of the shipped hammers whose times and forces differ from those of printers."""
+"""Initial page states of the shipped hammers whose times and forces differ from those of printers."""
 
 
 def describe(hammer: Hammer) -> dict[str, Any]:
@@ -145,7 +145,7 @@ def _control(hammer: Hammer, constant: Constant, span: Range) -> dict[str, Any]:
 
 
 def opening_of(hammer: Hammer) -> dict[str, Any]:
-    """Return the entries of the opening state of a hammer without a pulse, or with other time scales."""
+    """Return initial page settings of a hammer that has no pulse or differs from printers in time scale."""
     if hammer.waveform is not None:
         return OPENINGS.get(hammer.name, {})
     quantity = "current" if "magnet" in hammer.parts else "force"
@@ -155,7 +155,7 @@ def opening_of(hammer: Hammer) -> dict[str, Any]:
 
 
 def equation_of(section: str, law: str) -> str:
-    """Return the equation of a law, or the first line of its part."""
+    """Return the equation of a law, or else the first line of its module docstring."""
     known = EQUATIONS.get(f"{section}.{law}" if law else section)
     if known is not None or not law:
         return known or ""
@@ -166,7 +166,7 @@ def equation_of(section: str, law: str) -> str:
 
 
 def combined_of(hammer: Hammer) -> list[dict[str, Any]]:
-    """Return the controls of the paper's terminal that move several constants together.
+    """Return the combined controls, each of which changes several constants, as on the terminal of the paper.
 
     Of platen, front of the pack and thickness two are independent, since the pack lies on the platen: the
     platen distance moves platen and front, the forms thickness moves the front toward the hammer.

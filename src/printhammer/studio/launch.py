@@ -1,4 +1,4 @@
-"""The page as a file of the user: the state with which the page opens, and the folder of its copies."""
+"""Studio page in a file: the state with which the page opens, and the cache folder of written pages."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FORMAT: Final = 1
 KIND: Final = "printhammer studio state"
 
 _KEPT: Final = 8
-"""Number of pages that the folder keeps; arbitrary."""
+"""Number of pages that are kept in the cache folder; arbitrary."""
 
 
 def read_start(written: str) -> tuple[dict[str, Any] | str, Hammer | None]:

@@ -1,4 +1,4 @@
-"""Page that computes by itself: one HTML file with hammers, their WebAssembly modules and the whole studio.
+"""Studio page without a server: one HTML file with hammers, their WebAssembly modules and scripts.
 
 Whatever never changes is computed when the page is written, and embedded: the description of each hammer, the
 limits of states, the kernel as a WebAssembly module. The JavaScript modules in ``web/engine`` read states and
@@ -90,7 +90,7 @@ VIEWS: Final = ("motion", "forces", "loops", "phase", "sketch", "map", "strobe",
 
 
 def live_page(shelf: Shelf, start: Mapping[str, Any] | str = "") -> str:
-    """Return the studio as one HTML file that computes by itself.
+    """Return the studio as one HTML file that computes in the browser.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def _limits() -> dict[str, Any]:
 
 
 def _line() -> dict[str, Any]:
-    """Return font, head and limits of the printed line."""
+    """Return font, print head and quality limits of the printed line."""
     from printhammer.printing.dots import lettering
     from printhammer.printing.dots.judging import FAULTS, PRESETS
     from printhammer.printing.dots.strategy import FIRST_SLOT
@@ -235,7 +235,7 @@ def _numbers(hammer: Hammer, wave: Waveform, modules: dict[str, str]) -> dict[st
 
 
 def _numbers_of(values: Iterable[float]) -> list[float | str]:
-    """Return numbers for JSON, which has neither infinity nor NaN: these are texts that JavaScript reads."""
+    """Convert numbers for JSON; infinity and NaN, which JSON lacks, become texts that JavaScript parses."""
     return [
         value if math.isfinite(value) else repr(value).replace("inf", "Infinity").replace("nan", "NaN")
         for value in map(float, values)

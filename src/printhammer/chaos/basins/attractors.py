@@ -28,10 +28,10 @@ SETTLING: Final = 1000
 points agree."""
 
 LONGEST: Final = 16_000
-"""Largest number of discarded firings; a train that still drifts stays undecided; arbitrary."""
+"""Maximum number of discarded firings; a train that drifts even after them stays undecided. Arbitrary."""
 
 REACH: Final = 0.99
-"""Quantile of the nearest-neighbour distances of a strange attractor's points that defines its reach."""
+"""Quantile of nearest-neighbour distances that is used as the reach of a strange attractor."""
 
 INSIDE: Final = 0.95
 """Fraction of a train's points that have to lie within reach of a strange attractor for a match."""
@@ -66,18 +66,18 @@ class Cloud(NamedTuple):
 
     @classmethod
     def of(cls, points: FloatArray) -> Cloud:
-        """Build the cloud of successive points, shape (n, 2), and compute its reach from its two halves."""
+        """Build a cloud from successive points, shape (n, 2); distances between the halves give the reach."""
         half = len(points) // 2
         apart, _ = cKDTree(points[:half]).query(points[half:])
         return cls(cKDTree(points), float(np.quantile(apart, REACH)))
 
     def holds(self, points: FloatArray) -> BoolArray:
-        """Whether trains, shape (..., n, 2), lie on the attractor, shape (...)."""
+        """Mask, shape (...), of the trains whose points, shape (..., n, 2), lie on the attractor."""
         apart, _ = self.tree.query(points, distance_upper_bound=self.reach)
         return np.asarray(np.isfinite(apart).mean(axis=-1) >= INSIDE)
 
     def equals(self, other: Cloud) -> bool:
-        """Whether each of two clouds lies on the other."""
+        """Whether two clouds represent the same attractor: each lies within reach of the other."""
         return bool(self.holds(other.tree.data) and other.holds(self.tree.data))
 
 
@@ -185,7 +185,7 @@ class Attractors:
             if followed in self._clouds:
                 left = self._within(points, left, followed, places)
                 if followed < known:
-                    # Other trains may converge to the same attractor: they are continued for a round first.
+                    # Other trains may converge to the same attractor: continue them to the next test first.
                     break
 
     def _within(self, points: FloatArray, rows: IntArray, place: int, places: IntArray) -> IntArray:

@@ -154,13 +154,13 @@ def uncertainty_exponent(labels: npt.ArrayLike) -> float:
 _FEWEST_DISTANCES: Final = 3  # Smallest number of distances for a fit of the exponent
 
 SAMPLE: Final = 256
-"""Maximum number of cells recomputed at a tenth of the tolerance, and at most an eighth of all cells."""
+"""Maximum number of cells recomputed at a tenth of the tolerance; never more than an eighth of all cells."""
 
 FIRINGS: Final = 200
-"""Default number of firings per round, i.e. between two tests for an attractor."""
+"""Default number of firings between two tests of a cell for an attractor."""
 
 ROUNDS: Final = 20
-"""Default maximum number of rounds per cell; a cell without an attractor after them is undecided."""
+"""Default maximum number of tests for an attractor; a cell that passes none of the tests is undecided."""
 
 CELLS: Final = 128
 """Default number of cells along each side of the plane of initial states."""
@@ -177,7 +177,7 @@ NO_STATE_STATUS: Final = "no state"
 
 _PIECE: Final = 4096  # Number of trains integrated in one batch, which bounds the memory
 _GOLDEN: Final = 0.618033988749895  # Inverse golden ratio, whose multiples modulo 1 spread evenly
-_FEWEST: Final = 4  # Smallest number of firings of a round
+_FEWEST: Final = 4  # Smallest number of firings between two tests for an attractor
 
 Range = tuple[float | str, float | str, SupportsIndex]
 
@@ -279,7 +279,7 @@ class Basins(Result, rows="v x"):
 
     @property
     def shares(self) -> tuple[FloatArray, FloatArray]:
-        """Fraction of the cells with a state that lead to each attractor, and its standard error, shape (A,).
+        """Fraction of initial states that lead to each attractor, and its standard error, both of shape (A,).
 
         The standard error is that of n independent random states, sqrt(p (1 - p) / n). Where the boundary is
         smooth, a regular grid is more accurate.

@@ -95,7 +95,7 @@ class QuenchMap(Result):
         return f"quench map of {self.hammer.name}"
 
     def summary(self) -> Summary:
-        """Summarise how many second dots are lost, and how force and flight time of the others compare."""
+        """Summarise the number of lost second dots, and forces and flight times of the printed ones."""
         struck, lost = self.struck, int(self.lost.sum())
         first = f"{quantity(self.single_force, 'N')}, flight time {quantity(self.single_flight_time, 's')}"
         rows: list[FactRow] = [
@@ -121,7 +121,7 @@ class QuenchMap(Result):
     @property
     @derived("1", "second peak, 0 at the backstop and 1 at the pack", "gap width")
     def peak_share(self) -> FloatArray:
-        """Second peak on a scale from 0 at the backstop to 1 at the front of the pack."""
+        """Displacement peak after the second firing, scaled: 0 at the backstop, 1 at the pack front."""
         front = self.hammer.front
         assert front is not None
         return (self.peak - self.hammer.origin) / (front - self.hammer.origin)
@@ -140,7 +140,7 @@ class QuenchMap(Result):
 
 
 class TwoPulses(Waveform):
-    """Waveform that contains two different pulses, far apart, so that one drive can fire both."""
+    """Waveform that contains two different pulses, far apart in time, so that one drive can fire both."""
 
     shape: ClassVar[str] = "two pulses"
     first: Waveform
@@ -149,7 +149,7 @@ class TwoPulses(Waveform):
     largest: float
 
     def segments(self) -> FloatArray:
-        """Return the segment table: no pulse, the first pulse at `apart`, the second at 2 `apart`."""
+        """Return the segment table: zero, then the first pulse at time `apart`, the second at 2 * `apart`."""
         rows = [
             (number * self.apart + row[0], *row[1:])
             for number, pulse in enumerate((self.first, self.second), 1)
@@ -177,7 +177,7 @@ class TwoPulseDrive(Drive):
 
     @staticmethod
     def firings(apart: float, gap: float) -> FloatArray:
-        """Compute the four firing times, s: two before the run, and the two to which dots are assigned."""
+        """Compute the four firing times, s: two before the run, and the two firings that print the dots."""
         return np.array([gap, apart, 2.0 * apart, 2.0 * apart + gap])
 
     @property
@@ -296,7 +296,7 @@ def two_pulse_drives(first: Waveform, seconds: Sequence[Waveform], last: float) 
 def _piece(
     hammer: Hammer, drives: Sequence[TwoPulseDrive], gaps: FloatArray, tail: float, effort: Effort
 ) -> tuple[npt.NDArray[Any], ...]:
-    """Simulate a block of gaps at all widths; return dot, status, peak, m, force, N, and flight time, s."""
+    """Simulate a block of gaps at all widths; return dot mask, status, peak, force and flight time, SI."""
     begin, number = 0.0, 1
     every: list[Drive]
     if drives[0].pulses[0].replaces:
@@ -344,7 +344,7 @@ def _piece(
 
 
 def _highest(grid: FloatArray, x: FloatArray, after: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Find the largest local maximum of each sampled motion after a given time, and its time, shape (M,).
+    """Find the largest local maximum of each sampled motion after a given time; return value and time.
 
     The samples, shape (M, T), are evenly spaced; samples after the end of a run are NaN, and so is a maximum
     that does not exist.
@@ -363,7 +363,7 @@ def _highest(grid: FloatArray, x: FloatArray, after: FloatArray) -> tuple[FloatA
 
 
 def _top(t: FloatArray, x: FloatArray, v: FloatArray) -> FloatArray:
-    """Compute the highest displacement at which the velocity falls through 0 between samples, shape (M,).
+    """Interpolate the highest maximum of each motion from samples of displacement and velocity, shape (M,).
 
     NaN without such a crossing. The velocity is interpolated linearly between samples, shape (M, T).
     """

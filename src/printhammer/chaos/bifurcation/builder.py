@@ -1,4 +1,4 @@
-"""Construction of a bifurcation diagram: trains at given values, refinement between them, exponents.
+"""Construction of a bifurcation diagram: trains at a grid of values, refined values, Lyapunov exponents.
 
 The final state at one value of the parameter is the initial state at the next; this is done in parallel.
 
@@ -51,7 +51,7 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray
 
 STRAND: Final = 16
-"""Number of successive parameter values in a strand."""
+"""Number of successive parameter values in a strand; strands are computed in parallel."""
 
 SAME: Final = 1e-3
 """Largest distance, in half-widths of the strobe window, of periodic orbits that count as the same."""
@@ -65,9 +65,9 @@ class Strand:
     """Strand of a diagram: successive trains, each starting in the final state of its predecessor."""
 
     rows: list[int]
-    """Row indices in the table of all trains, in the order in which the state is carried."""
+    """Row indices in the table of all trains; each train starts in the final state of the preceding row."""
     before: int
-    """Index of the strand that ends where this strand begins; -1 for the first strand."""
+    """Index of the strand whose last parameter value precedes this strand; -1 for the first strand."""
 
 
 @dataclass
@@ -82,13 +82,13 @@ class Trains:
     """Period of each train in firings, 0 if aperiodic; shape (M,)."""
     distances: Any
     scales: FloatArray
-    """Half-widths that scale displacement, velocity and memory, and a typical current, shape (M, 4)."""
+    """Scales of displacement, velocity, pack memory and current of each train, shape (M, 4)."""
     carried: int = field(default=0)
-    """Number of trains that were run again to close the joints between strands."""
+    """Number of trains that were run again so that successive strands join."""
 
 
 def strands_of(rows: Sequence[int], first: int) -> list[Strand]:
-    """Divide trains, in the order in which the state is carried, into strands numbered from `first`."""
+    """Divide rows of successive trains into strands of `STRAND` trains, numbered from `first`."""
     cut = [list(rows[k : k + STRAND]) for k in range(0, len(rows), STRAND)]
     return [Strand(part, first + k - 1 if k else -1) for k, part in enumerate(cut)]
 
@@ -100,7 +100,7 @@ def carry(
     run: Callable[[list[int], FloatArray], None],
     trial: Callable[[list[int], FloatArray], tuple[Columns, Any, Any]],
 ) -> None:
-    """Run the trains of all strands, in one or several directions, and close the joints between strands.
+    """Run all strands in parallel; then rerun trains until every strand continues the preceding strand.
 
     `start` is the initial state of a strand. `run` runs the trains of selected rows from given states and
     stores the results in the table; `trial` returns the results instead: columns, periods, distances.
@@ -114,7 +114,7 @@ def carry(
         run([rows[k] for rows in long], np.array(begun))
     open_ = {(number, 0) for number, strand in enumerate(strands) if strand.before >= 0}
     while open_:
-        # Run one more train after each joint that is still open; the trains of all joints run in parallel.
+        # Run one more train of each strand that does not yet join its predecessor, all strands in parallel.
         order = sorted(open_)
         rows = [strands[number].rows[place] for number, place in order]
         ended = [
@@ -223,7 +223,7 @@ class DiagramBuilder:
         carry(self.table, strands, self.begin, self.run, self.trial)
 
     def refine(self, level: int) -> None:
-        """Run trains half-way between neighbouring values whose trains differ."""
+        """Run trains half-way between neighbouring parameter values whose trains differ."""
         order = np.argsort(self.values, kind="stable").tolist()
         pairs = [pair for pair in itertools.pairwise(order) if self.is_different(*pair)]
         middles = [0.5 * (self.values[low] + self.values[high]) for low, high in pairs]
@@ -246,7 +246,7 @@ class DiagramBuilder:
         self.run(rows, np.array(states))
 
     def is_different(self, place: int, neighbour: int) -> bool:
-        """Whether the trains at two values differ in status or period, or by a jump of the orbit."""
+        """Whether trains at two parameter values differ in status or period, or by a jump of the orbit."""
         table = self.table
         for way in range(len(self.ways)):
             a, b = self.rows([place, neighbour], way)
@@ -294,7 +294,7 @@ class DiagramBuilder:
         self.done += len(rows)
 
     def is_resting(self, columns: Columns, row: int, regime: Regime) -> bool:
-        """Whether an aperiodic train comes to rest on the backstop in a longer, exact cycle."""
+        """Whether a train without a short period repeats a longer cycle that rests on the backstop."""
         if not is_memoryless(regime) or columns.status[row] != OK or regime.phase:
             return False
         points = np.column_stack([columns.x[row], columns.v[row]])
@@ -302,7 +302,7 @@ class DiagramBuilder:
         return bool(count and rests_of(regime, points[-count:], self.effort.tolerance))
 
     def compare(self) -> None:
-        """Mark the trains whose period differs at finer tolerances, so that rounding determines the cycle.
+        """Mark the trains whose period changes at finer tolerances: rounding errors determine their cycles.
 
         An armature that comes to rest on the backstop forgets its past, but between two rests a small error
         may grow to the size of the motion; rounding then decides the length of the cycle.
@@ -323,11 +323,11 @@ class DiagramBuilder:
             self.sensitive[rows] |= cycles != table.cycles[rows]
 
     def report_progress(self, done: int) -> None:
-        """Report the number of finished trains; trains run again to close joints are not counted."""
+        """Report the number of finished trains; trains that are run again to join strands are not counted."""
         self.effort.report(min(done, self.known), self.known)
 
     def measure(self) -> None:
-        """Compute the exponents of the aperiodic trains, over as many firings as the diagram shows."""
+        """Compute Lyapunov exponents of the aperiodic trains, over as many firings as the diagram shows."""
         columns, table = self.table.columns, self.table
         begun = {}
         for row, regime in enumerate(table.regimes):

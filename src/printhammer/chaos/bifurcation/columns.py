@@ -23,7 +23,7 @@ from printhammer.run.supply import current_scale
 from printhammer.support.arrays import FloatArray, IntArray, TextArray
 
 TOLERANCE: Final = 1e-9
-"""Default tolerance of diagrams and basins; its noise is far below the agreement that defines a period.
+"""Default tolerance of diagrams and basins; its errors are far below the distances that decide a period.
 
 With `DISPLAY_TOLERANCE` of `printhammer.run.ensemble`, weakly stable orbits never settle to within 1e-6 of
 the half-width of the strobe window.
@@ -124,7 +124,7 @@ def _run(
 ) -> Columns:
     """Run trains whose initial states are all of one kind: at rest, inside the pack, or elsewhere."""
     rest = bool(np.isnan(states[0, 0]))
-    # The cells of a basin share one regime; each column of a diagram has its own.
+    # The cells of a basin share one regime; each column of a diagram has a different regime.
     known = {id(regime): regime for regime in regimes}
     made = {key: _train(regime, firings, rest) for key, regime in known.items()}
     trains = [made[id(regime)] for regime in regimes]

@@ -1,4 +1,4 @@
-"""Bifurcation diagram: states at the firings, windows of equal motion, and routes to chaos.
+"""Bifurcation diagram: states at the firings, windows of one classification, and routes to chaos.
 
 A window is an interval of the parameter in which all trains that were run have the same classification. A
 value stands for the interval half-way to its neighbours, so that widths of windows add up to the whole range.
@@ -36,7 +36,7 @@ from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArra
 from printhammer.units import from_si
 
 SERIES: Final = (2, 4, 8)
-"""Orbit periods, in firings, of successive windows that count as a series of period doublings."""
+"""Orbit periods, in firings, of the successive windows of a period-doubling cascade."""
 
 MOST_UNDECIDED: Final = 32
 """Maximum number of undecided aperiodic trains on a route before the search for chaos stops; arbitrary."""
@@ -226,7 +226,7 @@ class Bifurcation(Result, rows="direction column"):
         )
 
     def _value_text(self) -> tuple[Callable[[float], str], str]:
-        """Return a formatter of parameter values that separates neighbours, and their unit."""
+        """Return a formatter with enough digits to distinguish neighbouring values, and the unit."""
         si = self.regime.quantity(self.parameter).si
         unit = {"s": "ms", "m": "um"}.get(si, si)
         steps = np.diff(self.values)
@@ -283,7 +283,7 @@ class Bifurcation(Result, rows="direction column"):
     @property
     @derived("1", "time from a firing to its point, as a fraction of the period")
     def phase(self) -> float:
-        """Time from a firing to the point of the diagram, as a fraction of the period."""
+        """Phase of the strobe section: time since the last firing, as a fraction of the period."""
         return self.regime.phase
 
     @property

@@ -236,7 +236,7 @@ def _half(
 
 
 def _is_joined(follower: Corrector, here: Node, ahead: Node, length: float) -> bool:
-    """Whether a corrected point lies on the same curve, by its distance, tangent and multipliers."""
+    """Whether a corrected point lies on the curve of its predecessor, by distance, tangent, multipliers."""
     predicted = follower.point(here) + length * here.tangent
     near = float(np.linalg.norm(follower.point(ahead) - predicted)) <= _FARTHEST * length
     return near and float(here.tangent @ ahead.tangent) >= _LEAST_COSINE and not _has_leap(here, ahead)

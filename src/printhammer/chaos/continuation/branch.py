@@ -99,7 +99,7 @@ def event_of(point: BranchPoint, phase: float = 0.0) -> BranchEvent:
 
 
 def _grazing_of(point: BranchPoint) -> tuple[str, str]:
-    """Find the surface of a grazing, and the change of the contacts as the parameter grows."""
+    """Return the grazed surface, and whether its contact appears, vanishes, splits or merges."""
     assert point.sides is not None
     ordered = sorted(point.sides, key=lambda node: node.parameter)
     before, after = (node.value.extra for node in ordered)
@@ -120,7 +120,7 @@ def _grazing_of(point: BranchPoint) -> tuple[str, str]:
 
 
 def _is_parted(touches: list[Touch], length: float) -> bool:
-    """Whether a contact is split by a short separation: shorter than the shortest of the contacts."""
+    """Whether a contact is split in two: the armature leaves for less than the shortest contact."""
     durations = [touch.t_out - touch.t_in for touch in touches]
     if len(touches) < 2 or min(durations) == 0.0:
         return False
@@ -301,7 +301,7 @@ class Branch(Result):
     @property
     @derived("1", "whether the branch is a closed loop", kind="column", dtype=np.int32)
     def closed(self) -> bool:
-        """Whether the branch is a closed loop, an island that no other branch joins; its ends coincide."""
+        """Whether the branch is an isola: a closed loop, whose ends coincide."""
         return self.curve.closed
 
     @property

@@ -56,16 +56,16 @@ _ROUNDING: Final = 1e-8
 _SHARE_OF_CHANGE: Final = 1e-10
 _SMALL_MARGIN: Final = 0.05
 _CLOSE_MARGIN: Final = 1e-7
-"""Final bracket width of a contact change, in steps; margins at which interpolation starts and ends."""
+"""Contact change: final bracket, in steps; distances from the grazing where interpolation starts, ends."""
 _NEAR: Final = 1e-4
 """Distance, as a fraction of a step, within which a fold and a crossing are the same point."""
 _AMPLITUDE: Final = 1e-2  # First scaled distance from a doubling at which its orbit is sought
 _LEAST_AMPLITUDE: Final = 1e-6
 _CLOSER: Final = 4.0
-"""Smallest scaled distance from a doubling at which an orbit is sought; ratio of successive distances."""
+"""Smallest scaled distance from a doubling to try for an orbit born there; ratio of successive distances."""
 _ASIDE: Final = 0.5
 _NEW_MULTIPLIER: Final = 0.3
-"""Tolerances of a new orbit: sideways offset relative to its distance; deviation of a multiplier from 1."""
+"""Limits for an orbit born at a doubling: relative offset from the tangent; |multiplier - 1|."""
 _HALF_NEAR: Final = 0.05
 """Largest scaled distance of an orbit from an orbit of half its period near their common doubling."""
 _HALF_DOUBLES: Final = 0.5
@@ -241,7 +241,7 @@ def zero_between(
 def _changes(
     follower: Corrector, here: Node, ahead: Node, after: int, margin: Callable[[Node], float] | None
 ) -> list[tuple[float, Kind, BranchPoint]]:
-    """Locate all points between two nodes at which the label of the motion changes."""
+    """Locate all points between two nodes at which the contact sequence of the orbit changes."""
     changes: list[tuple[float, Kind, BranchPoint]] = []
     begin, first = 0.0, here
     while first.value.label != ahead.value.label and len(changes) < _ROUNDS:
@@ -267,7 +267,7 @@ def _change(
     start: tuple[float, Node],
     margin: Callable[[Node], float] | None,
 ) -> tuple[float, tuple[Node, Node], bool]:
-    """Locate the first change of the label; return step fraction, nodes on both sides, and sharpness."""
+    """Locate the first change of the contacts; return step fraction, nodes on both sides, and convergence."""
     low, inside = start
     high, beyond = 1.0, ahead
     m_low = m_high = math.nan
@@ -351,13 +351,13 @@ def follow_doubled(
 
 
 def _is_born(way: FloatArray, row: FloatArray, amplitude: float, node: Node) -> bool:
-    """Whether an orbit lies, to first order, where an orbit born at the doubling has to lie."""
+    """Whether an orbit lies, to first order, in the critical direction of the period doubling."""
     aside = float(np.linalg.norm(way - amplitude * row))
     return aside <= _ASIDE * amplitude and float(np.abs(node.multipliers - 1.0).min()) <= _NEW_MULTIPLIER
 
 
 def birth_of(half: Corrector, here: Node, ahead: Node) -> Stop | None:
-    """Locate the period doubling in which a branch of even period ends; None if its curve passes none.
+    """Locate the period doubling in which a branch of even period ends; None if not found.
 
     At the doubling, states half a period apart coincide, and the curve retraces the same orbits half a period
     later. `half` corrects points onto the curve of orbits of half the period; `here` and `ahead` are

@@ -117,7 +117,7 @@ def continuation(
 def _orbit_to_start_from(
     regime: Regime, firings: int | None, effort: Effort
 ) -> tuple[Regime, FloatArray, int]:
-    """Find the starting orbit; return the regime at the phase of its section, a state, and its firings."""
+    """Find the starting orbit; return the regime with the section phase, the state, and the orbit period."""
     judged = (_SETTLE // 2, _SETTLE)
     (settled,) = strobes(regime, points=1, transient=_SETTLE, firings=judged, threads=effort.threads)
     period = None if settled.verdict is None or not settled.ok else settled.verdict.period

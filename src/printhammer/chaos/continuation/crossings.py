@@ -41,7 +41,7 @@ _UPRIGHT: Final = 0.01
 _AMPLITUDE: Final = 1e-2
 _LEAST_AMPLITUDE: Final = 1e-5
 _CLOSER: Final = 4.0
-"""Smallest scaled distance from a crossing at which a curve is sought; ratio of successive distances."""
+"""Smallest scaled distance from a crossing to try for the other curve; ratio of successive distances."""
 _ASIDE: Final = 0.5
 """Largest distance from the predicted point, relative to the step, for a point to lie on the curve."""
 

@@ -25,12 +25,12 @@ from printhammer.run.start import initial_state
 from printhammer.support.arrays import FloatArray
 
 _SPACING: Final = 1e-6
-"""Relative parameter step of the slope's finite difference; the slope only steers Newton's method."""
+"""Relative step of the parameter derivative by finite differences, which only steers Newton's method."""
 _MUCH: Final = 1e3
 """Multiplier above which the parameter step of the finite difference is reduced in proportion."""
 _BESIDE: Final = 1e-7  # Finite-difference step of the state at gentle touches, in scales of the run
 _GENTLE: Final = 3e-4
-"""Touch speed on the pack, relative to the run's speed scale, below which finite differences are used."""
+"""Impact speed on the pack, relative to the speed scale, below which finite differences are used."""
 _IN_PACK: Final = f"{IN_PACK} at the section; another phase of the period can be chosen"
 _MOST_TOUCHES: Final = 100  # Number of contacts in a period above which the map has no value
 _MANY: Final = f"more than {_MOST_TOUCHES} contacts"

@@ -146,7 +146,7 @@ class Corrector:
         return self.correct(z, np.eye(self.count + 1)[-1])
 
     def onto(self, z: FloatArray) -> Node | None:
-        """Find the fixed point near z, at its parameter if possible, else close to it; None if not found."""
+        """Find the fixed point near z, at the parameter of z if possible, else nearby; None if not found."""
         node = self.at_parameter(z)
         if node is not None:
             return node

@@ -251,7 +251,7 @@ _GENTLE: Final = 1e-2
 _NEAR: Final = 1e-2
 """Largest distance from the last orbit to the grazing that ends its branch, in parameter scales."""
 _STEEP: Final = 10.0
-"""Smallest multiplier of an orbit close to its grazing; beyond it no multiplier crosses the unit circle."""
+"""Multiplier above which an orbit is close to its grazing, without a further bifurcation before it."""
 _CLOSER: Final = 0.7
 """Impact speed, relative to that at the last attempt, below which a grazing is sought again."""
 _ON_CURVE: Final = 1e-5
@@ -289,7 +289,7 @@ def _orbits(
     node: Node,
     way: list[tuple[float, float, float]],
 ) -> list[Node] | None:
-    """Convert orbits, each by impact phase, impact speed and parameter, to nodes that extend a branch."""
+    """Convert orbits (impact phase, impact speed, parameter value) to nodes that extend a branch."""
     nodes = [node]
     place = family.regime.hammer.position
     for phase, speed, value in way:
@@ -314,7 +314,7 @@ def _orbits(
 
 
 def fades(family: RegimeFamily, scales: FloatArray) -> Callable[[Node, Node], bool]:
-    """Build the test of two successive nodes: whether an impact slows down toward a grazing.
+    """Build a predicate of two successive nodes: whether the slowest impact approaches a grazing.
 
     A grazing is located only if the impact speed has fallen well below the speed at the last attempt.
     """

@@ -259,7 +259,7 @@ class _Collected:
                     self.found.append(branch)
 
     def followed(self, orbit: Orbit) -> Branch | str:
-        """Follow the branch through an orbit; return the branch, or the reason why that failed."""
+        """Follow the branch through an orbit; return the branch, or the reason for the failure."""
         bounds = read_bounds(orbit.regime, RATE, self.bounds)
         tracer = Tracer(orbit.regime, RATE, bounds, self.effort.alone)
         try:
@@ -337,7 +337,7 @@ def _is_at_section(branch: Branch, orbit: Orbit, phase: float) -> bool:
     ).at_phase(phase)
     for i in between:
         for k in range(branch.firings):
-            # The distance from the chord is a quick test; then the orbit itself is compared.
+            # The distance from the chord is a quick test; the orbit itself is compared afterwards.
             ends = np.array([[branch.x[j, k], branch.v[j, k]] for j in (i, i + 1)]) / half_widths
             reach = float(np.abs(ends[1] - ends[0]).max()) + 0.05
             if np.abs(ends - state / half_widths).max(axis=1).min() > reach:

@@ -46,7 +46,7 @@ _MOST_SECTIONS: Final = 8  # Maximum number of segments of a branch at different
 _SAME_PHASE: Final = 1e-3
 """Difference of two section phases, as a fraction of the period, below which they are the same."""
 _CLEAR: Final = 1e-3
-"""Scaled distance from a lost end within which orbits are removed: an impact is close to the section."""
+"""Scaled distance from the end of a segment within which orbits are removed before a section change."""
 _LEAST_CHORD: Final = 1e-5
 """Smallest scaled distance of two orbits whose chord defines the direction of the branch."""
 _NO_STOP: Final = Stop("section", math.nan, np.zeros(0), "the section moves")
@@ -152,7 +152,7 @@ class Tracer:
         return pieces, stop
 
     def before_end(self, nodes: list[Node]) -> list[Node]:
-        """Remove the orbits so close to a lost end that an impact at the section spoils derivatives."""
+        """Remove orbits at the end of a segment, where an impact close to the section spoils derivatives."""
         places = np.array([np.append(node.state, node.parameter) for node in nodes]) / self.scales
         away = np.linalg.norm(places - places[0], axis=1) > _CLEAR
         return nodes[min(int(np.argmax(away)) if away.any() else 0, len(nodes) - 2) :]
@@ -393,7 +393,7 @@ class Tracer:
         )
 
     def symmetry_of(self, family: RegimeFamily, node: Node) -> str:
-        """Classify an orbit: "symmetric" if it is its own mirror image, "asymmetric", or ""."""
+        """Classify an orbit as "symmetric" (its own mirror image) or "asymmetric"; "" if undefined."""
         regime = family.regime.with_(self.parameter, node.parameter)
         image = mirror_image(regime, node.state, self.effort.tolerance)
         if image is None or not np.isfinite(image).all():

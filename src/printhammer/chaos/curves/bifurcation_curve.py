@@ -129,7 +129,7 @@ class BifurcationCurve(Result, rows="point"):
     @property
     @derived("1", "whether stability is lost, the other multiplier being inside the unit circle", "point")
     def limits(self) -> BoolArray:
-        """Mask of points, shape (N,), where stability is lost: the other multiplier is in the unit circle."""
+        """Mask, shape (N,), of points where stability is lost: the other multiplier has modulus below 1."""
         if self.kind == "grazing":
             return np.asarray(np.abs(self.multipliers).max(axis=1) < 1.0)
         return np.asarray(np.abs(self.multipliers).max(axis=1) < 1.0 + SAME)

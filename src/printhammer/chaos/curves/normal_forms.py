@@ -86,7 +86,7 @@ def doubling_coefficient(plane: Plane, place: CurvePoint) -> float:
 
 
 def root_coefficient(plane: Plane, place: CurvePoint) -> float:
-    """Compute (1 + e) sqrt(2 a), m^(1/2)/s: the velocity added by a touch, per square root of its depth."""
+    """Compute the grazing coefficient (1 + e) sqrt(2 a), m^(1/2)/s; e: restitution, a: acceleration."""
     try:
         restitution = plane.at(place.first, place.second).value("backstop.restitution")
     except InputError:

@@ -234,7 +234,7 @@ class _Chart:
         self.value = branch.regime.value(second)
 
     def across(self, effort: Effort) -> list[tuple[float, list[Start]]]:
-        """Locate the stability limits of branches along the second parameter, from orbits of the branch."""
+        """Locate stability limits of branches in the second parameter, started at orbits of the branch."""
         branch, values = self.branch, self.branch.values
         low, high = float(values.min()), float(values.max())
         # A stable orbit is preferred: stability is lost at its limits.

@@ -20,7 +20,7 @@ from printhammer.support.arrays import FloatArray
 
 FIRST: Final = "first"
 LAST: Final = "last"
-_ENDS: Final = {FIRST: 0, LAST: -1}  # Index of the end of a branch, by its name
+_ENDS: Final = {FIRST: 0, LAST: -1}  # Index of the end of a branch, by name of the end
 _LIST: Final = ", ".join(KINDS)
 
 

@@ -64,7 +64,7 @@ KINDS: Final = (*TESTS, GRAZING)
 """Kinds of bifurcation that can be followed."""
 
 SPACING: Final = 1e-6
-"""Step size of finite differences, in scales of the variables; only the convergence depends on its error."""
+"""Scaled step size of finite differences, whose errors affect only the convergence of Newton's method."""
 _PARTS: Final = 5.0
 """Ratio of a parameter's range to its scale; the state is scaled by half-widths of the strobe window."""
 
@@ -180,7 +180,7 @@ def curve_point_of(node: Node) -> CurvePoint:
 _PHASES: Final = 0.2
 """Scale of the phase of a touch, as a fraction of the period."""
 _IN_TRACE: Final = {"fold": -1.0, "period doubling": 1.0, "Neimark-Sacker": 0.0}
-"""Coefficient of the trace of J in the test function f; the rest of f is 1 + det J, or det J - 1."""
+"""Coefficient c of the test function f = 1 + det J + c tr J; Neimark-Sacker: f = det J - 1."""
 
 
 def _flight(
@@ -197,10 +197,10 @@ class GrazingSystem:
         self.scales = np.array([_PHASES, *plane.scales[2:]])
 
     def at(self, phase: float, first: float, second: float) -> tuple[CurvePoint, FloatArray] | str:
-        """Compute the orbit that leaves a grazing touch, and its miss at the next touch.
+        """Compute the orbit that leaves a grazing touch, and its closing error at the next touch.
 
-        The miss is the difference of both states, in units of the state scales. A text with the reason is
-        returned if the run ends early; InputError if the parameters are invalid.
+        The closing error is the difference of both states, in units of the state scales. A text with the
+        reason is returned if the run ends early; InputError if the parameters are invalid.
         """
         flight = _flight(self.plane, self.surface, phase, 0.0, first, second)
         if flight.trouble:
@@ -296,7 +296,7 @@ class ImpactSystem:
 
 
 def _monodromy(flight: Flight) -> tuple[FloatArray, float]:
-    """Compute the derivative of the state from after an impact to after the next one, and its determinant."""
+    """Compute the monodromy matrix between post-impact states of successive impacts, and its determinant."""
     e, w = flight.rebound, float(flight.end[1])
     jump = flight.accelerations[0] + e * flight.accelerations[1]
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -312,7 +312,7 @@ class CurveTracer:
     def with_ends(
         self, nodes: list[Node], stops: list[Stop], points: list[CodimensionTwo]
     ) -> list[CodimensionTwo]:
-        """Add the points of codimension two at which the curve ends in a grazing, and mark its stops."""
+        """Add the points of codimension two at which the curve ends in a grazing, and set its stops."""
         if self.kind not in ("fold", "period doubling"):
             return points
         for end, (node, after) in enumerate(((nodes[0], -1), (nodes[-1], len(nodes) - 1))):

@@ -42,7 +42,7 @@ _SHORTEST: Final = 3 * _PER_OCTAVE
 """Smallest length of a plateau, in steps of the radius; corresponds to a factor of 8."""
 _FEW_PAIRS: Final = 200  # Number of pairs below which a correlation sum is discarded
 _LARGEST: Final = 0.25
-"""Fraction of pairs above which a correlation sum is not used: the shape of the attractor matters."""
+"""Correlation sum above which radii are not used: the finite size of the attractor biases the slope."""
 _PARTS: Final = 5  # Number of sections of the series whose scatter gives the error
 
 

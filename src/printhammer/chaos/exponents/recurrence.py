@@ -1,4 +1,4 @@
-"""Recurrence plots and recurrence quantification: when and in what patterns a motion returns.
+"""Recurrence plots and recurrence quantification analysis of a series of states.
 
 The recurrence matrix has a point at (i, j) where the states i and j lie within a threshold of each other. Its
 diagonal lines are stretches during which the motion repeats an earlier stretch; its vertical lines, stretches
@@ -176,7 +176,7 @@ def run_lengths(points: BoolArray) -> IntArray:
 
 
 def _distances(scaled: FloatArray) -> FloatArray:
-    """Compute the distances of all pairs of states: the largest difference of a component."""
+    """Compute the distances of all pairs of states in the maximum norm."""
     count = len(scaled)
     distances = np.empty((count, count))
     for first in range(0, count, _ROWS):

@@ -56,10 +56,10 @@ LONGEST_CYCLE: Final = 64
 """Largest cycle length of a series that is tested; at most a quarter of its length."""
 
 CYCLES: Final = 5
-"""Number of cycles over which growth must occur to count as chaos; within one cycle, any path may grow."""
+"""Number of cycles over which a path has to grow to count as chaos; within one cycle, any path may grow."""
 
 FOLLOWS: Final = 0.7
-"""Distance of images of neighbours, relative to arbitrary pairs, below which a series is deterministic."""
+"""Largest distance of images of neighbours, relative to arbitrary pairs, in a deterministic series."""
 
 _CUT: Final = 10  # Ratio of the series length to the largest lag of the displacement (Gottwald and Melbourne)
 _PASSES: Final = 4  # Smallest number of cycles in a series for a cycle to be considered

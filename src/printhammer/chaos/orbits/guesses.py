@@ -36,7 +36,7 @@ _EARLY: Final = 2
 """Number of first firings of a motion whose close returns count as early."""
 _LEAST: Final = 16
 """Smallest number of firings over which a motion is recorded."""
-_ROOM: Final = 1.2  # Extent of the spread beyond the window, in its half-widths
+_ROOM: Final = 1.2  # Extent of the spread beyond the window, in half-widths of the window
 # Extent of the spread of an unbounded motion: a ball that bounces once a period rises 5 scales
 _SCALES: Final = 6.0
 _PLASTIC: Final = 1.324717957244746

@@ -334,7 +334,7 @@ def _stable(own: Scaled, saddle: FloatArray, side: float, firings: int, limits: 
 
 @dataclass
 class _Inward:
-    """Known part of a stable manifold, parametrised so that a preimage is 1 further along.
+    """Known part of a stable manifold; the curve parameter grows by 1 from a point to its preimage.
 
     Up to the parameter 1 the curve is treated as straight.
     """

@@ -154,10 +154,11 @@ class Orbit(Result):
 
     @property
     def kind(self) -> str:
-        """Stability of the orbit: the fate of small perturbations of the state.
+        """Stability type of the orbit: "stable", "saddle", "unstable" or "undecided".
 
-        "stable": all decay; "saddle": some grow and others decay; "unstable": all grow; "undecided": a
-        multiplier is within 1e-6 of the unit circle, or the motion has no derivative.
+        Small perturbations of a stable orbit decay, those of an unstable orbit grow; a saddle has a growing
+        and a decaying direction. "undecided": a multiplier is within 1e-6 of the unit circle, or the motion
+        has no derivative.
         """
         sizes = np.abs(self.multipliers)
         if not np.isfinite(sizes).all() or (np.abs(sizes - 1.0) <= NEUTRAL).any():
@@ -340,7 +341,7 @@ def multipliers_of(jacobians: FloatArray) -> npt.NDArray[np.complex128]:
 
 
 class _Run:
-    """Run over several drive periods, from a section, within a train that has been fired before."""
+    """Run over several drive periods from a section, in a train whose earlier pulses may still act."""
 
     def __init__(self, regime: Regime, start: FloatArray, periods: int, tolerance: float) -> None:
         self.regime, self.periods = regime, periods

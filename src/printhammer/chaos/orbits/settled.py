@@ -28,10 +28,10 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray
 
 AGREES: Final = 1e-8
-"""Distance of states, in half-widths of the strobe window, below which they agree completely."""
+"""Distance, in half-widths of the strobe window, below which two states agree without doubt."""
 
 DISTINCT: Final = 1e-3
-"""Distance of states, in half-widths of the strobe window, above which they differ by more than noise."""
+"""Distance, in half-widths of the strobe window, above which two states differ by more than noise."""
 
 LIES_ON: Final = 1e-6
 """Distance from a stable orbit, in half-widths, within which a state lies on the orbit up to noise."""
@@ -62,7 +62,7 @@ class Settled(Declared):
 
 
 def shown(points: FloatArray, period: int) -> BoolArray:
-    """Mask of the motions whose states, which agree `period` firings apart, alone prove the period.
+    """Mask of the motions with states so close `period` firings apart that the period needs no Newton test.
 
     Points, shape (n, m, k), are the states at m successive firings, divided by the scales.
     """
@@ -74,7 +74,7 @@ def shown(points: FloatArray, period: int) -> BoolArray:
 
 
 def settled(regime: Regime, points: FloatArray, period: int, scales: FloatArray) -> Settled:
-    """Determine the orbit to which a motion has settled whose states agree `period` firings apart.
+    """Determine the settled orbit of a motion whose states agree `period` firings apart.
 
     Points, shape (m, k), are displacement, m, velocity, m/s, and further components of the state, at
     successive sections; the scales, shape (k,), are the half-widths of the strobe window. If the strobe map
@@ -129,7 +129,7 @@ def is_approaching(
 
 
 def noise_about(multiplier: float) -> float:
-    """Compute the distance from a stable orbit, in half-widths, that noise of the runs can cause.
+    """Compute the distance from a stable orbit, in half-widths, that integration errors can cause.
 
     The allowed distance grows as the largest multiplier falls, since the boundary of the basin is then
     further away.
@@ -148,7 +148,7 @@ def _by_states(points: FloatArray, scaled: FloatArray, period: int) -> Settled:
 
 
 def _apart(points: FloatArray, count: int, period: int) -> tuple[FloatArray, FloatArray]:
-    """Compute the mean distance of states `count` firings apart, at the beginning and at the end."""
+    """Compute the mean distance of states `count` firings apart, early and late in each motion."""
     apart = np.abs(points[:, count:] - points[:, :-count]).max(axis=2)
     part = period * max(apart.shape[1] // (4 * period), 1)
     return apart[:, :part].mean(axis=1), apart[:, -part:].mean(axis=1)

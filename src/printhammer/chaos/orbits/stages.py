@@ -49,7 +49,7 @@ _STEPS: Final = Steps(most=150, precision=1e-10)
 
 
 def crossings(orbit: Orbit) -> list[FloatArray]:
-    """Find the states at which the branch of an orbit, followed in the period, returns to its period."""
+    """Find the states at which the branch of an orbit, followed in the period, regains the orbit's period."""
     regime, own = orbit.regime, orbit.regime.period
     if PERIOD not in regime.names:
         return []
@@ -74,7 +74,7 @@ def crossings(orbit: Orbit) -> list[FloatArray]:
 
 _LONG: Final = 400
 """Number of firings of the train from rest whose close returns are guesses."""
-_BLOCKS: Final = (128, 1024)  # Numbers of starts to which more are rounded up; the last is doubled repeatedly
+_BLOCKS: Final = (128, 1024)  # Numbers of starts, ascending; requests are rounded up, as for `_BATCHES`
 _BATCHES: Final = (8, 48)
 """Numbers of guesses, ascending; a request is rounded up to one of them, or to a doubling of the last."""
 _EVEN: Final = 8
@@ -115,7 +115,7 @@ class _Known:
     hits: int = 1
 
     def is_visible(self, block: int, batch: int) -> bool:
-        """Whether a stage with at most these starts and guesses has found the orbit."""
+        """Whether the orbit was found by a stage up to a given block of starts and batch of guesses."""
         return any(i <= block and j <= batch for i, j in self.stages)
 
 
@@ -188,7 +188,7 @@ class Search:
         self.effort.report(self.done, self.all)
 
     def _through(self, regime: Regime, records: Records) -> list[_Known]:
-        """Find all different orbits with a section at the phase of a regime, from recorded motions."""
+        """Find all distinct orbits from recorded motions, with the section at the phase of a regime."""
         fast = FastMaps(regime, self.longest, self.effort.at(TOLERANCE))
         different: list[_Known] = []
         seen: set[bytes] = set()
@@ -367,7 +367,7 @@ class Search:
             self._describe(described, [(every[0].regime, known) for known in different])
 
     def _mirror(self, described: list[tuple[Orbit, int]]) -> None:
-        """Add the mirror images of orbits, x -> -x half a period later, if no surface acts on one side.
+        """Add mirror images of orbits, x -> -x half a period later, if the hammer has no one-sided surface.
 
         If the forces are not odd, Newton's method finds no orbit, or a different orbit.
         """

@@ -39,7 +39,7 @@ from printhammer.run.supply import emf, linkage
 from printhammer.support.arrays import FloatArray
 
 MAP_TOLERANCE: Final = 1e-13
-"""Tolerance of the strobe map; its noise limits the accuracy of a fixed point."""
+"""Integration tolerance of the strobe map, which limits the accuracy of a fixed point."""
 
 MAP_EFFORT: Final = Effort(MAP_TOLERANCE)
 

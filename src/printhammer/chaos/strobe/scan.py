@@ -34,7 +34,7 @@ STAGES: Final = (32, 128)
 """Numbers of firings after which trains are tested for an early period."""
 
 CLOSER: Final = 1e-2
-"""Agreement required for an early period, as a fraction of the agreement of the classification."""
+"""Largest distance of states for an early period, as a fraction of the distance allowed at the end."""
 
 LARGEST_MULTIPLIER: Final = 0.99
 """Largest absolute eigenvalue of the derivative over a period that is allowed for an early period."""
@@ -53,7 +53,7 @@ def scan(
     effort: Effort = DEFAULT,
     **_keywords: Unpack[Keywords],
 ) -> list[Verdict]:
-    """Classify the trains of a hammer from rest, one for each period.
+    """Classify the motions of trains from rest, one train for each time between firings.
 
     Parameters
     ----------

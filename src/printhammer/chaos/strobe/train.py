@@ -275,7 +275,7 @@ FINER: Final = (0.1, 0.01)
 def _at_finer(
     trains: Sequence[Train], judged: tuple[int, int], effort: Effort
 ) -> list[tuple[tuple[float, str], ...]]:
-    """Compute the periods of trains at a tenth and a hundredth of the tolerance, with the tolerances.
+    """Recompute the periods of trains at a tenth and a hundredth of the tolerance; return both as text.
 
     Between two rests small errors grow; if they reach the size of the motion, rounding decides its period.
     """
@@ -296,7 +296,7 @@ def _at_finer(
 def _ensemble(
     trains: Sequence[Train], ends: Sequence[float], tolerance: float, states: FloatArray | None = None
 ) -> Ensemble:
-    """Build the ensemble that runs trains to given times, s, from their own or given states."""
+    """Build the ensemble that runs trains to given times, s; `states` replace their initial states."""
     begun = [train.state for train in trains if train.state is not None]
     own = np.array(begun) if len(begun) == len(trains) else None
     return Ensemble(

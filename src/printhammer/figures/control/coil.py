@@ -74,7 +74,7 @@ def plot_duty(duty: ThermalDuty) -> Figure:
 
 @styled
 def plot_limit(limit: ThermalLimit) -> Figure:
-    """Draw stated rates against the ambient temperature, and the lines to the common temperature limit."""
+    """Draw stated rates against the ambient temperature, and a line per rail voltage to the fitted limit."""
     figure, ax = new_panel(3.4)
     for number, rail in enumerate(np.unique(limit.voltage).tolist()):
         rows = limit.voltage == rail

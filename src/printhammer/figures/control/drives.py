@@ -147,7 +147,7 @@ def plot_run(feedback: Feedback) -> Figure:
     return figure
 
 
-_AFTER: Final = 0.08  # Time shown after the rest, as a fraction of the time to rest; arbitrary
+_AFTER: Final = 0.08  # Time shown after the armature rests, as a fraction of the time to rest; arbitrary
 
 
 @styled

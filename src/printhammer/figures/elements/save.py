@@ -62,7 +62,7 @@ def save(
         try:
             for kind, draft in drafts.items():
                 draft.write_bytes(picture(figure, kind, dpi=dpi))
-            # All or none, so that an interrupted call does not mix the files of two figures.
+            # Write all formats or none, so that an interrupted call does not mix the files of two figures.
             for kind, draft in drafts.items():
                 draft.replace(paths[kind])
         finally:
