@@ -109,6 +109,10 @@ def compiled_code() -> Files:
     # The longest compilations, those with a circuit, begin first: the processes then end together.
     posed.sort(key=lambda pair: not pair[0].circuit)
     yield from (web(entries.page_module(laws)) for laws, _drive in posed)
+    # In a page, a current or a voltage can drive the coil.
+    coils = [each for each in hammers if each.magnet is not None and each.magnet.has_linkage]
+    for quantity in ("voltage", "current"):
+        yield from (web(entries.page_module(problem.laws_of(each, quantity))) for each in coils)
     # Processors of the level COMMON share their machine code; that of others runs nowhere else.
     if link.processor()[1] != link.COMMON:
         return

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.errors import refused
 
+from printhammer.drive import tables
 from printhammer.drive.segments import table
 from printhammer.drive.waveforms.shapes import (
     DECAY_TIMES,
@@ -271,3 +272,14 @@ def test_the_unit_of_the_amplitude_tells_what_is_driven(amplitude: str, quantity
 def test_a_wrong_dimension_is_an_input_error() -> None:
     with refused("width"):
         HalfSine(amplitude=1.0, width="3 lbf")
+
+
+@given(st.lists(st.tuples(st.floats(1e-9, 1e-2), st.integers(-3, 3)), min_size=2, max_size=30), st.booleans())
+def test_the_plain_table_of_a_record_is_that_of_scipy(steps: list[tuple[float, int]], later: bool) -> None:
+    times = np.cumsum([step for step, _ in steps])
+    times -= 0.0 if later else times[0]
+    values = [0.7 * value for _, value in steps]
+    expected = Sampled.from_samples(times, values).segments()
+    rows = np.empty((len(steps) + 1, 6))
+    count = tables.fill_table(tables.SAMPLED, [*times.tolist(), *values], rows)
+    np.testing.assert_array_equal(rows[:count], expected)

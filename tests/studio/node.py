@@ -25,10 +25,13 @@ globalThis.onmessage = null;
 
 SERVE = """
 onmessage({ data: { limits: { ...content.limits, ...content.sentences } } });
+const unpacked = (text) => new WebAssembly.Module(gunzipSync(Buffer.from(text, "base64")));
+const modules = content.modules.map(unpacked);
 for (const name of content.names) {
-  const hammer = content.hammers[name];
-  const bytes = gunzipSync(Buffer.from(content.modules[hammer.module], "base64"));
-  onmessage({ data: { name, module: new WebAssembly.Module(bytes), hammer } });
+  for (const [quantity, index] of Object.entries(content.hammers[name].modules)) {
+    const hammer = { ...content.hammers[name], quantity, circuit: quantity === "voltage" };
+    onmessage({ data: { kernel: `${name}, ${quantity}`, module: modules[index], hammer } });
+  }
 }
 createInterface({ input: process.stdin }).on("line", (line) => onmessage({ data: JSON.parse(line) }));
 """
@@ -39,7 +42,9 @@ class Engine:
 
     def __init__(self, shelf: Shelf, folder: Path) -> None:
         content = folder / "content.json"
-        content.write_text(json.dumps(content_of(shelf)), "utf-8")
+        whole = content_of(shelf)
+        self._pulses = {name: hammer["described"]["waveform"] for name, hammer in whole["hammers"].items()}
+        content.write_text(json.dumps(whole), "utf-8")
         script = folder / "worker.js"
         script.write_text(HOST + merged("engine/worker.js") + SERVE, "utf-8")
         self._process = subprocess.Popen(
@@ -69,7 +74,9 @@ class Engine:
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._number += 1
-        message = {"number": self._number, "work": name, "state": state, **more}
+        wave = state["waveform"] or self._pulses[state["hammer"]]
+        kernel = f"{state['hammer']}, {wave['quantity']}"
+        message = {"number": self._number, "work": name, "state": state, "kernel": kernel, **more}
         print(json.dumps(message), file=self._process.stdin, flush=True)
         frames = []
         while True:
@@ -82,6 +89,6 @@ class Engine:
         for frame in frames:
             frame["data"] = {
                 key: np.array([np.nan if value is None else value for value in values])
-                for key, values in frame["data"].items()
+                for key, values in frame.get("data", {}).items()
             }
         return frames

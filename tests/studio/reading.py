@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from printhammer.run.problem import Problem
-from printhammer.studio import Shelf
+from printhammer.studio import Shelf, live
 from printhammer.studio.bundle import merged
 from printhammer.studio.live import content_of
 
@@ -36,7 +35,8 @@ const asked = { %s };
 createInterface({ input: process.stdin }).on("line", (line) => {
   const [what, ...words] = JSON.parse(line);
   if (what === "shelf") {
-    shelf = { ...words[0], readers: readersOf(words[0].limits, words[0].vocabulary), noFiles: "no files" };
+    const adopt = () => { throw new Refusal("no files"); };
+    shelf = { ...words[0], readers: readersOf(words[0].limits, words[0].vocabulary), adopt };
     console.log("true");
     return;
   }
@@ -60,7 +60,7 @@ class NoModule:
 
 def without_modules(monkeypatch: pytest.MonkeyPatch) -> None:
     """Write pages without WebAssembly modules, which take long to link."""
-    monkeypatch.setattr(Problem, "page_module", NoModule())
+    monkeypatch.setattr(live, "page_module", lambda _laws: NoModule())
 
 
 @contextmanager

@@ -5,7 +5,7 @@ from contextlib import nullcontext
 import pytest
 from tests.hammers import CRUDE, interpreted
 
-from printhammer.drive.trains import PulseTrain
+from printhammer.drive.trains import Drive, PulseTrain, SineForce
 from printhammer.drive.waveforms.shapes import SHAPES
 from printhammer.hammer.hammer import Hammer, load, shipped
 from printhammer.hammer.names import range_of
@@ -77,11 +77,21 @@ def test_a_shipped_hammer_opens_with_something_that_strikes_its_backstop(name: s
     opening = controls.describe(hammer)["start"]
     assert ("waveform" in opening) == (hammer.waveform is None)
     wave, rate, pulses = hammer.waveform, opening.get("rate", 1200.0), opening.get("pulses", 9)
-    if fields := dict(opening.get("waveform", {})):
-        wave = SHAPES[fields.pop("shape")](**fields)
-    at = [slot / rate for slot, mark in enumerate(opening.get("pattern", "1" * pulses)) if mark == "1"]
+    fields = dict(opening.get("waveform", {}))
+    if fields.pop("shape", "") == "sine":
+        drive: Drive = SineForce(fields["amplitude"], rate, phase=fields["phase"])
+        duration: float | None = pulses / rate
+    else:
+        wave = SHAPES[opening["waveform"]["shape"]](**fields) if fields else wave
+        drive, duration = (
+            PulseTrain(
+                wave,
+                at=[k / rate for k, mark in enumerate(opening.get("pattern", "1" * pulses)) if mark == "1"],
+            ),
+            None,
+        )
     with interpreted() if name in RARE else nullcontext():
-        motion = simulate(hammer, PulseTrain(wave, at=at), tolerance=DISPLAY_TOLERANCE)
+        motion = simulate(hammer, drive, duration=duration, tolerance=DISPLAY_TOLERANCE)
     assert motion.status == "ok"
     struck = any(contact.surface == "backstop" for contact in motion.contacts)
     # Without a spring an armature stays where it was pulled.

@@ -49,7 +49,7 @@ def ask() -> Iterator[Any]:
         ({"extra": 1}, "unknown key 'extra'"),
         ({"rate": "1200"}, "rate is expected to be a number"),
         ({"rate": True}, "rate is expected to be a number"),
-        ({"rate": 1e99}, "rate is expected to be a finite number from 10 to 20000"),
+        ({"rate": 1e99}, "rate is expected to be a finite number from 0.01 to 20000"),
         ({"pulses": 65}, "pulses is expected to be a whole number from 1 to 64"),
         ({"pattern": "102"}, "pattern is expected to be of 0 and 1"),
         ({"pattern": "000"}, "pattern is expected to be of 0 and 1"),

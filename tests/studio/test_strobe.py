@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from tests.studio.test_live import NAME
 
 import printhammer as ph
 from printhammer.studio import Shelf
+from printhammer.studio.controls import describe
 
 COUNTS, JUDGED = [25, 50, 100, 150, 200], [1001, 2000]
 
@@ -58,3 +60,26 @@ def test_a_train_that_leaves_the_range_is_refused(engine: Engine) -> None:
     pulse = {"shape": "half-sine", "amplitude": -90.0, "width": 4e-4, "quantity": "current"}
     (refused,) = judged(engine, 1000.0, waveform=pulse)
     assert "the first 25 strobe points" in refused["refusal"]
+
+
+@pytest.mark.slow
+def test_a_continuous_force_is_classified_as_by_the_library(tmp_path: Path) -> None:
+    oscillator = ph.load("duffing-holmes")
+    opening = describe(oscillator)["start"]
+    wave = opening["waveform"]
+    with Engine(Shelf(oscillator, only=True), tmp_path) as engine:
+        state = {**STATE, "hammer": oscillator.name, **opening}
+        verdict = engine.work("section", state, counts=COUNTS, judged=JUDGED)[-1]["verdict"]
+        part = {"rates": [opening["low"], opening["high"]], "columns": 40, "wanted": False}
+        (piece,) = engine.work("piece", state, part=part)
+    force = ph.SineForce(wave["amplitude"], opening["rate"], phase=wave["phase"])
+    expected = ph.strobe(oscillator, drive=force, points=1).verdict
+    assert expected is not None
+    # Per firing, 2 pi times the exponent of 0.158 per unit of time of Holmes.
+    assert (verdict["verdict"], expected.name) == ("strange", "strange")
+    assert verdict["exponent_per_firing"] == pytest.approx(2.0 * math.pi * 0.158, abs=0.1)
+    slow = ph.SineForce(wave["amplitude"], opening["low"], phase=wave["phase"])
+    end = opening["pulses"] / opening["low"]
+    motion = ph.simulate(oscillator, slow, duration=end)
+    x = motion.curves_at(np.linspace(0.0, end, 40))[0]
+    np.testing.assert_allclose(piece["x"][:10], x[:10], atol=1e-4)

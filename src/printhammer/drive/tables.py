@@ -104,6 +104,53 @@ def trapezoid(fields: Any, table: Any) -> int:
     return close(table, rows, end)
 
 
+def end_slope(h0: float, h1: float, m0: float, m1: float) -> float:
+    """Return the slope of a shape-preserving cubic at the end of a record, from two intervals and secants."""
+    slope = ((2.0 * h0 + h1) * m0 - h0 * m1) / (h0 + h1)
+    if slope * m0 <= 0.0:
+        return 0.0
+    if m0 * m1 <= 0.0 and abs(slope) > 3.0 * abs(m0):
+        return 3.0 * m0
+    return slope
+
+
+def inner_slope(h0: float, h1: float, m0: float, m1: float) -> float:
+    """Return the slope between two intervals: a weighted harmonic mean of their secants, 0 at an extremum."""
+    if m0 == 0.0 or m1 == 0.0 or (m0 < 0.0) != (m1 < 0.0):
+        return 0.0
+    w0, w1 = 2.0 * h1 + h0, h1 + 2.0 * h0
+    return 1.0 / ((w0 / m0 + w1 / m1) / (w0 + w1))
+
+
+def sampled(fields: Any, table: Any) -> int:
+    """Write the table of a record, interpolated by shape-preserving cubics; return the number of rows.
+
+    `fields` holds the n times and then the n values; the table has room for n + 1 rows. Slopes as in
+    `scipy.interpolate.PchipInterpolator`.
+    """
+    n = len(fields) // 2
+    rows = put(table, 0, 0.0, POLYNOMIAL, 0.0, 0.0, 0.0, 0.0) if fields[0] > 0.0 else 0
+    left = 0.0
+    for k in range(n - 1):
+        h = fields[k + 1] - fields[k]
+        m = (fields[n + k + 1] - fields[n + k]) / h
+        right = m
+        ahead = fields[k + 2] - fields[k + 1] if k + 2 < n else h
+        beyond = (fields[n + k + 2] - fields[n + k + 1]) / ahead if k + 2 < n else m
+        behind = fields[k] - fields[k - 1] if k > 0 else h
+        before = (fields[n + k] - fields[n + k - 1]) / behind if k > 0 else m
+        if n == 2:
+            left = m
+        else:
+            left = end_slope(h, ahead, m, beyond) if k == 0 else left
+            right = inner_slope(h, ahead, m, beyond) if k + 2 < n else end_slope(h, behind, m, before)
+        turn = (left + right - 2.0 * m) / h
+        cubic = turn / h
+        rows = put(table, rows, fields[k], POLYNOMIAL, fields[n + k], left, (m - left) / h - turn, cubic)
+        left = right
+    return close(table, rows, fields[n - 1])
+
+
 def series_of(fields: Any) -> float:
     """Return the resistance of the supply as seen by the current of one coil, ohm."""
     return float(fields[_SOURCE_RESISTANCE] * fields[_COILS])
@@ -268,13 +315,15 @@ SHOWN: Final = 13
 
 
 def fill_table(shape: int, fields: Any, table: Any) -> int:
-    """Write the segment table of a shape; return its number of rows, or -1 for a shape without fields."""
+    """Write the segment table of a shape; return its number of rows, or -1 for an unknown shape."""
     if shape == HALF_SINE:
         return half_sine(fields, table)
     if shape == RECTANGLE:
         return rectangle(fields, table)
     if shape == TRAPEZOID:
         return trapezoid(fields, table)
+    if shape == SAMPLED:
+        return sampled(fields, table)
     if shape == RAIL_SHAPE:
         return rail(fields, table)
     if shape == CHOPPER:
@@ -299,8 +348,8 @@ def pulse(shape: int, fields: Any, table: Any, about: Any) -> int:
         Code of the shape.
     fields : float64 array
         Fields of the shape in order of declaration, NaN for a missing one; of a driver then the index of the
-        decay path.
-    table : float64 array, shape (4 or more, 6)
+        decay path. Of a record, the times and then the values.
+    table : float64 array, shape (4 or more, of a record one more than samples, 6)
         Segment table, in the form for the kernel: the last row has the kind `END`.
     about : float64 array, shape (14,)
         Support, s; end of the table, s; largest value; 1 if the latest firing replaces earlier ones, else 0;
@@ -310,7 +359,7 @@ def pulse(shape: int, fields: Any, table: Any, about: Any) -> int:
     Returns
     -------
     int
-        Number of rows; -1 for the shape of a record, which has no fields.
+        Number of rows; -1 for an unknown shape.
     """
     rows = fill_table(shape, fields, table)
     if rows < 0:

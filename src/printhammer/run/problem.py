@@ -16,7 +16,6 @@ from printhammer.drive.trains import Drive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.static_force import StaticForce
-from printhammer.kernel.compile.modules import WebModule
 from printhammer.kernel.compile.specialise import Kernel
 from printhammer.kernel.model import layout
 from printhammer.kernel.model.laws import Laws
@@ -115,8 +114,9 @@ def check_tolerance(tolerance: object) -> None:
         )
 
 
-def laws_of(hammer: Hammer, drive: Drive) -> Laws:
-    """Return the laws of a hammer's parts, and of its drive, that select the compiled kernel."""
+def laws_of(hammer: Hammer, drive: Drive | str) -> Laws:
+    """Return the laws of a hammer's parts, and of a drive or its quantity, that select the kernel."""
+    quantity = drive if isinstance(drive, str) else drive.quantity
     return Laws(
         magnet=_module(hammer.magnet),
         spring=_module(hammer.spring),
@@ -124,8 +124,8 @@ def laws_of(hammer: Hammer, drive: Drive) -> Laws:
         backstop=_module(hammer.backstop),
         absent="printhammer.parts.absent",
         damping=_module(hammer.damping),
-        force_drive=drive.quantity == "force",
-        circuit=drive.quantity == "voltage",
+        force_drive=quantity == "force",
+        circuit=quantity == "voltage",
         pack_pulls=bool(getattr(hammer.pack, "pull", True)),
         backstop_pulls=bool(getattr(hammer.backstop, "pull", True)),
         reload_along_unloading=getattr(hammer.pack, "reloading", "") == "unloading-curve",
@@ -232,13 +232,6 @@ class Problem:
         from printhammer.kernel.compile.specialise import specialise
 
         return specialise(self.laws)
-
-    @property
-    def page_module(self) -> WebModule:
-        """WebAssembly module with which a page computes the runs of this hammer."""
-        from printhammer.run.plain.entries import page_module
-
-        return page_module(self.laws)
 
     def leave_out(self, surface: Literal["pack", "backstop"]) -> None:
         """Move a surface out of reach of the armature, leaving all other forces unchanged."""

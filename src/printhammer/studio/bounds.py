@@ -19,7 +19,7 @@ LONGEST_REASON: Final = 500
 MOST_PULSES: Final = 64
 """Largest number of firings of a drive, and of slots of a pattern."""
 
-RATES: Final = (10.0, 20e3)
+RATES: Final = (0.01, 20e3)
 """Range of firing rates, Hz."""
 
 LONGEST_TIME: Final = 0.5

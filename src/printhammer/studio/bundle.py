@@ -28,8 +28,11 @@ def page_files() -> dict[str, bytes]:
         for entry in root.joinpath(place).iterdir():
             if entry.name.endswith(_ENDINGS):
                 contents[place + entry.name] = entry.read_bytes()
-    # The vendored file stays unmodified; its definitions are exported as a module here.
+    # Vendored files stay unmodified; their definitions are exported as modules here.
     contents["vendor/uPlot.js"] = contents["vendor/uPlot.iife.min.js"] + b"\nexport default uPlot;\n"
+    toml = root.joinpath("vendor", "smol-toml.min.cjs").read_bytes()
+    module = b"export const parseToml = ((exports) => {\n%b\nreturn exports.parse;\n})({});\n" % toml
+    contents["vendor/toml.js"] = module
     contents["engine/call.js"] = files("printhammer.kernel.compile.web").joinpath("call.mjs").read_bytes()
     return contents
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, get_args
 
 from printhammer import __version__
 from printhammer.drive.waveforms.drivers import DRIVERS, Rail
-from printhammer.drive.waveforms.shapes import SHAPES, Waveform
+from printhammer.drive.waveforms.shapes import SHAPES, Sine, Waveform
 from printhammer.studio import bounds
 from printhammer.studio.coil import by_voltage, open_constants, rail_of, span_of
+from printhammer.support.constants import quantities
 from printhammer.units import from_si
 
 if TYPE_CHECKING:
@@ -69,17 +71,32 @@ _PUSHES: Final[dict[str, Any]] = {
     "low": 10.0,
     "high": 20.0,
 }
-# As above, hard enough to reach a stop one unit of length away.
-_BLOWS: Final = {**_PUSHES, "waveform": {**_PUSHES["waveform"], "amplitude": 100.0}}
+
+
+def _shaken(
+    amplitude: float, angular: float, phase: float, low: float, high: float, pulses: int = 20
+) -> dict[str, Any]:
+    """Return the opening state of an oscillator under a sinusoidal force, with angular frequencies, rad/s."""
+    wave = {"shape": "sine", "amplitude": amplitude, "phase": phase, "quantity": "force"}
+    rates = {"rate": angular, "low": low, "high": high}
+    return {"waveform": wave, "pulses": pulses} | {
+        name: float(f"{value / (2.0 * math.pi):.6g}") for name, value in rates.items()
+    }
+
+
+SINE: Final = ("amplitude", "phase")
+"""Constants of a sinusoidal force that a page sets; its frequency is the rate."""
+
+_QUARTER: Final = 0.5 * math.pi
 
 OPENINGS: Final[dict[str, dict[str, Any]]] = {
     "bouncing-ball": _HOPS,
     "tufillaro-1992": _HOPS,
-    "linear-impact-oscillator": _PUSHES,
-    "resonant-grazing": _BLOWS,
-    "shaw-holmes-1983": _PUSHES,
-    "dankowicz-schilder-2013": _BLOWS,
-    "duffing-holmes": _BLOWS,
+    "linear-impact-oscillator": _shaken(1.0, 2.8, _QUARTER, 1.5, 5.0),
+    "resonant-grazing": _shaken(3.1, 2.0, -_QUARTER, 1.2, 4.0),
+    "shaw-holmes-1983": _shaken(1.0, 2.8, _QUARTER, 1.5, 5.0),
+    "dankowicz-schilder-2013": _shaken(0.12, 1.0, -_QUARTER, 0.6, 2.0),
+    "duffing-holmes": _shaken(0.3, 1.0, _QUARTER, 0.5, 2.0),
     "housner-1963": _PUSHES,
     "braille-embosser": {"rate": 20.0, "pulses": 3, "low": 10.0, "high": 60.0},
     "dot-peen": {"rate": 40.0, "pulses": 5, "low": 10.0, "high": 160.0},
@@ -209,28 +226,14 @@ def fields_of(waveform: Waveform) -> dict[str, Any]:
 
 def vocabulary(hammer: Hammer | None = None) -> dict[str, Any]:
     """Return units with factors suited to a hammer, pulse shapes with their constants, and limits."""
-    from printhammer.support.constants import quantities
-
     named = SHOWN if hammer is None else {**SHOWN, **_large(hammer)}
     units = {
         si: [{"name": _signed(name), "factor": from_si(1.0, si, name)} for name in names]
         for si, names in named.items()
     }
-    shapes = {
-        name: [
-            {
-                "name": field,
-                "unit": note.si,
-                "meaning": note.meaning,
-                "positive": note.gt is not None,
-                "least": note.gt if note.ge is None else note.ge,
-                "start": None if note.required else shape.model_fields[field].default,
-                "optional": not note.required and shape.model_fields[field].default is None,
-            }
-            for field, note in quantities(shape).items()
-        ]
-        for name, shape in SHAPES.items()
-    }
+    shapes = {name: [_field(shape, field) for field in quantities(shape)] for name, shape in SHAPES.items()}
+    # The frequency of a continuous force is the rate.
+    shapes[Sine.shape] = [_field(Sine, field) for field in SINE]
     limits = {
         "pulses": bounds.MOST_PULSES,
         "rates": bounds.RATES,
@@ -246,6 +249,20 @@ def vocabulary(hammer: Hammer | None = None) -> dict[str, Any]:
         "drivers": drivers,
         "decays": decays,
         "limits": limits,
+    }
+
+
+def _field(shape: type[Waveform], name: str) -> dict[str, Any]:
+    """Describe a constant of a pulse shape for its control."""
+    note = quantities(shape)[name]
+    return {
+        "name": name,
+        "unit": note.si,
+        "meaning": note.meaning,
+        "positive": note.gt is not None,
+        "least": note.gt if note.ge is None else note.ge,
+        "start": None if note.required else shape.model_fields[name].default,
+        "optional": not note.required and shape.model_fields[name].default is None,
     }
 
 

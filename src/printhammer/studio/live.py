@@ -16,26 +16,23 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any, Final, get_args
 
 from printhammer import __version__
-from printhammer.drive.trains import PulseTrain
 from printhammer.drive.waveforms.drivers import Rail
-from printhammer.drive.waveforms.shapes import SHAPES
+from printhammer.drive.waveforms.shapes import SHAPES, Sine
+from printhammer.errors import InputError
 from printhammer.run.energy import Ledger
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
-from printhammer.run.plain.entries import numbers_of
+from printhammer.run.plain.entries import numbers_of, page_module
 from printhammer.run.plain.page import REFUSALS
-from printhammer.run.problem import TOLERANCE, Problem, fresh_carry
-from printhammer.run.start import initial_state
+from printhammer.run.problem import TOLERANCE, constants_of, fresh_carry, laws_of
 from printhammer.studio import bounds
 from printhammer.studio.bundle import deltas, inside, merged, page_files, sources, style
-from printhammer.studio.coil import by_voltage, open_constants
-from printhammer.studio.controls import describe, vocabulary
+from printhammer.studio.controls import SINE, describe, vocabulary
 from printhammer.studio.launch import FORMAT, KIND
 from printhammer.support.constants import quantities
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
     from printhammer.studio.shelf import Shelf
 
@@ -76,12 +73,7 @@ begin(content, bytes.subarray(end));
 """
 
 _SENTENCES: Final = {
-    "files": "a hammer file is opened by `printhammer studio FILE`, not by this page",
-    "tables": "a measured table is opened by `printhammer studio`, not by this page",
-    "strobe": "exponents are computed by `printhammer strobe` on a computer with Python",
-    "drive": "the file of a drive is written by `printhammer studio` on a computer with Python",
-    "sampled": "a measured pulse is computed by `printhammer run` on a computer with Python",
-    "kinds": "another kind of drive is computed by `printhammer run` on a computer with Python",
+    "kinds": "this page has no kernel for such a drive of this hammer; a page made for the hammer alone has",
 }
 """Messages of the page about computations that only Python performs, by name."""
 
@@ -164,6 +156,13 @@ def _limits() -> dict[str, Any]:
         }
         for name, shape in SHAPES.items()
     }
+    # The frequency of a continuous force is the rate. Its code is the number of shapes, as in `drive.tables`.
+    named["WAVEFORMS"][Sine.shape] = {
+        "known": ["shape", "quantity", *SINE],
+        "fields": list(SINE),
+        "voltages": [],
+        "decays": False,
+    }
     named["ENERGIES"] = [field.name for field in fields(Ledger)]
     named["LINE"] = _line()
     named |= {"DISPLAY_TOLERANCE": DISPLAY_TOLERANCE, "TOLERANCE": TOLERANCE, "REFUSALS": REFUSALS}
@@ -205,31 +204,47 @@ def _hammer(shelf: Shelf, name: str, modules: dict[str, str]) -> dict[str, Any]:
         "text": hammer.to_toml(),
         "shipped": shelf.is_shipped(name),
     }
-    wave = hammer.waveform
-    if wave is None:
-        fields = dict(described["start"]["waveform"])
-        wave = SHAPES[fields.pop("shape")](**fields)
-    return entry | _numbers(hammer, wave, modules)
+    entry["modules"] = _modules(hammer, described, name == shelf.names[0], modules)
+    return entry | _numbers(hammer)
 
 
-def _numbers(hammer: Hammer, wave: Waveform, modules: dict[str, str]) -> dict[str, Any]:
-    """Return the arguments of the kernel for a hammer and its pulse, and the index of its module."""
-    further = open_constants(hammer)
-    if by_voltage(wave) and "coil.resistance" in further:
-        hammer = hammer.replace({key: constant.si for key, (constant, _) in further.items()})
-    drive = PulseTrain(wave)
-    problem = Problem(hammer, drive, initial_state(hammer, None), 0.0, DISPLAY_TOLERANCE)
-    module = problem.page_module
-    if module.name not in modules:
-        modules[module.name] = b64encode(gzip.compress(module.content(), 1)).decode()
+def _modules(
+    hammer: Hammer, described: dict[str, Any], first: bool, modules: dict[str, str]
+) -> dict[str, int]:
+    """Return the indices of the modules of a hammer by the quantity that drives the hammer.
+
+    All hammers have that of their pulse, or of the pulse with which they open; the first hammer also those of
+    a current and of a voltage.
+    """
+    pulse = described["waveform"] or described["start"]["waveform"]
+    wanted = [pulse["quantity"]]
+    if first and described["rail"] is not None:
+        wanted += ["current", "voltage"]
+    found: dict[str, int] = {}
+    for quantity in dict.fromkeys(wanted):
+        module = page_module(laws_of(hammer, quantity))
+        if module.name not in modules:
+            try:
+                content = module.content()
+            except InputError:
+                # Without the linker, what another quantity needs is left out.
+                if not found:
+                    raise
+                continue
+            modules[module.name] = b64encode(gzip.compress(content, 1)).decode()
+        found[quantity] = list(modules).index(module.name)
+    return found
+
+
+def _numbers(hammer: Hammer) -> dict[str, Any]:
+    """Return the arguments of the kernel for a hammer."""
+    numbers = numbers_of(hammer)
+    carry = fresh_carry(0.0, (math.pi, 0.0))
     return {
-        "module": list(modules).index(module.name),
-        "circuit": problem.laws.circuit,
-        "quantity": drive.quantity,
-        "numbers": {name: (keys, _numbers_of(own)) for name, (keys, own) in numbers_of(hammer).items()},
-        "size": len(problem.constants),
-        "carry": _numbers_of(fresh_carry(0.0, (math.pi, 0.0))),
-        "placeOfRest": fresh_carry(0.0, (math.pi, 0.0)).tolist().index(math.pi),
+        "numbers": {name: (keys, _numbers_of(own)) for name, (keys, own) in numbers.items()},
+        "size": len(constants_of(hammer)),
+        "carry": _numbers_of(carry),
+        "placeOfRest": carry.tolist().index(math.pi),
         "damped": hammer.damping is not None,
     }
 

@@ -82,6 +82,7 @@ const TEXTS = {
   },
   motion: ({ motion, dots }) => {
     const { fired } = motion;
+    if (motion.sine) return `A sinusoidal force: ${fired.length} periods of ${shown(motion.sine, "s", 4)}.`;
     const gap = fired.length > 1 ? `, fired every ${shown(fired[1] - fired[0], "s", 4)}` : "";
     const coil = motion.data.u ? ` The coil takes up to ${shown(motion.peak, "A", 3)} from ${shown(motion.supply, "V", 3)}.` : "";
     if (!dots) return `The displacement against time${gap}.${coil}`;

@@ -189,6 +189,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     if (frame.kind === "refusal") studio.say(frame.reason, true);
     else if (frame.what === "state") take(frame);
     else if (frame.what === "hammer") load({ ...studio.store.state, hammer: "", text: frame.text, constants: {}, waveform: null });
+    else if (frame.what === "drive") { studio.store.set(frame.patch); studio.say(`the drive is that of ${frame.name}`); }
     else if (frame.what === "curves") lay(frame);
   };
   /** Show measured curves: a displacement over the motion, a current, force or voltage as the pulse that is fired. */
@@ -212,6 +213,13 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     studio.notes = `${name}: ${shown.join(", ")}`;
     studio.say(studio.notes);
   }
+
+  // A drive that was copied as text can be pasted again, where no field takes the text.
+  element.ownerDocument.addEventListener("paste", (event) => {
+    if (event.target.closest?.("input, textarea, select")) return;
+    const text = event.clipboardData?.getData("text") ?? "";
+    if (/^\s*format\s*=/.test(text)) studio.drop(new File([text], "pasted.toml"));
+  });
 
   studio.store.listeners.add((state) => {
     const wanted = state.text || state.hammer;

@@ -11,7 +11,8 @@ const UNITS = { current: "A", force: "N", voltage: "V" };
 const MARGIN = { left: 42, right: 8, top: 6, bottom: 30 };
 
 export function waveformEditor(group, studio, sliderRow) {
-  const shapes = Object.keys(studio.shapes).filter((shape) => shape !== "sampled");
+  // A continuous force drives an armature without a magnet only.
+  const shapes = Object.keys(studio.shapes).filter((shape) => shape !== "sampled" && (shape !== "sine" || studio.quantity() === "force"));
   const choice = element("select", { id: "control-shape", class: "wide", "aria-label": "shape of the pulse" });
   const reset = element("button", { type: "button", class: "reset", title: "reset", "aria-label": "reset pulse" }, "↺");
   const holder = element("div", { class: "pulse" });
@@ -63,6 +64,7 @@ export function waveformEditor(group, studio, sliderRow) {
     const { t, value } = frame.pulse;
     const peak = value.reduce((best, part, k) => (Math.abs(part) > Math.abs(value[best]) ? k : best), 0);
     const end = (wave.rise && wave.shape === "trapezoid" ? wave.rise : 0) + wave.width;
+    if (wave.width === undefined) return [{ kind: "amplitude", x: t[peak], y: value[peak] }];
     return [{ kind: isDriver(studio, wave) ? "voltage" : "amplitude", x: t[peak], y: value[peak] }, { kind: "width", x: Math.min(end, t.at(-1)), y: 0 }];
   }
 

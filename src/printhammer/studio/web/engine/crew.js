@@ -34,11 +34,12 @@ export function crewOf(script, shelf) {
 
   async function hand(own, order) {
     own.order = order;
-    const { name } = order;
-    if (!own.known.has(name)) {
-      const module = await shelf.module(name);
-      own.worker.postMessage({ name, module, hammer: shelf.hammers[name] });
-      own.known.add(name);
+    const { name, quantity } = order;
+    const { kernel } = order.message;
+    if (!own.known.has(kernel)) {
+      const module = await shelf.module(name, quantity);
+      own.worker.postMessage({ kernel, module, hammer: shelf.driven(name, quantity) });
+      own.known.add(kernel);
     }
     own.worker.postMessage(order.message);
   }
@@ -60,7 +61,8 @@ export function crewOf(script, shelf) {
     /** Order a work; `done` gets { frames } or { reason }, or null where it is not wanted any more; `onward` what comes on the way. */
     send(team, work, state, more, wanted, done, onward = () => {}) {
       number += 1;
-      teams[team].orders.push({ name: state.hammer, message: { number, work, state, ...more }, wanted, done, onward });
+      const [name, quantity] = [state.hammer, shelf.quantity(state)];
+      teams[team].orders.push({ name, quantity, message: { number, work, state, kernel: `${name}, ${quantity}`, ...more }, wanted, done, onward });
       next();
     },
   };

@@ -1,7 +1,9 @@
 // What computes for the page: it answers the messages of the studio with workers.
+import { adopter } from "./adopt.js";
 import { crewOf } from "./crew.js";
+import { dropped } from "./files.js";
 import { codesOf, pictureOf } from "./map.js";
-import { checkConstant, readFile, readState, Refusal, taken } from "./read.js";
+import { checkConstant, readState, Refusal, taken } from "./read.js";
 import { textsOf } from "./texts.js";
 
 const DEVICE = ["hammer", "text", "constants", "waveform"];
@@ -18,6 +20,7 @@ const NOTHING = { map: { detail: "none" }, strobe: { verdict: null } };
 
 /** Start the engine; `receive` takes its frames. Returns what takes the text of a message. */
 export function engineOf(shelf, script, receive, page) {
+  shelf.adopt = adopter(shelf);
   const crew = crewOf(script, shelf);
   let latest = null; // the newest state, with its number
   let drawn = 0; // the number of the newest state whose map is drawn
@@ -32,12 +35,12 @@ export function engineOf(shelf, script, receive, page) {
   /** Read a state and check what can be checked without its run. */
   function read(content) {
     const state = readState(content, shelf.readers);
-    if (state.text) throw new Refusal(shelf.noFiles);
-    state.hammer ||= shelf.names[0];
+    state.hammer = state.text ? shelf.adopt(state.text) : state.hammer || shelf.names[0];
     if (!Object.hasOwn(shelf.hammers, state.hammer)) throw new Refusal(`hammer = '${state.hammer}': expected one of ${shelf.names.join(", ")}`);
     const { described } = shelf.hammers[state.hammer];
     for (const [key, value] of Object.entries(state.constants)) checkConstant(described, key, value);
     if (!state.waveform && !described.waveform) throw new Refusal(`the hammer '${described.name}' has no [waveform]: expected one set in the editor`);
+    if (!(shelf.quantity(state) in shelf.hammers[state.hammer].modules)) throw new Refusal(shelf.sentences.kinds);
     return state;
   }
 
@@ -91,7 +94,7 @@ export function engineOf(shelf, script, receive, page) {
     if (state.low >= state.high) { empty(`map: rates from ${state.low} Hz to ${state.high} Hz: expected ascending ones`); return; }
     drawn = serial;
     // A coarse map is delivered even while a slider moves; of several that wait, the newest.
-    const sizes = [[shelf.limits.PREVIEW[shelf.hammers[state.hammer].circuit], false, () => drawn === serial], [shelf.limits.FULL, true, () => latest === serial]];
+    const sizes = [[shelf.limits.PREVIEW[shelf.quantity(state) === "voltage"], false, () => drawn === serial], [shelf.limits.FULL, true, () => latest === serial]];
     for (const [size, full, wanted] of sizes) {
       const parts = await pictureOf(crew, state, size, full, wanted);
       if (!parts) return;
@@ -104,19 +107,15 @@ export function engineOf(shelf, script, receive, page) {
 
   const answers = {
     hammer: (serial, { name, text }) => {
-      if (text) throw new Refusal(shelf.noFiles);
-      const asked = name || shelf.names[0];
+      const asked = text ? shelf.adopt(text) : name || shelf.names[0];
       if (!Object.hasOwn(shelf.hammers, asked)) throw new Refusal(`hammer = '${asked.slice(0, 100)}': expected one of ${shelf.names.join(", ")}`);
       const { described, units } = shelf.hammers[asked];
-      return { kind: "hammer", hammer: described, offered: shelf.names, asked, text: "", units, ...shelf.vocabulary };
+      return { kind: "hammer", hammer: described, offered: shelf.names, asked: text ? "" : asked, text, units, ...shelf.vocabulary };
     },
     open: (serial, { state }) => ({ kind: "open", ...taken(state && Object.keys(state).length ? state : shelf.start, shelf) }),
     texts: (serial, { state }) => ({ kind: "texts", texts: textsOf(read(state), shelf) }),
     page: () => ({ kind: "page", html: page() }),
-    drop: (serial, { name, text }) => {
-      if (!/\.json$/i.test(name)) throw new Refusal(/\.toml$/i.test(name) ? shelf.noFiles : shelf.sentences.tables);
-      return { kind: "drop", what: "state", ...readFile(text, name, shelf) };
-    },
+    drop: (serial, content) => ({ kind: "drop", ...dropped(content, shelf) }),
   };
 
   function ask(kind, serial, state) {
@@ -146,7 +145,7 @@ export function engineOf(shelf, script, receive, page) {
       try {
         if (kind === "state") compute(serial, read(content.state));
         else if (QUESTIONS.includes(kind)) ask(kind, serial, read(content.state));
-        else receive({ serial, ...answers[kind](serial, content), data: {} });
+        else receive({ serial, data: {}, ...answers[kind](serial, content) });
       } catch (error) {
         if (kind === "state") latest = null;
         refuse(serial, error instanceof Refusal ? error.message : `this could not be answered, ${error}`);

@@ -43,6 +43,7 @@ export function runsOf(text, { glyphs, columns, name }) {
 export function line(kernel, hammer, state, limits) {
   return kernel.temporarily(() => {
     const posed = pose(kernel, hammer, state, limits);
+    if (posed.sine) throw new Refusal("a continuous force prints no line: expected a pulse");
     const { font, head, faults } = limits.LINE;
     if (posed.places.front === null) throw new Refusal("the hammer has no pack: expected one that a dot is made on");
     const runs = runsOf(state.line.trim(), font);

@@ -1,5 +1,5 @@
 // Many runs of a state: pieces of its map, its printed line.
-import { pose } from "./problem.js";
+import { isSine, pose, pulseOf } from "./problem.js";
 
 const ROW = 6; // columns of a row of dots
 const CONTACTS = 0; // column of the contacts of a firing
@@ -15,7 +15,7 @@ export function startsOf(kernel, counts) {
 }
 
 /** Integrate runs from rest with `counts` firings each, to their ends; `room` is that for dots of each. Return what is kept of them. */
-export function many(kernel, posed, firings, counts, ends, { grid = [], strobes = [], room = null, most, control = posed.control }) {
+export function many(kernel, posed, firings, counts, ends, { grid = [], strobes = [], room = null, most, control = posed.control, waves = null }) {
   const runs = counts.length;
   const starts = (step) => startsOf(kernel, counts.map(() => step));
   const each = Math.max(...counts);
@@ -24,8 +24,8 @@ export function many(kernel, posed, firings, counts, ends, { grid = [], strobes 
   for (let k = 0; k < runs; k += 1) states.set([0, posed.rest, 0, -1, 0, 0, 0, NaN], k * STATE);
   const batch = {
     hammer_of: kernel.array("i", runs), hammers: { letter: "f", at: posed.constants.at, shape: [1, posed.constants.shape[0]] },
-    controls: kernel.copy("f", control, 1, 4), bounds: kernel.copy("f", posed.bounds, 1, 4), waveform_of: kernel.array("i", runs),
-    piece_starts: kernel.copy("i", [0, posed.pieces.shape[0]]), pieces: posed.pieces, rates: kernel.array("f", 1, 3), firing_starts: startsOf(kernel, counts),
+    controls: kernel.copy("f", control, 1, 4), bounds: kernel.copy("f", posed.bounds, 1, 4), waveform_of: kernel.copy("i", waves ? counts.map((_count, k) => k) : counts.map(() => 0)),
+    piece_starts: kernel.copy("i", waves ? waves.starts : [0, posed.pieces.shape[0]]), pieces: waves?.pieces ?? posed.pieces, rates: kernel.array("f", waves ? runs : 1, 3), firing_starts: startsOf(kernel, counts),
     firings, begins: kernel.array("i", firings.shape[0]), replace: posed.replace, states: kernel.copy("f", states, runs, STATE),
     ends: kernel.copy("f", ends), max_steps: most,
   };
@@ -44,20 +44,37 @@ export function many(kernel, posed, firings, counts, ends, { grid = [], strobes 
   return kept;
 }
 
+/** The segment tables of a continuous force at several rates, one after the other. */
+function wavesOf(kernel, hammer, state, limits, rates) {
+  const tables = rates.map((rate) => {
+    const { pieces } = pulseOf(kernel, hammer, { ...state, rate }, limits);
+    return { rows: pieces.shape[0], values: pieces.values.slice() };
+  });
+  const starts = [0];
+  for (const { rows } of tables) starts.push(starts.at(-1) + rows);
+  const pieces = kernel.array("f", starts.at(-1), 6);
+  tables.forEach(({ values }, k) => pieces.values.set(values, 6 * starts[k]));
+  return { starts, pieces };
+}
+
 /** Some rates of the map of a state: displacements, whether runs ended well, and which dots were struck. */
 export function piece(kernel, hammer, state, limits, { rates, columns, wanted }) {
   return kernel.temporarily(() => {
     const posed = pose(kernel, hammer, state, limits);
     const slots = state.pattern || "1".repeat(state.pulses);
     const fired = [...slots].flatMap((mark, k) => (mark === "1" ? [k] : []));
-    const end = (slots.length - 1) / state.low + posed.wait;
+    const end = isSine(state) ? slots.length / state.low : (slots.length - 1) / state.low + posed.wait;
     const grid = kernel.array("f", columns);
     kernel.call("map_rates", 0, end, grid);
     const [starts, firings] = [kernel.array("i", rates.length + 1), kernel.array("f", rates.length * fired.length)];
     kernel.call("map_trains", kernel.copy("f", rates), kernel.copy("i", fired), Boolean(state.pattern), starts, firings);
     const counts = rates.map(() => fired.length);
-    const kept = many(kernel, posed, firings, counts, rates.map(() => end), { grid: grid.values.slice(), room: wanted ? counts : null, most: limits.MOST_MAP_STEPS });
-    const struck = wanted ? kernel.array("i", firings.shape[0]) : null;
+    // A continuous force differs from rate to rate, and strikes no dots.
+    const waves = isSine(state) ? wavesOf(kernel, hammer, state, limits, rates) : null;
+    const isStruck = wanted && !waves;
+    const kinds = { grid: grid.values.slice(), room: isStruck ? counts : null, most: limits.MOST_MAP_STEPS, waves };
+    const kept = many(kernel, posed, firings, waves ? rates.map(() => 1) : counts, rates.map(() => end), kinds);
+    const struck = isStruck ? kernel.array("i", firings.shape[0]) : null;
     if (struck) kernel.call("map_struck", kept.dots, kept.dot_starts, fired.length, struck);
     return { end, places: posed.places, x: kept.x.values.slice(), ok: Array.from(kept.status.values, (code) => code === 0n), struck: struck && Uint8Array.from(struck.values, Number) };
   });

@@ -1,5 +1,5 @@
 // Pictures of the single run of a state: its curves, its dots, its energies.
-import { firingsOf, pose, resample, run } from "./problem.js";
+import { endOf, firingsOf, pose, resample, run, slotsOf } from "./problem.js";
 
 const CURVES = ["x", "v", "drive", "u", "F magnet", "F spring", "F pack", "F backstop", "F damping", "F drag", "F drive", "F total"];
 const DOT = ["fired_at", "struck", "flight_time", "impact_speed", "peak_force", "indentation", "contact_time", "loading_work", "net_loss", "extra_contacts"];
@@ -24,8 +24,8 @@ export function curves(kernel, hammer, state, limits) {
   return kernel.temporarily(() => {
     const posed = pose(kernel, hammer, state, limits);
     const fired = firingsOf(kernel, state);
-    const record = run(kernel, posed, fired, fired.at(-1) + posed.wait, limits.MOST_STEPS);
-    const frames = [motion(kernel, posed, record, hammer, fired, limits), dots(kernel, posed, record, hammer, limits)];
+    const record = run(kernel, posed, fired, endOf(state, posed, fired), limits.MOST_STEPS);
+    const frames = [motion(kernel, posed, record, hammer, slotsOf(kernel, state), limits), dots(kernel, posed, record, hammer, limits)];
     return frames;
   });
 }
@@ -46,7 +46,7 @@ function motion(kernel, posed, record, hammer, fired, limits) {
   const data = { t, ...Object.fromEntries(rows), "strobe t": inside, "strobe x": column(0), "strobe v": column(1) };
   return {
     kind: "motion", status: record.status, message: messageOf(hammer.described.name, record), places: posed.places, quantity: hammer.quantity, peak: largest.values[0],
-    fired, steps: record.steps, pulse: posed.pulse, ...(hammer.circuit ? { supply: posed.peak } : {}), data,
+    fired, steps: record.steps, pulse: posed.pulse, ...(hammer.circuit ? { supply: posed.peak } : {}), ...(posed.sine ? { sine: posed.sine } : {}), data,
   };
 }
 
@@ -63,7 +63,7 @@ function dots(kernel, posed, record, hammer, limits) {
   kernel.call("steps", nodes, ...each);
   const increments = quadratures(...each, steps);
   const peaks = kernel.array("f", touches, 3);
-  kernel.call("peaks", contacts, nodes, train, posed.constants, peaks);
+  kernel.call("pack_peaks", contacts, nodes, train, posed.constants, peaks);
   const [work, rows] = [kernel.array("f", WORK), kernel.array("f", touches, CONTACT)];
   const [firings] = train;
   kernel.call("contacts", contacts, nodes, peaks, increments, firings, hammer.described.rigid, work, rows);

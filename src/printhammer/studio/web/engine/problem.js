@@ -12,8 +12,17 @@ const SHOWN = 160; // points of the picture of a pulse
 const CURRENT_SCALE = 78; // index of the typical current among the constants
 const SINGLE = 500000; // steps of the single pulse that decides on the window of a run
 
-/** Return the firing times of a state, s. */
-export function firingsOf(kernel, { rate, pattern, pulses }) {
+/** Whether a state has a continuous sinusoidal force, whose frequency is the rate; each period counts as a firing. */
+export const isSine = ({ waveform }) => waveform?.shape === "sine";
+
+/** Return the times at which the pulses of a state begin, s: those of the firings, or the start of a continuous force. */
+export const firingsOf = (kernel, state) => (isSine(state) ? [0] : slotsOf(kernel, state));
+
+/** Return the end of the run of a state, s: the time of the last firing and the window of the device, or whole periods. */
+export const endOf = (state, posed, times) => (isSine(state) ? (state.pattern.length || state.pulses) / state.rate : times.at(-1) + posed.wait);
+
+/** Return the times of the firings of a state, s; of a continuous force, those at which its periods begin. */
+export function slotsOf(kernel, { rate, pattern, pulses }) {
   return kernel.temporarily(() => {
     const marks = kernel.copy("i", [...(pattern || "1".repeat(pulses))].map(Number));
     const times = kernel.array("f", marks.shape[0]);
@@ -32,9 +41,10 @@ function check(code, entry, out, limits) {
 
 /** The arrays of numbers of a hammer by name, with the constants of a state. */
 function numbersOf({ numbers, described, circuit }, { constants }) {
-  // Of a coil that no voltage drives, what its file leaves open is not set.
-  const left = new Set(circuit ? [] : described.open.map(({ key }) => key));
-  const set = ([keys, own]) => own.map((number, k) => (keys[k] && !left.has(keys[k]) ? constants[keys[k]] : undefined) ?? Number(number));
+  // Of a coil that no voltage drives, what its file leaves open is not set; else, without a resistance of its own, all is.
+  const left = Object.fromEntries(described.open.map(({ key, value }) => [key, value]));
+  const taken = circuit ? { ...("coil.resistance" in left ? left : {}), ...constants } : Object.fromEntries(Object.entries(constants).filter(([key]) => !(key in left)));
+  const set = ([keys, own]) => own.map((number, k) => (keys[k] ? taken[keys[k]] : undefined) ?? Number(number));
   return Object.fromEntries(Object.entries(numbers).map(([name, pair]) => [name, set(pair)]));
 }
 
@@ -46,22 +56,34 @@ function placesOf({ body: [, position, front], limits: [, , platen, thickness] }
   return { backstop: known(position), front: known(front), platen: known(platen), thickness: known(thickness) };
 }
 
+/** The times and the values of a record, one after the other. */
+function recordOf({ times, values }) {
+  const what = "sampled waveform";
+  if (times.length !== values.length) throw new Refusal(`${what}: ${times.length} times and ${values.length} values: expected one value for each time`);
+  if (times.length < 2) throw new Refusal(`${what}: ${times.length} samples: expected at least 2`);
+  if (times[0] < 0) throw new Refusal(`${what}: first time ${times[0]} s: expected 0 or later (the firing is at 0)`);
+  const bad = times.findIndex((time, k) => k && time <= times[k - 1]);
+  if (bad > 0) throw new Refusal(`${what}: ${times[bad]} s (sample ${bad + 1}) follows ${times[bad - 1]} s: expected strictly increasing times`);
+  return [...times, ...values];
+}
+
 /** The segment table of the pulse of a state, and the numbers about it. */
-function pulseOf(kernel, hammer, state, limits) {
+export function pulseOf(kernel, hammer, state, limits) {
   const wave = state.waveform ?? hammer.described.waveform;
   if (wave.quantity !== hammer.quantity) throw new Refusal(limits.kinds);
   const { fields, decays } = limits.WAVEFORMS[wave.shape];
-  const numbers = fields.map((name) => wave[name] ?? NaN);
+  const numbers = wave.shape === "sampled" ? recordOf(wave) : wave.shape === "sine" ? [wave.amplitude, state.rate, wave.phase] : fields.map((name) => wave[name] ?? NaN);
   if (decays) numbers.push(limits.DECAYS.indexOf(wave.decay));
-  const [pieces, about] = [kernel.array("f", PIECES, PIECE), kernel.array("f", ABOUT.count)];
+  const [pieces, about] = [kernel.array("f", Math.max(PIECES, numbers.length / 2 + 1), PIECE), kernel.array("f", ABOUT.count)];
   const [rows] = kernel.call("pulse", Object.keys(limits.WAVEFORMS).indexOf(wave.shape), kernel.copy("f", numbers), pieces, about);
-  if (rows < 1) throw new Refusal(wave.shape === "sampled" ? limits.sampled : `the constants of the ${wave.shape} pulse do not make one`);
+  if (rows < 1) throw new Refusal(`the constants of the ${wave.shape} pulse do not make one`);
+  if (wave.shape === "sine") about.values[ABOUT.shown] = 2 / state.rate;
   return { pieces: cut(pieces, rows), about };
 }
 
 /** Return what the kernel needs for a state: constants, control, bounds, the tables of the pulse, rest and window. */
 export function pose(kernel, hammer, state, limits) {
-  const key = JSON.stringify([state.hammer, state.constants, state.waveform]);
+  const key = JSON.stringify([state.hammer, state.constants, state.waveform, isSine(state) ? state.rate : null]);
   if (latest.key !== key) latest = { key, device: kernel.temporarily(() => kept(prepare(kernel, hammer, state, limits))) };
   const { constants, pieces, ends, about, rest, wait, ...device } = latest.device;
   const posed = {
@@ -70,12 +92,13 @@ export function pose(kernel, hammer, state, limits) {
   };
   const scaled = scalesOf(kernel, hammer, { ...posed, ends: kernel.copy("f", ends) });
   Object.assign(posed, scaled(state.pattern ? NaN : 1 / state.rate, limits.DISPLAY_TOLERANCE));
+  posed.sine = isSine(state) ? 1 / state.rate : 0; // period of a continuous force, s
   posed.controlAt = (tolerance) => [...posed.scales, ...scaled(NaN, tolerance).control.slice(2)];
   posed.exact = posed.controlAt(limits.TOLERANCE);
   posed.atOrigin = () => scaled(1 / state.rate, limits.TOLERANCE, posed.places.backstop ?? 0).scales;
   posed.currentScale = posed.constants.values[CURRENT_SCALE];
   // How many earlier pulses still act at a firing of an endless train.
-  posed.memory = state.overlap === "replace" ? 1 : Math.ceil(about[ABOUT.support] * state.rate) + 1;
+  posed.memory = isSine(state) ? 0 : state.overlap === "replace" ? 1 : Math.ceil(about[ABOUT.support] * state.rate) + 1;
   return posed;
 }
 
@@ -88,6 +111,10 @@ function prepare(kernel, hammer, state, limits) {
   const [mass] = numbers.body;
   const [constants, domain] = [kernel.array("f", hammer.size), kernel.array("f", 2)];
   kernel.call("constants", ...ARRAYS.map((name) => kernel.copy("f", numbers[name])), constants, domain);
+  const [low, high] = domain.values;
+  for (const [key, place] of [["backstop.position", places.backstop], ["pack.front", places.front]]) {
+    if (place !== null && !(place >= low && place <= high)) throw new Refusal(`${key} = ${place} m: expected a position where the magnet's law holds, ${low} to ${high} m`);
+  }
   const { pieces, about } = pulseOf(kernel, hammer, state, limits);
   const ends = kernel.copy("f", [...domain.values, ...numbers.limits.slice(2)]);
   const found = kernel.array("f", 4);
@@ -99,7 +126,7 @@ function prepare(kernel, hammer, state, limits) {
   device.rest = restOf(kernel, hammer, constants, ends, limits);
   const carry = hammer.carry.map(Number).with(hammer.placeOfRest, device.rest);
   const alone = { ...device, carry, replace: about.values[ABOUT.replaces] !== 0 };
-  device.wait = waitOf(kernel, { ...alone, ...scalesOf(kernel, hammer, device)(NaN, limits.DISPLAY_TOLERANCE) }, about);
+  device.wait = isSine(state) ? 1 / state.rate : waitOf(kernel, { ...alone, ...scalesOf(kernel, hammer, device)(NaN, limits.DISPLAY_TOLERANCE) }, about);
   const [times, values] = [kernel.array("f", SHOWN), kernel.array("f", SHOWN)];
   kernel.call("map_rates", 0, about.values[ABOUT.shown], times);
   kernel.call("pulse_values", pieces, times, values);

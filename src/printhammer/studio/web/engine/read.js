@@ -8,7 +8,7 @@ const MOST_CONSTANTS = 64;
 const QUANTITIES = ["current", "force", "voltage"];
 
 const short = (value) => String(Number(value.toPrecision(6)));
-const isTable = (content) => typeof content === "object" && content !== null && !Array.isArray(content);
+export const isTable = (content) => typeof content === "object" && content !== null && !Array.isArray(content);
 
 function text(content, where, most) {
   if (typeof content !== "string" || content.length > most) throw new Refusal(`${where} is expected to be a text of at most ${most} characters`);
@@ -127,14 +127,24 @@ export function taken(content, shelf) {
     }
   }
   const wanted = state.hammer || names[0];
-  if (state.text || !names.includes(wanted)) {
-    const why = state.text ? shelf.noFiles : `hammer = '${wanted}': expected one of ${names.join(", ")}`;
+  let named = wanted;
+  let why = names.includes(wanted) ? "" : `hammer = '${wanted}': expected one of ${names.join(", ")}`;
+  if (state.text) {
+    try {
+      [named, why] = [shelf.adopt(state.text), ""];
+    } catch (error) {
+      if (!(error instanceof Refusal)) throw error;
+      why = error.message;
+    }
+  }
+  if (why) {
     notes.push(`${why}; ${names[0]} is shown instead`);
     Object.assign(state, { hammer: names[0], text: "" });
+    [named] = names;
   }
   if (isTable(content.constants)) {
     state.constants = {};
-    const { described } = shelf.hammers[state.hammer || names[0]];
+    const { described } = shelf.hammers[named];
     for (const [key, value] of Object.entries(content.constants)) {
       try {
         readers.constants({ [key]: value });

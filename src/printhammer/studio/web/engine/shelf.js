@@ -31,11 +31,15 @@ export function shelfOf({ names, hammers, sizes, limits, vocabulary, version, se
   const ends = sizes.map((_, k) => sizes.slice(0, k + 1).reduce((sum, size) => sum + size, 0));
   const compiled = sizes.map(() => null);
   return {
-    names, hammers, limits, vocabulary, version, sentences, stateFile, noFiles: sentences.files,
+    names, hammers, limits, vocabulary, version, sentences, stateFile,
     readers: readersOf(limits, vocabulary),
-    /** The compiled module of a hammer; each is compiled once. */
-    module(name) {
-      const { module } = hammers[name];
+    /** What drives the coil or the armature in a state: current, force or voltage. */
+    quantity: ({ hammer, waveform }) => (waveform ?? hammers[hammer].described.waveform).quantity,
+    /** A hammer as a quantity drives it. */
+    driven: (name, quantity) => ({ ...hammers[name], quantity, circuit: quantity === "voltage" }),
+    /** The compiled module of a hammer that a quantity drives; each is compiled once. */
+    module(name, quantity) {
+      const module = hammers[name].modules[quantity];
       compiled[module] ??= WebAssembly.compile(whole.subarray(ends[module] - sizes[module], ends[module]));
       return compiled[module];
     },

@@ -1,5 +1,5 @@
 // The endless train of a state: the states at its firings, its largest exponent, and what kind of motion it is.
-import { firingsOf, pose, resample, STATUS, trainOf } from "./problem.js";
+import { pose, resample, slotsOf, STATUS, trainOf } from "./problem.js";
 import { Refusal } from "./read.js";
 
 const PLACE = { pauseAfter: 1, time: 4, position: 5, velocity: 6 }; // indices in the state of a run
@@ -53,7 +53,7 @@ function carriedOf(kernel, { circuit }, marks) {
 
 /** Integrate a train in stretches, with the growth of perturbations, from a state at `begin`; `take` sees each stretch. */
 function* flowed(kernel, posed, { times, begin = 0, state = null, control, marks }, take) {
-  const train = trainOf(kernel, posed, times);
+  const train = trainOf(kernel, posed, posed.sine ? [0] : times);
   const renormalise = state === null;
   const marked = kernel.copy("f", marks);
   const rows = posed.circuit ? 7 : 3;
@@ -94,7 +94,7 @@ export function* section(kernel, hammer, state, limits, { counts, judged }) {
   return yield* within(kernel, function* () {
     const posed = pose(kernel, hammer, state, limits);
     const last = judged ? judged[1] : counts.at(-1);
-    const times = firingsOf(kernel, { ...state, pattern: "", pulses: last + 1 });
+    const times = slotsOf(kernel, { ...state, pattern: "", pulses: last + 1 });
     const marks = times.slice(0, last);
     const currents = kernel.array("f", posed.circuit ? last : 0);
     let [known, shown, failed] = [0, 0, ""];
@@ -240,7 +240,7 @@ function* settle(kernel, posed, state, limits, states, scales, period) {
 /** Write the image of a state after one firing with its derivative, and return whether it is known. */
 function* imageOf(kernel, posed, state, limits, start, images, place) {
   return yield* within(kernel, function* () {
-    const times = firingsOf(kernel, { ...state, pattern: "", pulses: posed.memory + 3 });
+    const times = slotsOf(kernel, { ...state, pattern: "", pulses: posed.memory + 3 });
     const marks = times.slice(-3, -1);
     const { status, carried, record } = yield* flowed(kernel, posed, { times, begin: marks[0], state: start, control: posed.controlAt(MAP_TOLERANCE), marks });
     const current = posed.circuit ? resample(kernel, posed, record, [marks[1]]).values[CURRENT] / posed.currentScale : 0;

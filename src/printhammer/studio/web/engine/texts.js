@@ -1,5 +1,5 @@
 // A state as texts: the file of its hammer and of its drive, a script, a command line.
-import { Refusal } from "./read.js";
+import { driveText } from "./drive.js";
 
 const HAMMER_FILE = "studio-hammer.toml";
 const DRIVE_FILE = "studio-drive.toml";
@@ -13,7 +13,7 @@ export function textsOf(state, shelf) {
   const hammer = shelf.hammers[state.hammer];
   return {
     get hammer() { return hammerFile(state, hammer); },
-    get drive() { throw new Refusal(shelf.sentences.drive); },
+    drive: driveText(state, shelf),
     python: scriptOf(state, hammer),
     command: commandOf(state, hammer),
     state: `${JSON.stringify({ ...shelf.stateFile, state }, null, 1)}\n`,
@@ -60,6 +60,12 @@ function scriptOf(state, hammer) {
   lines.push(hammer.shipped ? `hammer = ph.load(${python(state.hammer)})` : `hammer = ph.Hammer.from_toml(${JSON.stringify(hammer.text)})`);
   const changes = Object.entries(state.constants).sort();
   if (changes.length) lines.push("hammer = hammer.replace(", "    {", ...changes.map(([key, value]) => `        ${python(key)}: ${python(value)},`), "    }", ")");
+  if (state.waveform?.shape === "sine") {
+    const { amplitude, phase } = state.waveform;
+    const force = `${python(amplitude)}, ${python(state.rate)}${phase ? `, phase=${python(phase)}` : ""}`;
+    const duration = written((state.pattern.length || state.pulses) / state.rate);
+    return [...lines, `motion = ph.simulate(hammer, ph.SineForce(${force}), duration=${duration})`, "print(motion.energy)", ""].join("\n");
+  }
   let waveform = "hammer.waveform";
   if (state.waveform) {
     const { shape, ...fields } = state.waveform;
@@ -78,6 +84,8 @@ function scriptOf(state, hammer) {
 
 function commandOf(state, { shipped }) {
   const hammer = Object.keys(state.constants).length || !shipped ? HAMMER_FILE : state.hammer;
+  const periods = state.waveform?.shape === "sine" ? ` --duration '${written((state.pattern.length || state.pulses) / state.rate)} s'` : "";
+  if (periods) return `printhammer run ${hammer} --drive ${DRIVE_FILE}${periods}`;
   if (state.waveform || state.pattern) return `printhammer run ${hammer} --drive ${DRIVE_FILE}`;
   return `printhammer run ${hammer} --rate '${written(state.rate)} Hz' --pulses ${state.pulses}${state.overlap === "add" ? "" : ` --overlap ${state.overlap}`}`;
 }

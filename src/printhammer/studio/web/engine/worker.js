@@ -40,12 +40,12 @@ async function inSteps(steps, number) {
 onmessage = async ({ data }) => {
   if (data.limits) { limits = data.limits; return; }
   if (data.module) {
-    kernels.set(data.name, { kernel: new Kernel(data.module), hammer: data.hammer });
+    kernels.set(data.kernel, { kernel: new Kernel(data.module), hammer: data.hammer });
     return;
   }
   if (data.drop) { dropped = data.drop; return; }
   const { number } = data;
-  const { kernel, hammer } = kernels.get(data.state.hammer);
+  const { kernel, hammer } = kernels.get(data.kernel);
   try {
     const work = WORKS[data.work](kernel, hammer, data);
     const frames = Array.isArray(work) ? work : await inSteps(work, number);

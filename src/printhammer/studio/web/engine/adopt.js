@@ -1,0 +1,109 @@
+// Hammer files of the user's own: constants in the place of those of a hammer of the page that has the same laws.
+import { quantityOf, tomlOf, waveformOf } from "./drive.js";
+import { isTable, Refusal } from "./read.js";
+
+const PLACES = ["backstop.position", "pack.front", "platen"];
+const SPAN = 10; // of a control about its value, as in printhammer/hammer/names.py
+const WORDS = ["name", "title", "note", "strike", "struck", "mover"];
+const SECTIONS = ["magnet", "coil", "spring", "pack", "backstop", "damping"];
+const UNREAD = ["uncertainty", "waveform", "format", "length_unit", "time_unit", ...WORDS];
+const STATUSES = ["stated", "datasheet", "derived", "reconstructed", "assumed"];
+
+/** Entries of a document by dotted key, without what describes it. */
+function entriesOf(document) {
+  const found = Object.create(null);
+  for (const [key, content] of Object.entries(document)) {
+    if (UNREAD.includes(key)) continue;
+    if (SECTIONS.includes(key) && isTable(content)) for (const [name, entry] of Object.entries(content)) found[`${key}.${name}`] = entry;
+    else found[key] = content;
+  }
+  return found;
+}
+const isQuantity = (entry) => isTable(entry) && "value" in entry;
+const bare = (entry) => (isQuantity(entry) ? { value: entry.value, unit: entry.unit } : entry);
+
+/** Why the entries of a file are not those of a hammer of the page; empty where they are, but for their values. */
+function differenceOf(own, known) {
+  const missing = Object.keys(known).find((key) => !(key in own));
+  const further = Object.keys(own).find((key) => !(key in known));
+  if (missing) return `${missing} is missing`;
+  if (further) return `${further.slice(0, 60)} is not known`;
+  const other = Object.keys(known).find((key) => !isQuantity(known[key]) && own[key] !== known[key]);
+  return other ? `${other} = ${String(own[other]).slice(0, 40)}` : "";
+}
+
+/** The range of a control about its value. */
+function rangeOf(control, value, places) {
+  const { key, low, high, value: before } = control;
+  if (PLACES.includes(key)) {
+    const reach = 0.5 * (Math.max(...places) - Math.min(...places)) || 0.5 * (high - low);
+    return { low: value - reach, high: value + reach, log: false };
+  }
+  if (value === 0 || control.unit === "degC") return value === 0 && before !== 0 ? { low: 0, high: Math.abs(before), log: false } : { low, high, log: control.log };
+  const [least, most] = [value / SPAN, value * SPAN].sort((a, b) => a - b);
+  return { low: least, high: key.endsWith(".restitution") ? Math.min(most, 1) : most, log: least > 0 };
+}
+
+/** The controls that move several constants, about the values of a file. */
+function combinedOf(combined, values) {
+  const [distance, thickness, way] = [values.platen - (values["backstop.position"] ?? 0), values["pack.thickness"], values["pack.front"] - (values["backstop.position"] ?? 0)];
+  const ranges = { "platen distance": [distance, distance - 0.8 * way, 1.4 * distance], "forms thickness": [thickness, 0.3 * thickness, thickness + 0.8 * way] };
+  return combined.map((control) => {
+    const [value, low, high] = ranges[control.key];
+    return { ...control, value, low, high };
+  });
+}
+
+/** The entry of a shelf for the text of a hammer file; refused where no hammer of the page has its laws. */
+function entryOf(text, shelf, templates) {
+  const where = "dropped file";
+  const document = tomlOf(text, where, shelf.limits);
+  const own = entriesOf(document);
+  let [template, why] = [null, ""];
+  for (const { entry, known } of templates) {
+    const difference = differenceOf(own, known);
+    if (!difference) { template = entry; break; }
+    // The difference from the hammer with the same law of the magnet and the pack says most.
+    if (!why || (known["magnet.law"] === own["magnet.law"] && known["pack.law"] === own["pack.law"])) why = difference;
+  }
+  if (!template) throw new Refusal(`${where}: ${why}: expected the laws and constants of a hammer of this page; \`printhammer studio FILE\` opens other hammers`);
+  const { described, numbers } = template;
+  const values = {};
+  for (const control of described.constants) {
+    if (!(control.key in own)) continue;
+    const [value] = quantityOf(bare(own[control.key]), [control.unit], control.key);
+    if (!Number.isFinite(value) || (Math.sign(value) !== Math.sign(control.value) && !PLACES.includes(control.key) && control.value !== 0)) throw new Refusal(`${where}: ${control.key} = ${value} ${control.unit}: expected a number like ${control.value} ${control.unit}; \`printhammer studio FILE\` takes others`);
+    values[control.key] = value;
+  }
+  const places = PLACES.map((key) => values[key]).filter((place) => place !== undefined);
+  const constants = described.constants.map((control) => {
+    if (!(control.key in values)) return control;
+    const { status, source } = isQuantity(own[control.key]) ? own[control.key] : {};
+    return { ...control, value: values[control.key], ...rangeOf(control, values[control.key], places), status: STATUSES.includes(status) ? status : "assumed", source: typeof source === "string" ? source.slice(0, 500) : "the dropped file" };
+  });
+  const words = Object.fromEntries(WORDS.filter((key) => typeof document[key] === "string").map((key) => [key, document[key].slice(0, 2000)]));
+  const waveform = document.waveform === undefined ? null : waveformOf(isTable(document.waveform) ? Object.fromEntries(Object.entries(document.waveform).map(([key, entry]) => [key, bare(entry)])) : document.waveform, shelf);
+  const place = (key, before) => (before === null ? null : values[key] ?? before);
+  const made = {
+    ...described, name: "dropped file", title: "", note: "", ...words, constants, combined: combinedOf(described.combined, values), waveform: waveform && shelf.readers.waveform(waveform),
+    start: waveform ? {} : described.start.waveform ? described.start : { waveform: described.waveform }, places: { backstop: place("backstop.position", described.places.backstop), front: place("pack.front", described.places.front), platen: place("platen", described.places.platen) },
+  };
+  const set = ([keys, list]) => [keys, list.map((number, k) => (keys[k] in values ? values[keys[k]] : number))];
+  return { ...template, described: made, numbers: Object.fromEntries(Object.entries(numbers).map(([name, pair]) => [name, set(pair)])), text, shipped: false };
+}
+
+/** Return a function that adds the hammer of a text to a shelf, under a name that no list shows, and returns this name. */
+export function adopter(shelf) {
+  const adopted = new Map();
+  let templates = null;
+  return (text) => {
+    templates ??= shelf.names.map((name) => ({ entry: shelf.hammers[name], known: entriesOf(tomlOf(shelf.hammers[name].text, name, shelf.limits)) }));
+    if (!adopted.has(text)) {
+      const entry = entryOf(text, shelf, templates);
+      const name = `dropped hammer ${adopted.size + 1}`;
+      shelf.hammers[name] = entry;
+      adopted.set(text, name);
+    }
+    return adopted.get(text);
+  };
+}

@@ -1,0 +1,74 @@
+"""Hammer files dropped on a page: read as by Python where a hammer of the page has their laws, or refused."""
+
+import json
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from tests.studio.reading import node
+
+import printhammer as ph
+from printhammer.run.plain.entries import numbers_of
+from printhammer.studio import Shelf
+from printhammer.studio.controls import describe, fields_of
+
+ASKED = "\n  adopt: (text) => shelf.hammers[adopter(shelf)(text)],\n"
+NAMES = ("hendriks-1983-1", "tung-shaw-1988", "dot-peen", "duffing-holmes")
+RAISED = 1.07
+
+
+@pytest.fixture(scope="module")
+def ask() -> Iterator[Any]:
+    with node("engine/adopt.js", ASKED, Shelf(*map(ph.load, NAMES), only=True)) as asked:
+        yield asked
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_hammer_file_gives_the_numbers_of_python(ask: Any, name: str) -> None:
+    hammer = ph.load(name)
+    keys = [key for key in hammer.constants if not key.startswith("waveform.")]
+    changed = hammer.replace({key: RAISED * hammer.constants[key].si for key in keys}).replace("name", "mine")
+    found = ask("adopt", changed.to_toml())["found"]
+    for role, (_keys, numbers) in numbers_of(changed).items():
+        own = [float(value) for value in found["numbers"][role][1]]
+        assert own == pytest.approx([float(value) for value in numbers], rel=1e-12, nan_ok=True), role
+    expected, described = describe(changed), found["described"]
+    assert described["name"] == "mine"
+    for control, other in zip(expected["constants"], described["constants"], strict=True):
+        for entry in ("value", "low", "high"):
+            assert other[entry] == pytest.approx(control[entry], rel=1e-9), control["key"]
+    assert described["places"] == pytest.approx(expected["places"])
+    for control, other in zip(expected["combined"], described["combined"], strict=True):
+        assert (other["value"], other["low"]) == pytest.approx((control["value"], control["low"]))
+    if hammer.waveform is not None:
+        wave = {key: value for key, value in fields_of(changed.waveform).items() if value is not None}
+        assert {key: value for key, value in described["waveform"].items() if value is not None} == wave
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (("[spring]\n", "[spring]\ncolour = 'red'\n"), "spring.colour"),
+        (('law = "power"', 'law = "hertz"'), "pack.law"),
+        (("value = 0.803171", "value = -0.8"), "magnet.F0"),
+        (("[waveform]", "[wave]"), "wave is not known"),
+        (("mass = {", "mass = 3 #{"), "mass has no unit"),
+        (("format = 1", "format = 1\n__proto__ = 1"), "not known"),
+    ],
+)
+def test_another_hammer_file_is_refused(ask: Any, change: tuple[str, str], reason: str) -> None:
+    text = ph.load(NAMES[0]).to_toml()
+    assert change[0] in text
+    answer = ask("adopt", text.replace(*change, 1))
+    assert reason in answer["refused"], json.dumps(answer)[:300]
+
+
+def test_a_value_in_another_unit_is_converted(ask: Any) -> None:
+    hammer = ph.load(NAMES[0])
+    mass = hammer.constants["mass"]
+    written = f'value = {mass.value!r}, unit = "{mass.unit}"'
+    text = hammer.to_toml()
+    assert written in text
+    found = ask("adopt", text.replace(written, 'value = 2, unit = "g"'))["found"]
+    assert math.isclose(found["numbers"]["body"][1][0], 2e-3)

@@ -1,0 +1,182 @@
+"""Random states of the shipped hammers: the page computes what Python computes, as long as rounding allows.
+
+Two runs whose masses differ by rounding drift apart. Up to the time at which they differ by more than 5e-13
+of their range, the horizon of predictability, dots, forces and energies have to agree to 1e-9.
+"""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.studio.node import Engine
+from tests.studio.reading import STATE
+
+import printhammer as ph
+from printhammer.drive.trains import Drive
+from printhammer.drive.waveforms.shapes import SHAPES, Sampled, Waveform
+from printhammer.hammer.hammer import Hammer, shipped
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
+from printhammer.run.motion import Motion
+from printhammer.run.problem import Problem
+from printhammer.run.simulate import end_of_run
+from printhammer.studio import Shelf, bounds
+from printhammer.studio.coil import open_constants
+from printhammer.studio.controls import describe
+
+NUDGE, DRIFT, AGREES = 5e-16, 5e-13, 1e-9
+NAME = "hendriks-1983-1"
+LENGTHS = {"indentation": 1e-15}
+WORKS = ("loading_work", "net_loss")
+FIELDS = ("flight_time", "impact_speed", "peak_force", "indentation", "contact_time", *WORKS)
+
+State = dict[str, Any]
+
+
+def random_state(name: str, rng: np.random.Generator) -> State:
+    """State of a shipped hammer with other constants, pulse and train, as sliders set them."""
+    described = describe(ph.load(name))
+    opening: State = {**STATE, "hammer": name, "views": [], **described["start"]}
+    controls = described["constants"]
+    constants = {}
+    for k in rng.choice(len(controls), min(3, len(controls)), replace=False):
+        control = controls[k]
+        value = control["value"] * rng.uniform(0.9, 1.1)
+        constants[control["key"]] = float(np.clip(value, control["low"], control["high"]))
+    wave = dict(opening["waveform"] or described["waveform"])
+    for key in ("amplitude", "voltage", "width"):
+        if key in wave:
+            wave[key] *= rng.uniform(0.8, 1.0)
+    train = {"rate": rng.uniform(opening["low"], opening["high"]), "pulses": int(rng.integers(1, 10))}
+    if rng.uniform() < 0.3 and wave["shape"] != "sine":
+        train["pattern"] = "1" + "".join(rng.choice(["0", "1"], 4))
+    return {**opening, "constants": constants, "waveform": wave, **train}
+
+
+def posed(state: State) -> tuple[Hammer, Drive]:
+    """Hammer and drive of a state, in Python."""
+    hammer, fields = ph.load(state["hammer"]), dict(state["waveform"])
+    shape = fields.pop("shape")
+    if shape == "sine":
+        return hammer.replace(state["constants"]), ph.SineForce(
+            fields["amplitude"], state["rate"], phase=fields["phase"]
+        )
+    if shape == "sampled":
+        wave: Waveform = Sampled.from_samples(fields["times"], fields["values"], quantity=fields["quantity"])
+    else:
+        wave = SHAPES[shape](**fields)
+    constants = state["constants"]
+    if wave.quantity == "voltage" and "coil.resistance" in (further := open_constants(hammer)):
+        constants = {key: constant.si for key, (constant, _) in further.items()} | constants
+    hammer = hammer.replace(constants) if constants else hammer
+    rate, pattern, overlap = state["rate"], state["pattern"], state["overlap"]
+    if pattern:
+        at = [slot / rate for slot, mark in enumerate(pattern) if mark == "1"]
+        return hammer, ph.PulseTrain(wave, at=at, overlap=overlap)
+    return hammer, ph.PulseTrain(wave, rate=rate, pulses=state["pulses"], overlap=overlap)
+
+
+def run_of(state: State, nudge: float = 0.0) -> Motion:
+    """Run of a state as the page makes it, with a mass that differs by a relative amount."""
+    hammer, drive = posed(state)
+    sine = state["waveform"]["shape"] == "sine"
+    end = state["pulses"] / state["rate"] if sine else end_of_run(hammer, drive, None)
+    hammer = hammer.replace({"mass": hammer.mass * (1.0 + nudge)}) if nudge else hammer
+    problem = Problem(hammer, drive, (hammer.rest, 0.0), 0.0, DISPLAY_TOLERANCE)
+    problem.max_steps = bounds.MOST_STEPS
+    record = problem.run(end)
+    return Motion(problem, record, end, record.nodes[:, 0].copy(), "default")
+
+
+def horizon_of(motion: Motion, other: Motion) -> float:
+    """Time up to which two runs differ by less than `DRIFT` of their range."""
+    times = np.linspace(0.0, min(motion.end, other.end), 2000)
+    states = [np.stack(run.curves_at(times)[:2]) for run in (motion, other)]
+    span = np.abs(states[0]).max(axis=1, keepdims=True)
+    apart = (np.abs(states[0] - states[1]) > DRIFT * np.maximum(span, 1e-12)).any(axis=0)
+    return float(times[np.argmax(apart)]) if apart.any() else math.inf
+
+
+def check_state(engine: Engine, state: State) -> str:
+    """Compare the curves and dots of a state; return what could be compared."""
+    frames = engine.work("curves", state)
+    if "refusal" in frames[0]:
+        with pytest.raises(ph.InputError):
+            run_of(state)
+        return "refused"
+    motion = run_of(state)
+    horizon = horizon_of(motion, run_of(state, NUDGE))
+    curve, shown = frames
+    if math.isinf(horizon):
+        assert (curve["status"], curve["steps"]) == (motion.status, motion.steps)
+    before = 0
+    for dot, own in zip(motion.dots, shown["dots"], strict=math.isinf(horizon)):
+        fired = dot.fired_at + (dot.flight_time or 0.0) + (dot.contact_time or 0.0)
+        if fired >= horizon or (not dot.struck and not math.isinf(horizon)):
+            break
+        before += 1
+        assert own["struck"] == dot.struck
+        for name in FIELDS:
+            expected = getattr(dot, name)
+            assert (own[name] is None) == (expected is None), name
+            if expected is not None:
+                # A net loss is a difference of works, an indentation one of places.
+                scale = max(abs(expected), abs(dot.loading_work or 0.0) if name in WORKS else 0.0)
+                within = AGREES * scale + LENGTHS.get(name, 0.0)
+                assert own[name] == pytest.approx(expected, rel=0.0, abs=within), name
+    if math.isinf(horizon):
+        ledger = motion.energy
+        for name, value in shown["energy"].items():
+            expected = getattr(ledger, name)
+            scale = max(abs(expected), 1e-3 * abs(ledger.throughput))
+            # Rounding moves the ends of steps, on which the sum of the works of all steps depends.
+            within = (1e-7 if name == "throughput" else AGREES) * scale
+            assert value == pytest.approx(expected, rel=0.0, abs=within), name
+        return "whole"
+    return f"{before} dots"
+
+
+def test_the_page_computes_what_python_computes(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    # The first has no coil, so that two modules are linked and not four.
+    few = [ph.load(name) for name in ("duffing-holmes", NAME)]
+    with Engine(Shelf(*few, only=True), tmp_path) as engine:
+        for hammer in few:
+            done = [check_state(engine, random_state(hammer.name, rng)) for _ in range(3)]
+            assert "whole" in done
+
+
+def check_dots(engine: Engine, wave: dict[str, Any]) -> None:
+    """Compare the dots that a pulse makes; the steps of the runs may differ."""
+    state = {**STATE, "hammer": NAME, "waveform": wave, "rate": 900.0, "pulses": 3}
+    own = engine.work("curves", state)[1]["dots"]
+    for dot, other in zip(run_of(state).dots, own, strict=True):
+        assert dot.struck == other["struck"]
+        assert other["flight_time"] == pytest.approx(dot.flight_time, rel=1e-5)
+        assert other["peak_force"] == pytest.approx(dot.peak_force, rel=1e-4)
+
+
+@pytest.mark.slow
+def test_a_page_fires_records_and_drivers_of_the_coil(tmp_path: Path) -> None:
+    hammer = ph.load(NAME)
+    times, values = [0.0, 5e-5, 1.2e-4, 2e-4, 2.4e-4], [0.0, 1.4, 2.1, 1.6, 0.0]
+    record = {"shape": "sampled", "times": times, "values": values, "quantity": "current"}
+    with Engine(Shelf(hammer, only=True), tmp_path) as engine:
+        check_dots(engine, record)
+        check_dots(engine, {"shape": "rail", **describe(hammer)["rail"]})
+        state = {**STATE, "hammer": NAME, "waveform": {**record, "times": times[::-1]}}
+        (refused,) = engine.work("curves", state)
+        assert "expected strictly increasing times" in refused["refusal"]
+
+
+@pytest.mark.slow
+def test_the_page_agrees_with_python_for_500_states(tmp_path: Path) -> None:
+    rng, names = np.random.default_rng(36), shipped()
+    counts: dict[str, int] = {}
+    with Engine(Shelf(), tmp_path) as engine:
+        for k in range(500):
+            compared = check_state(engine, random_state(names[k % len(names)], rng))
+            counts[compared] = counts.get(compared, 0) + 1
+    assert counts["whole"] > 250
+    assert counts.get("refused", 0) < 100

@@ -1,0 +1,194 @@
+"""Files dropped on a page: drive files and measured tables, read in Node as Python reads them, or refused."""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from tests.studio.reading import STATE, node
+
+import printhammer as ph
+from printhammer.drive.file import read_drive
+from printhammer.drive.waveforms.shapes import SHAPES, Sampled
+from printhammer.studio import Shelf
+from printhammer.studio.controls import fields_of
+from printhammer.support.tables.readings import read_table
+
+NAME = "hendriks-1983-1"
+CURVES = {"displacement": "m", "current": "A", "force": "N", "voltage": "V"}
+ASKED = """
+  write: (state) => driveText(state, shelf),
+  drive: (text) => driveOf(tomlOf(text, "a.toml", shelf.limits), shelf, "a.toml"),
+  table: (text, told) => {
+    const { data, ...rest } = recordOf(text, "a.csv", told, shelf.limits);
+    return { ...rest, data: Object.fromEntries(Object.entries(data).map(([key, list]) => [key, [...list]])) };
+  },
+"""
+RECORD = {"shape": "sampled", "times": [0.0, 1e-4, 3e-4], "values": [0.0, 1.5, 0.0], "quantity": "current"}
+WAVES: list[Any] = [
+    None,
+    RECORD,
+    {"shape": "half-sine", "amplitude": 0.7, "width": 3e-4, "quantity": "force"},
+    fields_of(ph.load("relay-5v").waveform),
+    fields_of(
+        SHAPES["chopper"](voltage=40.0, width=4e-4, upper=1.5, lower=1.1, decay="zener", decay_voltage=50.0)
+    ),
+]
+TIMES = np.array([0.0, 1e-5, 2e-5])
+PLACES = np.array([50e-6, 51.5e-6, 52e-6])
+CURRENTS = np.array([0.0, 0.5, 1.25])
+# The same three samples, as programs write them.
+WRITTEN = {
+    "ours": "# by hand\ntime [us],displacement [um],current [A]\n0,50,0\n10,51.5,0.5\n20,52,1.25\n",
+    "semicolons": "time (us);displacement (um);current (A)\n0;50;0\n10;51,5;0,5\n20;52;1,25\n",
+    "tabs": "Time [us]\tPosition [um]\tCurrent [mA]\n0\t50\t0\n10\t51.5\t500\n20\t52\t1250\n",
+    "units below": "x-axis,Position,Current\nsecond,mm,A\n0,0.05,0\n1e-5,0.0515,0.5\n2E-5,0.052,1.25\n",
+    "lines above": (
+        "Model,XYZ\nSample Interval,1e-5\n\n"
+        "time [s],displacement [m],current [A]\n0,50e-6,0\n1e-5,51.5e-6,.5\n2e-5,52e-6,1.25\n"
+    ),
+    "quotes": '"time [us]","x [um]","current [A]"\r\n"0","50","0"\r\n10,51.5,0.5\r\n20,52,1.25\r\n',
+}
+
+
+@pytest.fixture(scope="module")
+def ask() -> Iterator[Any]:
+    own = ph.load(NAME), ph.load("relay-5v")
+    with node("engine/files.js", ASKED, Shelf(*own, only=True)) as asked:
+        yield asked
+
+
+def state_of(**changed: Any) -> dict[str, Any]:
+    return {**STATE, "hammer": NAME, **changed}
+
+
+@pytest.mark.parametrize("wave", WAVES)
+@pytest.mark.parametrize("train", [{}, {"pattern": "1011", "rate": 812.5}, {"overlap": "replace"}])
+def test_a_drive_is_written_as_python_writes_it_and_read_again(
+    ask: Any, wave: Any, train: dict[str, Any]
+) -> None:
+    state = state_of(waveform=wave, **train)
+    fields = dict(wave or {})
+    shape = fields.pop("shape", None)
+    pulse = ph.load(NAME).waveform
+    if shape == "sampled":
+        pulse = Sampled.from_samples(fields["times"], fields["values"], quantity=fields["quantity"])
+    elif shape:
+        pulse = SHAPES[shape](**fields)
+    if state["pattern"]:
+        at = [slot / state["rate"] for slot, mark in enumerate(state["pattern"]) if mark == "1"]
+        drive = ph.PulseTrain(pulse, at=at, overlap=state["overlap"])
+    else:
+        drive = ph.PulseTrain(pulse, rate=state["rate"], pulses=9, overlap=state["overlap"])
+    text = ask("write", state)["found"]
+    assert read_drive(text).fingerprint == drive.fingerprint
+    patch = ask("drive", drive.to_toml())["found"]
+    assert (patch["pattern"], patch.get("pulses", 9)) == (state["pattern"], 9)
+    assert patch["rate"] == pytest.approx(state["rate"], rel=1e-12)
+    assert read_drive(ask("write", {**state, **patch})["found"]).waveform == drive.waveform
+
+
+def test_a_sinusoidal_force_is_written_and_read_again(ask: Any) -> None:
+    wave = {"shape": "sine", "amplitude": 0.3, "phase": 1.5, "quantity": "force"}
+    text = ask("write", state_of(waveform=wave, rate=0.16))["found"]
+    assert read_drive(text).fingerprint == ph.SineForce(0.3, 0.16, phase=1.5).fingerprint
+    assert ask("drive", text)["found"] == {"pattern": "", "rate": 0.16, "waveform": wave}
+    assert ask("drive", text.replace("rad", "deg"))["found"]["waveform"]["phase"] == pytest.approx(
+        math.radians(1.5)
+    )
+    assert "an angle" in ask("drive", text.replace("rad", "m"))["refused"]
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        (
+            "format = 1\n[burst]\nrate = '1 kHz'\npulses = 2\nbursts = 2",
+            "[times] or [sine]",
+        ),
+        ("format = 2\n[train]\nrate = '1 kHz'", "expected 1"),
+        ("format = 1\n[train]\nrate = 1000", "has no unit"),
+        ("format = 1\n[train]\nrate = '1 mm'", "expected a quantity in Hz"),
+        ("format = 1\n[train]\nrate = '1 kHz'\npulses = 1000", "pulses is expected"),
+        ("format = 1\n[train]\nrate = '1 kHz'\ncolour = 1", "train.colour is not known"),
+        ("format = 1\n[times]\nat = ['0 s', '1 ms', '2.5 ms']", "expected multiples"),
+        ("format = 1\n[train]\nrate = '1 kHz'\n[waveform]\nshape = '__proto__'", "waveform.shape"),
+        ("format = 1\n[train\nrate", "expected a TOML file"),
+        (f"format = 1\n[train]\n{'a.' * 300}b = 1", "dots"),
+    ],
+)
+def test_a_drive_that_a_page_cannot_set_is_refused(ask: Any, text: str, reason: str) -> None:
+    assert reason in ask("drive", text)["refused"]
+
+
+@pytest.mark.parametrize("written", WRITTEN.values(), ids=list(WRITTEN))
+def test_what_oscilloscopes_write_is_read(ask: Any, written: str) -> None:
+    data = ask("table", written, None)["found"]["data"]
+    np.testing.assert_allclose(data["t"], TIMES, rtol=1e-12, atol=1e-20)
+    np.testing.assert_allclose(data["displacement"], PLACES, rtol=1e-12)
+    np.testing.assert_allclose(data["current"], CURRENTS, rtol=1e-12)
+
+
+def test_columns_are_asked_for_where_the_heading_does_not_say_what_they_hold(ask: Any) -> None:
+    text = "time,displacement,current\n0,50,0\n10,51.5,0.5\n20,52,1.25\n"
+    found = ask("table", text, None)["found"]
+    assert found["what"] == "columns"
+    assert [column["quantity"] for column in found["columns"]] == ["time", "displacement", "current"]
+    assert found["columns"][1]["first"] == ["50", "51.5", "52"]
+    told = [["time", "us"], ["displacement", "um"], ["current", "10 A"]]
+    data = ask("table", text, told)["found"]["data"]
+    np.testing.assert_allclose(data["current"], 10.0 * CURRENTS)
+    np.testing.assert_allclose(data["t"], TIMES, atol=1e-20)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("nothing here", "expected columns of numbers"),
+        ("time [us],current [A]\n0,0\n10,x\n20,1\n", "line 3"),
+        ("time [us],current [A]\n0,0\n10,nan\n20,1\n", "is no finite number"),
+        ("time [us],current [A]\n0,0\n10,1\n5,1\n", "ascending times"),
+        ("time [us],current [A]\n0,0\n10,1,7\n", "line 3"),
+        ("time [us],current [A]\n-10,1\n0,1\n10,0\n", "before time 0"),
+        ("time [s],current [A]\n0,0\n1,1\n", "at most 0.5 s"),
+        ("time [us],current [A]\n0,0\n10,101\n", "at most 100 A"),
+        ("time [us];current [A]\n0;0\n10;1,234\n", "may be a decimal mark"),
+    ],
+)
+def test_a_table_that_is_none_is_refused_in_a_sentence(ask: Any, text: str, reason: str) -> None:
+    assert reason in ask("table", text, None)["refused"]
+
+
+cells = st.sampled_from(
+    ["0", "1", "2.5", "-3e-1", "4,5", "1,234", "1.234", "nan", "", "x", "12 3", '"7"', "1e9"]
+)
+heads = st.sampled_from(
+    ["time [us]", "t/ms", "x [mm]", "current (A)", "I", "CH1 [V]", "Force in N", "s", "A", "", "sec", "Volt"]
+)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(
+    names=st.lists(heads, min_size=2, max_size=3),
+    rows=st.lists(st.lists(cells, min_size=2, max_size=3), min_size=2, max_size=4),
+    separator=st.sampled_from([",", ";", "\t"]),
+    end=st.sampled_from(["\n", "\r\n"]),
+)
+def test_a_table_that_is_read_is_read_as_python_reads_it(
+    ask: Any, tmp_path: Path, names: list[str], rows: list[list[str]], separator: str, end: str
+) -> None:
+    text = end.join(separator.join(row) for row in [names, *rows])
+    found = ask("table", text, None)
+    if found.get("found", {}).get("what") != "curves":
+        return
+    path = tmp_path / "a.csv"
+    path.write_bytes(text.encode())
+    expected = read_table(path, {"time": "s"}, optional=CURVES).values
+    data = found["found"]["data"]
+    assert {name.replace("time", "t") for name in expected} == set(data)
+    for name, values in expected.items():
+        np.testing.assert_allclose(data[name.replace("time", "t")], values, rtol=1e-12, atol=1e-300)
