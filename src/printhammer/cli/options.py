@@ -268,7 +268,7 @@ def between(span: tuple[str, str, int] | None, si: str, name: str) -> list[float
 
 
 def given(**options: Any) -> dict[str, Any]:
-    """Return the options that are not None; the library supplies the defaults of the others."""
+    """Return the options that are not None; the library supplies the defaults of the other options."""
     return {name: value for name, value in options.items() if value is not None}
 
 

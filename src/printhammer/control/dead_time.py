@@ -118,7 +118,7 @@ SHORTEST: Final = 1.0 / 64.0
 
 _DOUBLINGS: Final = 6  # Iteration limit of the doublings that bracket the width; arbitrary
 _WIDTH_ERROR: Final = 1e-9  # Tolerance of the width, in flight times
-_SAME: Final = 1e-9  # Relative tolerance of the blow
+_SAME: Final = 1e-9  # Relative tolerance of the impact speed
 
 
 class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
@@ -249,7 +249,7 @@ def dead_time(
     hammer : Hammer
         The hammer, whose waveform must be a driver on a rail.
     voltage : sequence of float or str, optional
-        Rail voltages, V, in any order; by default that of the waveform, and 10 % less and more.
+        Rail voltages, V, in any order; by default that of the waveform, and 10 % below and above.
     temperature : sequence of float or str, optional
         Coil temperatures, degC; by default 20, 60 and 100 degC.
     blow : float or str, optional

@@ -100,7 +100,7 @@ def read_temperature(value: float | str, name: str) -> float:
     Raises
     ------
     InputError
-        The value is not a temperature, or the linear law gives copper no resistance at it.
+        The value is not a temperature, or the linear law gives copper no resistance at that temperature.
     """
     temperature = read_number(value, "degC", name)
     if not temperature > COLDEST:
@@ -362,7 +362,7 @@ TEMPERATURES: Final = (20.0, 40.0, 60.0, 80.0, 100.0, 120.0, 140.0)
 """Winding temperatures at which a hammer with a driver is simulated, degC."""
 
 _LEFT: Final = 1e-3  # Residual current at which a pulse counts as ended, as a fraction of its largest
-_DECAYED: Final = 0.01  # Residual current that adds at most 2 % to the heat of the next dot, likewise
+_DECAYED: Final = 0.01  # Residual fraction of the current that adds at most 2 % to the heat of the next dot
 _DOUBLINGS: Final = 8  # Iteration limit of the doublings of the simulated time; arbitrary
 
 

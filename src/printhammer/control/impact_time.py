@@ -212,7 +212,7 @@ def impact_time(
         scale = 10.0 if volts else _largest_current(hammer)
         levels = scale * np.array(LEVELS)
         if rates.size and widths.size:
-            # A device whose impact shows less is sampled with less noise.
+            # A device with a weaker impact signature is sampled with less noise.
             least = float(rates.min()), int(widths.min()), span, late, width
             clear = [_is_clear(hammer, Sampling(signal, level, *least)) for level in levels.tolist()]
             levels = levels[clear] if any(clear) else levels[:1]
@@ -278,7 +278,7 @@ def _largest_current(hammer: Hammer) -> float:
     """Return the largest current of the hammer's own pulse, A."""
     waveform = hammer.waveform
     if waveform is None or waveform.quantity != "voltage":
-        return 1.0  # The estimator says what is wrong.
+        return 1.0  # The estimator reports the error.
     motion = simulate(hammer, PulseTrain(waveform), duration=1.1 * waveform.support)
     return float(np.abs(motion.current).max())
 

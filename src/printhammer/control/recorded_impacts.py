@@ -39,7 +39,7 @@ _UNEVEN: Final = 0.01
 
 
 class RecordedImpacts(Result, rows="record"):
-    """Impact times in records of one single shot each.
+    """Impact times estimated from records of single shots, one shot per record.
 
     The uncertainty is the RMS error of the estimator on 20 simulated units of `Variability.of(hammer)` with
     the noise of the record; an estimate that is no better than the nominal flight time has the flag "vague".

@@ -56,7 +56,7 @@ class Ragged:
 
     @classmethod
     def sorted_by(cls, keys: npt.NDArray[Any]) -> Self:
-        """Group indices by key: one row per distinct key, with the indices of the entries that have it."""
+        """Group indices by key: one row per distinct key, with the indices of the entries with that key."""
         _, counts = np.unique(keys, return_counts=True)
         return cls(np.argsort(keys, kind="stable"), starts_of(counts))
 

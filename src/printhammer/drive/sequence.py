@@ -42,7 +42,7 @@ class PulseSequence(Drive):
     Raises
     ------
     InputError
-        `waveforms` is empty, contains something else than waveforms, an endless waveform, or both currents
+        `waveforms` is empty, contains something other than waveforms, an endless waveform, or both currents
         and forces; the numbers of times and waveforms differ; or a time is negative, not finite, duplicate or
         descending.
     """

@@ -91,7 +91,7 @@ class Controller:
     Raises
     ------
     InputError
-        The hammer has no pack, backstop, waveform or rest state, or the driver is too weak for it.
+        The hammer has no pack, backstop, waveform or rest state, or the driver is too weak for the hammer.
     """
 
     def __init__(
@@ -175,7 +175,7 @@ class Controller:
         for k, loop in enumerate(loops):
             if not loop.alive:
                 continue
-            # An estimate far from the expectation is rejected, and the plan stands.
+            # An estimate far from the expectation is rejected, and the plan is kept.
             if abs(flight.touch[k] - loop.touch) < _ASTRAY * long and flight.speed[k] > 0.0:
                 loop.touch, loop.speed = float(flight.touch[k]), float(flight.speed[k])
                 loop.learned.take_scale(float(flight.scale[k]), float(flight.covariance[k, 2, 2]))
@@ -219,7 +219,7 @@ class Controller:
         for k, (loop, dot) in enumerate(now):
             pulse = loop.pulses[-1]
             if loop.kind != FREE:
-                # The push that is on has no end yet.
+                # The present push has not ended yet.
                 del pulse.at[1:], pulse.levels[1:]
             if rests[k] or not np.isfinite(cost[k]):
                 self._land(loop, dot, *(float(values[k]) for values in landed))

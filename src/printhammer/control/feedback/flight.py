@@ -295,7 +295,7 @@ class Contacts:
         steps: FloatArray,
         samples: Samples,
     ) -> FloatArray:
-        """Simulate the nominal contact and four perturbed ones; return displacements, m, shape (5, M, N)."""
+        """Simulate the nominal and four perturbed contacts; return displacements, m, shape (5, M, N)."""
         hammers, drives, states, strobes = [], [], [], []
         plain = [loop.recent(self._plant.driver) for loop in loops]
         stronger = [drive.scaled(1.0 + _FACTOR_STEP) for drive in plain]

@@ -53,7 +53,7 @@ MIDDLE: Final = 1  # Index of the nominal distance
 
 @dataclass(frozen=True)
 class Fronts:
-    """Impact maps and landings for packs at several distances."""
+    """Impact maps and soft landings for packs at several distances."""
 
     # One impact map for each of `OFFSETS`, with the same touches and the same actions
     maps: tuple[ImpactMap, ...]
@@ -307,7 +307,7 @@ class Choice:
         self.next_speed = self.of("next_speed")
 
     def settle(self, force: FloatArray) -> None:
-        """Replace the outcomes by those after M dots with known forces, relative to the single pulse.
+        """Replace the outcomes by the outcomes after M dots with known forces, relative to the single pulse.
 
         Outcomes of the middle force of the maps are shifted linearly; the other forces become inadmissible.
         """

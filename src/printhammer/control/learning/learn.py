@@ -308,7 +308,7 @@ def learn(
     variability : Variability, optional
         Variability of the production; by default `Variability.of(hammer)`.
     members : int, optional
-        Number of simulated hammers on which the ladder is chosen, 100 to 5000.
+        Number of simulated hammers on which the test pulses are chosen, 100 to 5000.
     forgetting : float, optional
         Fraction by which earlier corrections decay at each stage, above 0 and below 1. The decay keeps
         corrections that the readings do not determine from growing.

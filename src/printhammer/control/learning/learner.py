@@ -30,7 +30,7 @@ Arbitrary; units of the production leave 0.7 to 1.6, whatever the offset of the 
 
 _STARTED: Final = 3  # Maximum number of tables tuned for the most probable hammer
 _LATE: Final = (
-    2  # Stages before an unstable row is a reason to tune another table: the belief is wide before; arbitrary
+    2  # Stages before an unstable row causes another table to be tuned; early posteriors are wide; arbitrary
 )
 
 

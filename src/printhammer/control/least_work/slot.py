@@ -129,7 +129,7 @@ class Task:
     tolerance: float  # As for `printhammer.simulate`
 
     def run(self, begin: SlotState, currents: FloatArray, duration: float, tolerance: float) -> Outcomes:
-        """Simulate M slots of `duration`, s, with currents, A, shape (M, nodes), after the first node."""
+        """Simulate M slots of `duration`, s, with nodal currents, A, shape (M, nodes) without the first."""
         front = self.hammer.front
         assert front is not None
         grid = np.linspace(0.0, duration, _SAMPLES)

@@ -97,8 +97,8 @@ class Draft:
     def judge(self, level: Sequence[History] | None = None) -> None:
         """Evaluate the deviations of histories at all rates; by default of all histories.
 
-        For all histories, the deviation of equal gaps becomes infinite if an error in a long row of them
-        grows.
+        With all histories, the deviation of a history of equal gaps becomes infinite if errors grow along a
+        long row of such dots.
         """
         lengths = range(1, self.task.gaps + 1)
         levels = [histories_of_length(self.task, n) for n in lengths] if level is None else [level]
@@ -122,7 +122,7 @@ class Draft:
             if gap / rate <= task.single.settled
         ]
         drives = []
-        first = task.gaps + 1  # The firing before it is the first one with the full history of the row.
+        first = task.gaps + 1  # The preceding firing is the first with the full history of the row.
         for row, history in cells:
             settings, gap = Settings(*self.values[:4, row]), history[0]
             slots = range(0, gap * (first + MORE), gap)
@@ -200,7 +200,7 @@ def histories_of_length(task: Task, known: int) -> list[History]:
 
 
 def gaps_before(history: History, reach: int) -> list[tuple[int, ...]]:
-    """Return the sequences of gaps that precede a history in test patterns: none, and several long ones."""
+    """Return the sequences of gaps that precede a history in test patterns: empty, and several long ones."""
     late = (reach + 1,)
     if REST in history:
         return [(), late]
@@ -228,7 +228,7 @@ def polish(draft: Draft) -> None:
             guess = draft.values[:4, :, number_of(parent, task.reach)]
             draft.values[:4, :, number_of(history, task.reach)] = guess
         _polish_level(draft, level)
-    # Entries of shorter histories may have changed since the others were judged.
+    # Entries of shorter histories may have changed since the other entries were evaluated.
     draft.judge()
     task.report()
 

@@ -191,7 +191,7 @@ def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
     halvings = _HALVINGS if pulse.quantity == "current" else _FEWER
     found = widest(pulse, bound, width, WIDEST * width, halvings, peak_of)
     if pulse.quantity == "current" and peak == bound:
-        # A current that saturates at the limit has no margin at any width. It may last longer where the next
+        # A current that saturates at the limit has no margin at any width. The pulse may be wider if the next
         # pulse need not wait longer for its tail.
         longer = _SATURATED * width
         waits = (clearance(hammer, pulse, each, largest) for each in (found, longer))

@@ -96,8 +96,8 @@ class TableReport(Result, rows=_AXES):
     def passed(self) -> Any:
         """Whether all dots are within limits, boolean array of shape (strategies, hammers, rates).
 
-        A table with a row in which errors grow does not pass, even if these rows keep to the limits: where
-        they leave them depends on the last digits of the first dots.
+        A table with a row in which errors grow does not pass, even if the row keeps to the limits: the
+        length at which such a row exceeds the limits depends on the last digits of its first dots.
         """
         held = (self.good == 1.0).all(axis=3)
         held[1] &= ~(np.abs(self.multiplier[1]) > 1.0)

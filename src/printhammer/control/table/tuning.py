@@ -100,7 +100,7 @@ def _tuned_between(draft: Draft, lower: IntArray) -> Draft:
         for place, row in enumerate(near.tolist()):
             best = ways.take([2 * place + int(cost[place].argmin())])
             if not cost[place].min() <= BAD:
-                # Neither branch continues from its rate to here; a new one may exist.
+                # Neither branch continues to the rate halfway; a new branch may exist.
                 more = searched(task, float(periods[row]))
                 if more.size and more.cost.min() < cost[place].min():
                     best = more.take([int(more.cost.argmin())])
@@ -152,7 +152,7 @@ def tune(
     (Levenberg-Marquardt) iteration so that force and arrival of the last dot of patterns with that history
     are those of the single pulse. Mostly there are several solutions: before or after a rebound, with or
     without a brake pulse that removes some of the rebound. `printhammer.control.table.search` enumerates them
-    and keeps the one for which a row of dots stays nearest to the single pulse on hammers with 3 % more and
+    and keeps the solution whose row of dots stays nearest to the single pulse on hammers with 3 % more and
     less current and 10 um more and less travel; the deviation on this hammer itself has a weight of eight.
     Solutions are admitted only if a small error decays from dot to dot in a long row. No dot is fired before
     the armature has left the pack of the preceding dot.

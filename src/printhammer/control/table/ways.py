@@ -108,7 +108,7 @@ def changes(
 
 
 BAD: Final = 0.75  # Cost above which more candidates are searched for
-_SECOND: Final = 2  # Index of the first firing after two dots that are made right
+_SECOND: Final = 2  # Index of the first firing after the two dots with solved pulses
 UNSTABLE: Final = 1e3
 """Lowest cost of an unstable candidate, which is never chosen, but may have a stable neighbour; arbitrary."""
 

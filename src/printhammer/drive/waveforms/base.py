@@ -98,7 +98,7 @@ class Waveform(BaseModel):
         return result
 
     def numbers(self) -> tuple[float, ...]:
-        """Return the physical constants in order of declaration, SI; NaN for a missing one."""
+        """Return the physical constants in order of declaration, SI; NaN for a missing constant."""
         values = (getattr(self, name) for name in quantities(type(self)))
         return tuple(math.nan if value is None else float(value) for value in values)
 
@@ -126,7 +126,7 @@ class Waveform(BaseModel):
 
     @property
     def replaces(self) -> bool:
-        """Whether the latest firing always replaces earlier ones."""
+        """Whether the latest firing always replaces earlier firings."""
         return False
 
     @property

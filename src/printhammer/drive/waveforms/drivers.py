@@ -64,7 +64,7 @@ class _Driver(Waveform):
 
     @property
     def replaces(self) -> bool:
-        """Whether the latest firing replaces earlier ones: always, a driver has a single output stage."""
+        """Whether the latest firing replaces earlier firings: always, as a driver has one output stage."""
         return True
 
     @property

@@ -93,8 +93,8 @@ def read_csv(path: Path) -> Samples:
     Raises
     ------
     InputError
-        The file cannot be read, is empty, lacks units, holds something else than finite numbers at increasing
-        times, or the drive is not zero before time 0.
+        The file cannot be read, is empty, lacks units, holds something other than finite numbers at
+        increasing times, or the drive is not zero before time 0.
     """
     what = str(path)
     table = read_table(path, {"time": "s"}, optional=_UNITS, what="the sampled waveform")

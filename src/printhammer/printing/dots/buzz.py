@@ -2,7 +2,7 @@
 
 F. Hendriks (1983), Fig. 7: "Instead of allowing the armature to return fully to the backstop, current pulses
 can be issued that are synchronized with the return of the armature from the paper." No such train is known
-beforehand for a hammer; `find_buzz_train` looks for one, with the hammer's own waveform, in two families:
+beforehand for a hammer; `find_buzz_train` searches with the hammer's own waveform in two families:
 even trains, and trains in which each pulse follows the armature's departure from the pack by a constant
 delay.
 A delayed train needs a sensor, and can hold a motion that no even train holds because the motion is unstable

@@ -43,7 +43,7 @@ def glyphs() -> Mapping[str, BoolArray]:
     """Return the dots of each character of the built-in font, shape (9, 6): wires from the top, columns."""
     text = (files("printhammer.printing.dots") / "fonts" / "nine-wire.txt").read_text("utf-8")
     drawn = {" ": np.zeros((WIRES, ADVANCE), np.bool_)}
-    # Blank lines separate the groups; the first group says what the file is.
+    # Blank lines separate the groups; the first group describes the file.
     for group in text.split("\n\n")[1:]:
         heading, *rows = group.strip("\n").split("\n")
         for start in range(0, len(heading), _STEP):

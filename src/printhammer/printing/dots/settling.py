@@ -32,7 +32,7 @@ _WINDOWS: Final = 2.0  # Shortest duration of the simulation, in windows (`print
 _SPACING: Final = 1e-6  # Spacing of the samples, s
 _BISECTIONS: Final = 40  # Bisections of the settling time: they exhaust the digits
 _SAMPLES: Final = 4001  # Number of samples of a pulse, from which the time of exact rest is read; arbitrary
-_MARGIN: Final = 0.99  # Reduction of that rate, since the errors of integration shift the rest; arbitrary
+_MARGIN: Final = 0.99  # Reduction of the undisturbed rate, since integration errors shift the rest; arbitrary
 
 
 class Wear(Declared):

@@ -11,7 +11,7 @@ force, density in proportion to ink. Dots are as wide as the wire.
 
 Print heads: positions and diameter of the wires, and the darkness of a dot. The paper says of the head only
 that its wires are arranged in columns and that the carriage moves a fraction of a metre per second. The
-defaults are assumptions modelled on heads of the time: nine wires 1/72 in apart and about as thick as that,
+defaults are assumptions modelled on heads of the time: nine wires, 1/72 in apart and of about that diameter,
 dot columns 1/60 in apart, so that a character of six columns is a tenth of an inch wide; 18 and 24 thinner
 wires over the same height.
 """
@@ -371,7 +371,7 @@ def print_page(
     strategy, limits
         As for `printhammer.safe_rate`.
     head : Head, optional
-        Wire positions and diameter; by default `printhammer.printing.page.page.head_of` the number of wires.
+        Wire positions and diameter; by default that of `printhammer.printing.page.page.head_of`.
 
     Returns
     -------

@@ -302,8 +302,8 @@ def quality(
         Slot rate, Hz, or text with a unit.
     pattern : str, int or bool array, optional
         Requested dots by slot: text such as "10110111", 1 for a dot; a number of dots in consecutive slots;
-        or a boolean mask. By default one turn of the binary de Bruijn cycle of order 8, which contains every
-        word of eight slots exactly once, after a lead-in of 64 slots that are not judged.
+        or a boolean mask. By default one period of the binary de Bruijn cycle of order 8, which contains
+        every word of eight slots exactly once, after a lead-in of 64 slots that are not judged.
     strategy, limits, nominal, tolerance
         As for `printhammer.safe_rate`.
     pitch : float or str, optional

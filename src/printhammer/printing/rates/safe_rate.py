@@ -58,13 +58,13 @@ from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 FIRST: Final = 100.0  # First rate of the grid of the paper's hammer, Hz
 
-LAST: Final = 4000.0  # Last rate of that grid, Hz
+LAST: Final = 4000.0  # Last rate of the grid of the paper's hammer, Hz
 
-STEP: Final = 5.0  # Step of that grid, Hz
+STEP: Final = 5.0  # Step of the grid of the paper's hammer, Hz
 
 MOST_RATES: Final = 10_000  # Largest number of rates in a grid; arbitrary
 
-_AT_FIRST: Final = 2  # Number of rates in the first ensemble, doubled from one to the next; arbitrary
+_AT_FIRST: Final = 2  # Number of rates in the first ensemble, doubled for each further ensemble; arbitrary
 _FEW: Final = 3  # Number of slots of the patterns that are simulated first
 _AT_ONCE: Final = 16  # Largest number of rates per ensemble; arbitrary
 _HAMMERS_AT_ONCE: Final = 32  # Number of hammers per ensemble; arbitrary
@@ -229,8 +229,8 @@ def safe_rate(
         Single-pulse dot with which all dots are compared; by default that of `hammer`. If the drive was
         designed for another hammer, pass the single-pulse dot of that other hammer.
     first, last, step : float or str, optional
-        The grid of rates, Hz, or text with a unit; by default 100 Hz to 4 kHz, every 5 Hz, and as much lower
-        as a device is slower than the paper's hammer. In open loop the default grid leaves out lower rates at
+        The grid of rates, Hz, or text with a unit; by default 100 Hz to 4 kHz, every 5 Hz, scaled down
+        for a device slower than the paper's hammer. In open loop the default grid leaves out lower rates at
         which each pulse finds the device exactly at rest.
     stop : bool, optional
         Whether to stop at the first rate that does not pass; otherwise all rates of the grid are simulated,
@@ -273,7 +273,7 @@ def safe_rate(
         runs = [] if brief is None else [[(brief[0], k)] for k in range(brief[1])]
         left = cases[len(runs) :]
         if left:
-            # What fails is reported with the patterns themselves.
+            # A failed rate is simulated again with the patterns themselves, for the report.
             left = left[:1] if stop and brief is not None else left
             runs += attempt_patterns(left, patterns, strategy, long=long, stop=stop, **options)
         cases = cases[: len(runs)]

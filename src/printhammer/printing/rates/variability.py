@@ -227,7 +227,7 @@ class Variability(Declared):
         return [drawn for _row, drawn in self.draw_rows(hammer, count, seed)]
 
     def draw_rows(self, hammer: Hammer, count: int, seed: int) -> list[tuple[FloatArray, Hammer]]:
-        """Draw hammers as `draw` does; return each with its deviations, in standard deviations."""
+        """Draw hammers like `draw`; return each hammer with its deviations, in standard deviations."""
         rng = np.random.default_rng(seed)
         drawn: list[tuple[FloatArray, Hammer]] = []
         for _ in range(_TRIES):
