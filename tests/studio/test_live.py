@@ -14,6 +14,7 @@ from printhammer.printing.page.pattern import Pattern
 from printhammer.studio import Shelf, live_page
 from printhammer.studio.controls import fields_of
 from printhammer.studio.live import VIEWS
+from printhammer.studio.widget import SCRIPT
 
 NAME = "hendriks-1983-1"
 
@@ -147,5 +148,30 @@ def test_a_hostile_link_does_no_harm(address: str, opened_browser: Any, link: st
     page.wait("window.studio?.studio?.frames.motion")
     assert reason in page.run("document.querySelector('.status').textContent")
     assert page.run("document.querySelectorAll('#studio img').length") == 0
+    assert page.complaints == []
+    page.call("Page.close")
+
+
+@pytest.mark.slow
+def test_a_notebook_shows_the_page_and_follows_its_state(address: str, opened_browser: Any) -> None:
+    page = opened_browser()
+    page.open("about:blank")
+    html = Path(address.removeprefix("file://")).read_text("utf-8")
+    kept = {"state": "rate=900", "height": "700px", "page": html}
+    page.run(
+        f"window.heard = {{}}; window.kept = {json.dumps(kept)};"
+        "window.model = { get: (name) => kept[name], set: (name, value) => { kept[name] = value; },"
+        " save_changes() {}, on: (kind, call) => { heard[kind] = call; }, off() {} }; 1"
+    )
+    page.run(
+        f"import(URL.createObjectURL(new Blob([{json.dumps(SCRIPT)}], {{ type: 'text/javascript' }})))"
+        ".then((made) => made.default.render({ model, el: document.body })).then(() => 1)"
+    )
+    inside = "document.querySelector('iframe').contentWindow.studio?.studio"
+    page.wait(f"{inside}?.frames.motion && {inside}.store.state.rate === 900")
+    page.run(f"{inside}.store.set({{ rate: 910 }}); 1")
+    page.wait("new URLSearchParams(kept.state).get('rate') === '910'")
+    page.run("kept.state = 'rate=950&pulses=2'; heard['change:state'](); 1")
+    page.wait(f"{inside}.store.state.rate === 950 && {inside}.frames.motion.fired.length === 2")
     assert page.complaints == []
     page.call("Page.close")
