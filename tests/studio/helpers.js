@@ -18,12 +18,6 @@ window.helpers = {
     box.dispatchEvent(new Event("change"));
   },
 
-  /** Hand a frame, as text of base64, to the widget. */
-  take(text) {
-    const bytes = Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0));
-    window.take({}, [new DataView(bytes.buffer)]);
-  },
-
   /** Count the colours of a view's canvases; an empty one has one. */
   inked(view) {
     const colours = new Set();

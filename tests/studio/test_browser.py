@@ -162,21 +162,6 @@ def test_rates_that_failed_are_counted_in_the_map(page: Page) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("width", "height"), [(1280, 720), (1920, 1080), (2560, 1080)])
-def test_everything_fits_on_the_screen(page: Page, width: int, height: int) -> None:
-    page.size(width, height)
-    page.wait(f"innerWidth === {width}")
-    overflow = page.run("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
-    assert overflow == [width, height]
-    for view in VIEWS:
-        box = page.box(f".view-{view}")
-        assert box["width"] > 250, view
-        assert box["height"] > 180, view
-        assert box["x"] + box["width"] <= width
-        assert box["y"] + box["height"] <= height
-
-
-@pytest.mark.slow
 def test_a_rail_in_the_place_of_the_current_and_back(page: Page) -> None:
     """Drivers, decay path and temperature are controls, both curves are there, and undo leads back."""
     page.run(HELPERS)

@@ -70,8 +70,8 @@ export function layout(studio, makers) {
   const tour = tourOf(studio, stories);
   const strip = make("nav", { class: "strip", "aria-label": "stories from the paper" }, ...stories.buttons, make("button", { type: "button", class: "story tour", onclick: tour.begin }, "Tour"));
   const share = menuOf("share", "Share", "Share what is set", [
-    ["", button("copy link", "Copy the address, which holds what is set", () => copy(studio.address(), studio, "address"))],
-    ["", button("save as a page", "Save what is set as a page of its own: one file, which computes without a network", () => savePage(studio))],
+    ["", button("copy link", "copy link: the address, which holds what is set", () => copy(studio.address(), studio, "address"))],
+    ["", button("save as a page", "save as a page: one file with what is set, which computes without a network", () => savePage(studio))],
     ["", out],
   ], true);
   const menu = menuOf("more", "☰", "Menu", [
