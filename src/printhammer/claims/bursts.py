@@ -161,7 +161,8 @@ def _exceeds(drive: Drive, limit: float) -> bool:
 def hang_up_range(context: Context) -> tuple[float | None, list[Motion], float]:
     """Return the lowest rate at which bursts hang up, the motions from this rate on, and the highest rate.
 
-    The rates are in Hz; the highest is the last rate of the claim, or the one that the current limit permits.
+    The rates are in Hz; the highest rate is the last rate of the claim, or the highest that the current limit
+    permits.
     """
     settings = claims()["hang_up_at_high_rate"].settings
     step, pulses, limit = (settings[name] for name in ("rate_step_Hz", "pulses", "current_limit_A"))

@@ -273,7 +273,7 @@ def distance(value: Any, band: Any, unit: str) -> str:
 
 
 def _limit(value: float, band: Any) -> float | None:
-    """Return the end of the band that the value violates."""
+    """Return the bound of a band that a value violates."""
     if isinstance(band, dict):
         for side, limit in band.items():
             if not (math.isnan(value) or SIDES[side](value, limit)):

@@ -52,7 +52,7 @@ def share_view(share: Share, floor: float | None = None) -> dict[str, Any]:
 
 
 def rates_view(report: Report) -> dict[str, Any] | None:
-    """Return the base rates, the rarest first, on a logarithmic axis; None without base rates."""
+    """Return the base rates of the claims, rarest first, on a logarithmic axis; None without base rates."""
     rates = report.reconstruction.base_rates
     if rates is None:
         return None
@@ -247,7 +247,7 @@ def family_view(report: Report) -> dict[str, Any] | None:
 
 
 def _conclusions(family: Family) -> list[dict[str, Any]]:
-    """Return the conclusions, those that hold for all hammers first."""
+    """Return the conclusions about the family; conclusions that hold for all hammers come first."""
     rows = []
     for name, conclusion in family.conclusions.items():
         words, unit = split_name(name)
@@ -289,7 +289,7 @@ def _member(member: FamilyMember, names: list[str]) -> dict[str, Any]:
 
 
 def _spread(family: Family, hammer: Hammer) -> dict[str, Any]:
-    """Return the constants relative to those of the shipped hammer, on a logarithmic axis."""
+    """Return the ratios of the family's constants to those of the shipped hammer, on a logarithmic axis."""
     ratios: dict[str, list[float]] = {}
     for key, constant in hammer.constants.items():
         values = [member.constants[key] for member in family.hammers if key in member.constants]
@@ -313,7 +313,7 @@ def _spread(family: Family, hammer: Hammer) -> dict[str, Any]:
 
 
 def _claims(family: Family) -> dict[str, Any]:
-    """Return the claims that hold for all hammers, for some, and for none."""
+    """Return the claims that hold for all hammers of the family, for some hammers, and for none."""
     counts = {}
     for name in every_claim():
         verdicts = [member.verdicts[name] for member in family.hammers if name in member.verdicts]

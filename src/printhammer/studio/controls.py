@@ -216,7 +216,7 @@ def combined_of(hammer: Hammer) -> list[dict[str, Any]]:
 
 
 def fields_of(waveform: Waveform) -> dict[str, Any]:
-    """Return shape and constants of a waveform, SI, in the form of a state."""
+    """Return shape and constants of a waveform, SI, as entries of a page state."""
     content: dict[str, Any] = getattr(waveform, "content", dict)()
     if content:
         columns = {name: [float(x) for x in values] for name, values in content.items()}

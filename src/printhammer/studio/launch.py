@@ -71,7 +71,7 @@ def read_start(written: str) -> tuple[dict[str, Any] | str, Hammer | None]:
 
 
 def hammer_inside(text: str, where: str) -> Hammer:
-    """Parse a hammer file that another file contains; it may not refer to further files.
+    """Parse a hammer file embedded in another file; a reference to further files is refused.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """Studio page without a server: one HTML file with hammers, their WebAssembly modules and scripts.
 
-Whatever never changes is computed when the page is written, and embedded: the description of each hammer, the
+Constant data are computed when the page is written, and embedded: the description of each hammer, the
 limits of states, the kernel as a WebAssembly module. The JavaScript modules in ``web/engine`` read states and
 compute the pictures in workers.
 """
@@ -195,7 +195,7 @@ def _line() -> dict[str, Any]:
 
 
 def _hammer(shelf: Shelf, name: str, modules: dict[str, str]) -> dict[str, Any]:
-    """Compose the entry of a hammer; add its module to `modules`, by its identity."""
+    """Compose the page entry of a hammer, and add its WebAssembly module to `modules`."""
     hammer = shelf.hammer(name)
     described = describe(hammer)
     entry: dict[str, Any] = {

@@ -408,7 +408,7 @@ def basins(
 def _decided(
     regime: Regime, cells: FloatArray, counts: tuple[int, int], effort: Effort, attractors: Attractors
 ) -> tuple[IntArray, IntArray, TextArray]:
-    """Compute the attractor of each cell: index, number of firings, and status."""
+    """Determine the attractor of each cell; return attractor indices, firings used, and statuses."""
     firings, most = counts
     places = np.full(len(cells), UNDECIDED - 1, np.int64)
     used = np.zeros(len(cells), np.int64)

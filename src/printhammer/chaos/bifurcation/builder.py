@@ -1,14 +1,14 @@
 """Construction of a bifurcation diagram: trains at a grid of values, refined values, Lyapunov exponents.
 
-The final state at one value of the parameter is the initial state at the next; this is done in parallel.
+The final state at one value of the parameter is the initial state at the next value.
 
-Strictly, each train begins where the train before it ended, which is a serial computation. Here the values
-are cut into strands of `STRAND` successive values. The first train of a strand begins at rest, the state is
-carried within the strand, and all strands run in parallel. Then the joints are closed: the first train of a
-strand is run again from the final state of the preceding strand. If it reaches the same attractor as before,
-the rest of the strand is kept. If not, it replaces the former result, and its state is carried through the
-strand until a train reaches the same attractor as before. If the strand ends first, the next joint is closed
-anew.
+Strictly, each train begins where the preceding train ended, which is a serial computation. Here the values
+are divided into strands of `STRAND` successive values. The first train of a strand begins at rest, states are
+passed on within the strand, and all strands run in parallel. Then successive strands are joined: the first
+train of a strand is run again from the final state of the preceding strand. If the train reaches the same
+attractor as before, the rest of the strand is kept. Otherwise the new train replaces the former one, and its
+final state is passed on through the strand until a train reaches the same attractor as before. If no train of
+the strand does, the next strand is joined in the same way.
 
 So every train lies on the attractor to which a strictly serial computation leads, up to the resolution of
 `is_same_attractor`. The strands, and hence the result, depend on the values alone, not on threads or chunks.

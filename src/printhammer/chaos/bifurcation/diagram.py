@@ -102,7 +102,7 @@ class Route(Declared):
 
 
 def cells(values: FloatArray) -> FloatArray:
-    """Compute the width of the interval that each ascending parameter value represents."""
+    """Compute the width of the parameter interval around each value, for ascending values."""
     if len(values) < 2:
         return np.zeros(len(values))
     edges = np.concatenate([values[:1], 0.5 * (values[1:] + values[:-1]), values[-1:]])

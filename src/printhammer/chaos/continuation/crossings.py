@@ -1,4 +1,4 @@
-"""Crossings of two curves of fixed points: location, kind, and continuation of the other curve.
+"""Crossings of two curves of fixed points: location, kind, and continuation of the crossing curve.
 
 At a crossing the corrector's matrix A = [dG/du - I, dG/dp] has a null space of two dimensions. One
 direction in it is the tangent t of the curve that was followed; q is perpendicular to it. With the left null
@@ -41,7 +41,7 @@ _UPRIGHT: Final = 0.01
 _AMPLITUDE: Final = 1e-2
 _LEAST_AMPLITUDE: Final = 1e-5
 _CLOSER: Final = 4.0
-"""Smallest scaled distance from a crossing to try for the other curve; ratio of successive distances."""
+"""Smallest scaled distance from a crossing to try for the second curve; ratio of successive distances."""
 _ASIDE: Final = 0.5
 """Largest distance from the predicted point, relative to the step, for a point to lie on the curve."""
 
@@ -71,7 +71,7 @@ def locate_crossing(
 
 
 def crossing_direction(follower: Corrector, node: Node) -> FloatArray | None:
-    """Compute the scaled tangent of the other curve at a crossing, shape (n + 1,); None if undetermined."""
+    """Compute the scaled tangent, shape (n + 1,), of the second curve at a crossing; None if undetermined."""
     z = follower.point(node)
     value = follower.family(node.state, node.parameter)
     if value.trouble:

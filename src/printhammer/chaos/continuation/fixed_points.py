@@ -66,7 +66,7 @@ class Node(Declared):
 
     @property
     def multipliers(self) -> npt.NDArray[np.complex128]:
-        """Eigenvalues of dG/du or of the monodromy matrix, largest absolute value first."""
+        """Eigenvalues of the map's derivative or of the monodromy matrix, largest absolute value first."""
         value = self.value
         matrix = value.jacobian if value.monodromy is None else value.monodromy
         values = np.linalg.eigvals(matrix).astype(np.complex128)
@@ -97,7 +97,7 @@ class Corrector:
             )
 
     def scaled(self, state: npt.ArrayLike, parameter: float) -> FloatArray:
-        """Divide a state and parameter by the scales; return the vector z, shape (n + 1,)."""
+        """Divide a state and a parameter by the scales; return the scaled point z, shape (n + 1,)."""
         return np.append(np.asarray(state, dtype=np.float64), parameter) / self.scales
 
     def point(self, node: Node) -> FloatArray:
@@ -105,12 +105,12 @@ class Corrector:
         return self.scaled(node.state, node.parameter)
 
     def derivative(self, value: MapValue) -> FloatArray:
-        """Compute the scaled derivative of G(u, p) - u, shape (n, n + 1)."""
+        """Compute the scaled derivative of the residual G(u, p) - u of the map G, shape (n, n + 1)."""
         rows = np.column_stack([value.jacobian - np.eye(self.count), value.slope])
         return np.asarray(rows * self.scales / self.scales[: self.count, np.newaxis])
 
     def correct(self, z: FloatArray, row: FloatArray, *, arc: float = 0.0) -> Node | None:
-        """Find the fixed point near z in the plane through z normal to `row`; None if not found.
+        """Find the fixed point near a scaled point z, in the plane normal to `row`; None if not found.
 
         The tangent of the node points along `row`.
         """
@@ -142,7 +142,7 @@ class Corrector:
         return None
 
     def at_parameter(self, z: FloatArray) -> Node | None:
-        """Find the fixed point near z at the parameter of z; None if not found."""
+        """Find the fixed point near a scaled point z, at the parameter of z; None if not found."""
         return self.correct(z, np.eye(self.count + 1)[-1])
 
     def onto(self, z: FloatArray) -> Node | None:

@@ -41,7 +41,7 @@ _ROUNDS: Final = 20  # Iteration limit of Newton's method; arbitrary
 _PRECISION: Final = 1e-12  # Scaled correction below which Newton's method has converged
 _STAGNANT: Final = 1e3  # Multiple of the precision below which stagnation counts as convergence
 _SLOWER: Final = (0.98, 0.9, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.02, 0.005)
-"""Impact speeds, relative to the initial speed, at which a branch is computed down to its grazing."""
+"""Impact speeds, relative to the first, at which the last orbits before a grazing are computed."""
 
 
 class Flight(Declared):

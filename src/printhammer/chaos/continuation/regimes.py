@@ -1,9 +1,9 @@
 """Map of printing regimes: all periodic orbits of a hammer, followed along the rate.
 
 Stable and unstable orbits are searched for at several rates; each orbit that lies on no known branch is
-followed in both directions. Period doublings and crossings lead to further branches. An island, an orbit that
-exists only between two folds and is joined to no other branch, is a closed loop. Islands between two
-successive search rates are missed.
+followed in both directions. Period doublings and crossings lead to further branches. An isola, a closed loop
+of orbits between two folds that is joined to no other branch, is missed if it lies between successive search
+rates.
 """
 
 from __future__ import annotations
@@ -310,7 +310,7 @@ def _state_at(orbit: Orbit, phase: float) -> FloatArray:
 
 
 def _has_end_at(branch: Branch, value: float, state: FloatArray) -> bool:
-    """Whether a branch ends in a period doubling at a given parameter value and state."""
+    """Whether a branch ends in a period doubling at a given state and parameter value."""
     scales = np.append(branch.regime.window.half_widths, (branch.bounds[1] - branch.bounds[0]))
     place = np.append(state, value)
     return any(

@@ -111,7 +111,7 @@ class Tracer:
 
         A branch is lost where an impact meets its section. Each new segment starts with the last orbit of the
         preceding segment, at the phase at which this orbit is farthest from its contacts. Orbits too close to
-        the lost end are removed from `nodes`.
+        the end of the branch are removed from `nodes`.
         """
         pieces: list[tuple[RegimeFamily, list[Node]]] = []
         while stop.reason in _LOST and len(pieces) < _MOST_SECTIONS and len(nodes) > 1:

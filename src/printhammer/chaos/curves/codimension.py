@@ -93,7 +93,7 @@ def _along(direction: FloatArray) -> Callable[[Node], float]:
 
 
 def _tests(kind: str, rigid: bool) -> dict[tuple[str, int], Callable[[Node], float]]:
-    """Return the test functions of the points of codimension two, by kind and orbit periods per touch."""
+    """Return the test functions of codimension-two points, by kind and number of orbit periods per touch."""
     if kind == "fold":
         return {
             ("fold-flip", 1): lambda node: _determinant(node) + 1.0,
@@ -165,7 +165,7 @@ def points_along(
 
 
 def _is_stationary(node: Node, here: Node, ahead: Node) -> bool:
-    """Whether a curve is stationary in both parameters at a node between two others.
+    """Whether a curve is stationary in both parameters at a node between two neighbouring nodes.
 
     Each component of the tangent is compared with its values at the neighbouring nodes, since the component
     of a parameter with a wide range is small everywhere.

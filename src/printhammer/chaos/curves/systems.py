@@ -86,7 +86,7 @@ class Plane:
         return np.array([*self.regime.window.half_widths, *widths])
 
     def at(self, first: float, second: float) -> Regime:
-        """Return the regime with given values of both parameters; InputError if the values are invalid."""
+        """Return the regime at a point of the parameter plane; InputError if the values are invalid."""
         return self.regime.with_(self.names[1], float(second)).with_(self.names[0], float(first))
 
 
@@ -279,7 +279,7 @@ class ImpactSystem:
 
     @property
     def _sign(self) -> float:
-        """Coefficient of the trace in f: minus the critical multiplier; 0 for Neimark-Sacker."""
+        """Coefficient of tr J in the test function: minus the critical multiplier; 0 for Neimark-Sacker."""
         return _IN_TRACE[self.kind]
 
     def _miss(self, flight: Flight, speed: float) -> FloatArray:

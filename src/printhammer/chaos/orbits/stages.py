@@ -399,7 +399,7 @@ def _share(guesses: int, period: int) -> int:
 
 
 def _doublings(first: int, below: int) -> list[int]:
-    """List a number and its doubles, by factors of 2, below a limit."""
+    """List the products of a number and the powers of 2 that lie below a limit."""
     return [first << k for k in range(below.bit_length()) if first << k < below]
 
 

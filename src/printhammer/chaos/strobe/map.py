@@ -58,7 +58,7 @@ RANGE_LEFT: Final = "range left"
 
 _TURN_STEPS: Final = 60  # Iteration limit of the root search for an extremum; arbitrary
 _STILL: Final = 1e-9
-"""Speed, relative to the scale, at which an extremum is located: its displacement error is quadratic."""
+"""Relative speed below which a motion is at an extremum; the displacement error is of second order."""
 STILL_COIL: Final = 1e-9
 """Current or flux linkage, relative to a typical value, below which the coil counts as currentless."""
 
@@ -322,7 +322,7 @@ def mirror_image(regime: Regime, state: FloatArray, tolerance: float) -> FloatAr
 
 
 def _busy(contacts: FloatArray, begin: float, end: float) -> FloatArray:
-    """Sample the times since the section during which there is a contact, at 20 points per contact."""
+    """Return sample times within contacts, counted from the section, 20 per contact."""
     times = [np.zeros(0)]
     for _surface, t_in, _v_in, t_out, *_ in contacts:
         low, high = (begin if np.isnan(t_in) else t_in), (end if np.isnan(t_out) else t_out)

@@ -119,7 +119,7 @@ class Train(Declared):
 
     @classmethod
     def of(cls, regime: Regime, firings: int, state: tuple[float, ...] | None = None) -> Self:
-        """Build a train whose states are needed up to a given firing.
+        """Build a train with enough firings to compute its states up to a given firing.
 
         One more pulse is fired, so that no state depends on the end of the run.
         """
@@ -177,7 +177,7 @@ class States:
         return settled(train.regime.at_firings, self.points, period, _scales(train))
 
     def resting(self, train: Train, distances: FloatArray, tolerance: float) -> tuple[int, int] | None:
-        """Return the cycle of a motion that rests on the backstop, in firings, and its number of rests.
+        """Return cycle length, in firings, and number of rests of a motion that rests on the backstop.
 
         None if the motion does not rest. The cycle is 0 if the motion does not repeat; then at least two
         rests are required. Cycles of less than 5 firings are excluded, since rounding does not change them.
@@ -269,7 +269,7 @@ def run_trains(
 
 
 FINER: Final = (0.1, 0.01)
-"""Factors on the tolerance at which the period of a motion that comes to rest is computed again."""
+"""Factors on the tolerance for recomputed periods of motions that come to rest on the backstop."""
 
 
 def _at_finer(

@@ -66,7 +66,7 @@ def plot(
 
 
 def _dot(table: Sensitivities, dot: int | None, quantities: Sequence[str]) -> int:
-    """Return the index of the dot to draw, by default the first printed dot; InputError if it is lost."""
+    """Return the index of the dot to draw, by default the first printed dot; InputError for a lost dot."""
     struck = [k for k in range(len(table.dots)) if k not in table.lost]
     if all(name in table.run_quantities for name in quantities):
         return 0
