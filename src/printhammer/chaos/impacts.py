@@ -79,7 +79,7 @@ class Section(Result):
 
     @property
     def title(self) -> str:
-        """Title of the section: touched surface, name of the hammer, and firing period."""
+        """Title of the section: surface of the impacts, name of the hammer, and firing period."""
         return f"touches of the {self.surface} by {self.hammer.name}, fired every {self.period:.9g} s"
 
     @property
@@ -101,7 +101,7 @@ class Section(Result):
 
     @property
     def remark(self) -> str:
-        """Remark that the section has fewer touches than requested, with the reason; else empty."""
+        """Remark that the section has fewer impacts than requested, with the reason; else empty."""
         if len(self.t) == self.wanted:
             return ""
         why = "" if self.ok else f"; the run ended early: {self.status}"
@@ -123,7 +123,7 @@ def section(
     tolerance: float = TOLERANCE,
     **firing: Unpack[Firing],
 ) -> Section:
-    """Compute the states of a hammer at the touches of its backstop or pack.
+    """Compute a Poincaré section: the states of a hammer at its impacts on backstop or pack.
 
     Parameters
     ----------

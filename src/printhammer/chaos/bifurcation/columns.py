@@ -95,7 +95,7 @@ def put(columns: Columns, rows: Sequence[int] | IntArray, others: Columns) -> No
 def run_columns(
     regimes: Sequence[Regime], states: FloatArray, firings: int, transient: int, effort: Effort
 ) -> Columns:
-    """Fire many trains and store their states at the last `firings` - `transient` firings.
+    """Simulate many trains and store their states at the last `firings` - `transient` firings.
 
     Initial states, shape (M, 7), are displacement, velocity, branch of the pack (negative: derived from the
     state), memory, and, with a voltage drive, the electric part of the state

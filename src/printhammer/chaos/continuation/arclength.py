@@ -262,7 +262,7 @@ def _lost(node: Node, trouble: str, *, jumped: bool = False) -> Stop:
 
 
 def _beyond(node: Node, bounds: tuple[float, float]) -> float | None:
-    """Return the bound that a node has reached if the tangent leads beyond it, else None."""
+    """Return the parameter bound that a node has reached while the tangent points outward, else None."""
     if node.parameter <= bounds[0] and node.tangent[-1] < 0.0:
         return bounds[0]
     if node.parameter >= bounds[1] and node.tangent[-1] > 0.0:

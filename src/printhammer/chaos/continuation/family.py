@@ -70,7 +70,7 @@ class Passage(Declared):
 
     @property
     def sequence(self) -> str:
-        """Sequence of touched surfaces, P or B each, rotated to its alphabetically first form.
+        """Sequence of contacts as text, P (pack) or B (backstop), rotated to the alphabetically first form.
 
         A touch that moves through the section changes nothing, since the beginning of an orbit is arbitrary.
         """

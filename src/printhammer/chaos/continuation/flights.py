@@ -1,4 +1,4 @@
-"""Flights from one touch of a surface to a later touch, and the touches of an orbit closest to a grazing.
+"""Flights from one impact on a surface to a later impact, and the impacts of an orbit near a grazing.
 
 At a touch the displacement is that of the surface; the remaining state variable is the velocity, 0 at a
 grazing. With a rigid backstop, the strobe map has a square-root singularity at a grazing. If the surface is
@@ -34,7 +34,7 @@ from printhammer.support.arrays import FloatArray
 
 _CURRENT: Final = "with a voltage drive, the current at a touch belongs to the state"
 _CLOSE: Final = 0.01
-"""Time before and after a touch during which the surface is removed, as a fraction of the period."""
+"""Time before and after an impact during which the surface is removed, as a fraction of the period."""
 _STILL: Final = 1e-9  # Speed, relative to the typical one, below which an orbit turns at its section
 _SPACING: Final = 1e-6  # Finite-difference step of Newton's method, in scaled variables
 _ROUNDS: Final = 20  # Iteration limit of Newton's method; arbitrary
@@ -45,7 +45,7 @@ _SLOWER: Final = (0.98, 0.9, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.02, 0.005)
 
 
 class Flight(Declared):
-    """Motion between two touches, some firings apart, with the surface removed close to both touches."""
+    """Motion from one impact on a surface to a later impact, without the surface close to both impacts."""
 
     end: FloatArray = part("displacement, m, and velocity, m/s, at the end, shape (2,)")
     jacobian: FloatArray = part("derivative with respect to the state at the start, shape (2, 2)")
@@ -59,7 +59,7 @@ class Flight(Declared):
 def fly(
     regime: Regime, surface: Surface, phase: float, speed: float, firings: int, tolerance: float
 ) -> Flight:
-    """Compute the flight that leaves a surface at a given phase of the drive and speed, m/s."""
+    """Compute the flight of the armature from a surface, at a given phase of the drive and speed, m/s."""
     hammer = regime.hammer
     place = hammer.front if surface == "pack" else hammer.position
     assert place is not None

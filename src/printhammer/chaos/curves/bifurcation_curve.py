@@ -38,7 +38,7 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 SAME: Final = 1e-3
-"""Distance of a multiplier from the unit circle within which it counts as lying on the circle."""
+"""Distance from the unit circle within which a multiplier counts as critical."""
 
 
 class BifurcationCurve(Result, rows="point"):

@@ -197,7 +197,7 @@ class GrazingSystem:
         self.scales = np.array([_PHASES, *plane.scales[2:]])
 
     def at(self, phase: float, first: float, second: float) -> tuple[CurvePoint, FloatArray] | str:
-        """Compute the orbit that leaves a grazing touch, and its closing error at the next touch.
+        """Compute the orbit that starts at a grazing of the surface, and its closing error at the next touch.
 
         The closing error is the difference of both states, in units of the state scales. A text with the
         reason is returned if the run ends early; InputError if the parameters are invalid.

@@ -255,7 +255,7 @@ def _paths(rest: FloatArray, angles: FloatArray) -> npt.NDArray[np.complex128]:
 
 
 def _displacements(paths: npt.NDArray[np.complex128], resolution: float) -> FloatArray:
-    """Compute the mean square displacements of paths up to a tenth of their length, with noise damped."""
+    """Compute the damped mean square displacements of paths, at lags up to a tenth of the path length."""
     moved = mean_square_displacements(paths, paths.shape[1] // _CUT)
     steps = np.arange(1, moved.shape[1] + 1)
     return np.asarray(moved + resolution**2 * np.sin(math.sqrt(2.0) * steps))

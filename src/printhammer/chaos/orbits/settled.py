@@ -112,7 +112,7 @@ def settled(regime: Regime, points: FloatArray, period: int, scales: FloatArray)
 def is_approaching(
     points: FloatArray, orbit: FloatArray, within: float = NEAR, lies_on: float = LIES_ON
 ) -> bool:
-    """Whether states, shape (m, 2), lie on an orbit or approach it, in the order of the orbit.
+    """Whether successive states, shape (m, 2), lie on a periodic orbit or converge to the orbit.
 
     False if the states converge to a point beside the orbit: their steps then shrink, but their distance from
     the orbit does not.

@@ -55,7 +55,7 @@ POINTS = 200
 """Default number of strobe points, as in Fig. 11."""
 
 _SETTLED = 1000
-"""Number of strobe points of a settled series, and of firings discarded before its first point."""
+"""Number of strobe points of a settled series, and number of firings discarded before the series."""
 
 
 class Strobe(Result):

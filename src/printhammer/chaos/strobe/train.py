@@ -86,7 +86,7 @@ def pack_branches(x: FloatArray, branch: npt.NDArray[np.integer[Any]], front: fl
 def handed_on(
     hammer: Hammer, x: float, v: float, mode: int, memory: float, electric: Sequence[float] = NO_CURRENT
 ) -> State:
-    """Return the state from which the next train continues; `FROM_REST` if no train can continue from it."""
+    """Return the start of the next train: the final state, or `FROM_REST` if that is no valid start."""
     begun = state_to_begin(hammer, x, v, mode, memory)
     return FROM_REST if begun is None else (*begun, *electric)
 
@@ -136,7 +136,7 @@ class Train(Declared):
         return self.regime.period
 
     def times(self, firings: IntArray) -> FloatArray:
-        """Return the times of firings, s, by their numbers, the first firing being number 1."""
+        """Return the times, s, of the firings with given numbers; the first firing is number 1."""
         if len(self.drive.times) > 1:
             return np.asarray(self.drive.times[firings - 1], dtype=np.float64)
         return np.asarray(self.drive.times[0] + self.period * (firings - 1.0), dtype=np.float64)
