@@ -125,7 +125,7 @@ def current_range(context: Context, _claim: Claim) -> Measured:
 
 
 _NEVER: Final = 1.0
-"""Firing time beyond the end of every run, s, for a run without current."""
+"""Firing time later than the end of every run, s, so that no current flows in the run."""
 
 
 @measures("elastomer_backstop", *WHOLE)

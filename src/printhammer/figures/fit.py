@@ -29,7 +29,7 @@ _KINDS: Final = {
     "impact speed": "velocity",
     "rebound speed": "velocity",
 }
-"""Scale of each measured quantity, by name; other quantities are drawn as pure numbers."""
+"""Axis scale of each measured quantity, by name; other quantities are drawn as pure numbers."""
 
 _MANY: Final = 400
 """Number of data points from which on they are drawn small; arbitrary."""

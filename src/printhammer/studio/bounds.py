@@ -59,7 +59,7 @@ POINTS: Final = 1600
 """Smallest number of points of a plotted curve."""
 
 MOST_ENDS: Final = 20_000
-"""Largest number of step ends among the points of a curve."""
+"""Largest number of ends of integration steps among the points of a curve."""
 
 PREVIEW: Final = {"false": (64, 128), "true": (32, 128)}
 """Numbers of rates and times of the coarse map, by whether a voltage drives the coil.

@@ -144,7 +144,7 @@ def _plain(value: Any) -> Any:
 
 
 def _limits() -> dict[str, Any]:
-    """Return the limits of states and of work, by name."""
+    """Return the limits of page states and of computation, by name."""
     named = {name: getattr(bounds, name) for name in vars(bounds) if name.isupper()}
     named["VIEWS"] = VIEWS
     named["WAVEFORMS"] = {

@@ -1,4 +1,4 @@
-"""Hammers of a studio page, by name."""
+"""Collection of the hammers that a studio page offers, by name."""
 
 from __future__ import annotations
 

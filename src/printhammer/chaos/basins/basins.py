@@ -221,7 +221,7 @@ class Basins(Result, rows="v x"):
         return f"basins of {self.regime.hammer.name}, every {self.regime.period:.9g} s"
 
     def summary(self, box: int | None = None) -> Summary:
-        """Summarise the attractors with the fractions of cells, the undecided cells, and the basin entropy."""
+        """Summarise attractors with their fractions of the cells, undecided cells, and the basin entropy."""
         rows: list[FactRow] = []
         for row, (attractor, share, error) in enumerate(zip(self.attractors, *self.shares, strict=True), 1):
             x, v = attractor.states[0].tolist()

@@ -175,7 +175,7 @@ def shown_period(period: float) -> str:
 
 @styled
 def plot_section(section: Section) -> Figure:
-    """Draw an impact map: velocity at the touches of a surface against the time since the last firing.
+    """Draw an impact map: velocity at the impacts on a surface against the time since the last firing.
 
     The time axis covers the whole period.
     """

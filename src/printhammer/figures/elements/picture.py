@@ -1,4 +1,4 @@
-"""Figure class of all figures: a matplotlib figure that notebooks display without pyplot."""
+"""Base class of all figures: a matplotlib figure that notebooks display without pyplot."""
 
 from __future__ import annotations
 

@@ -67,10 +67,10 @@ CURVES: Final = 81
 
 _TIMES: Final = 1361  # Times of a curve: more than a picture resolves
 _LEAN: Final = (0.19, 0.66)
-"""Offset from the first curve to the last, right and up, in units of the picture width."""
+"""Offset of the last curve from the first curve, right and up, in units of the picture width."""
 
 _ACROSS: Final = 0.80
-"""Width of a curve, in units of the picture width."""
+"""Width of each displacement curve, in units of the picture width."""
 
 _TALL: Final = 0.22
 """Height of a curve from the lowest to the highest position, in units of the picture width."""
