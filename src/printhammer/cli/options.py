@@ -130,7 +130,7 @@ def argument(metavar: str, what: str, **more: Any) -> Any:
 
 
 def bounded(least: float, what: str, *, default: float, **more: Any) -> Any:
-    """Return a numeric option of the type of its default, with the smallest value `least`."""
+    """Return a numeric option, of the type of its default value, with the lower bound `least`."""
     return Option(what, more.pop("metavar", None), default, type=type(default), least=least, **more)
 
 

@@ -96,7 +96,7 @@ def table(
     title: str = "",
     most: int | None = None,
 ) -> Table:
-    """Return a frameless table of rows; of more than `most` rows only the first and last ones are shown."""
+    """Return a frameless table; if the table has more than `most` rows, only its first and last rows."""
     from printhammer.results.summary import Cells, Grid
 
     every = list(rows)

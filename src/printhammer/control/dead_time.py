@@ -328,7 +328,7 @@ def _reference(hammer: Hammer, waveform: Waveform, tolerance: float) -> tuple[_F
 
 
 def _fire(hammer: Hammer, pulse: Waveform, span: float, tolerance: float) -> _Fired:
-    """Simulate one firing from rest for `span`, s; the outcome is NaN if the hammer strikes nothing."""
+    """Simulate one firing from rest for `span`, s; the outcome is NaN without an impact."""
     from printhammer.drive.trains import PulseTrain
     from printhammer.run.simulate import simulate
 

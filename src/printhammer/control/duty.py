@@ -57,7 +57,7 @@ class DotHeat:
     """Heat dissipated in the coil per dot, as a function of the winding temperature."""
 
     temperature: tuple[float, ...]
-    """Temperatures, degC, ascending; one or more."""
+    """Winding temperatures, degC, ascending; at least one temperature."""
     heat: tuple[float, ...]
     """Coil heat per dot at each temperature, J."""
     feed: str
@@ -71,7 +71,7 @@ class DotHeat:
 
     @property
     def apart(self) -> float:
-        """Largest dot rate at which the current of a dot decays before the next one, Hz."""
+        """Largest dot rate at which the current of a dot decays before the next dot, Hz."""
         return 1.0 / self.lasts if self.lasts > 0.0 else math.inf
 
     @property

@@ -193,7 +193,7 @@ class PulseTrains(Sequence[PulseTrain]):
         firings.values.flags.writeable = False
 
     def _check(self) -> None:
-        """Check the firing times; raise the same InputError as a single train with invalid times."""
+        """Validate the firing times; raise the InputError of a single train if the times are invalid."""
         if not len(self):
             raise InputError("trains: the list is empty", key="train", expected="at least one")
         times, starts = self._firings.values, self._firings.starts

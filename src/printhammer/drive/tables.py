@@ -30,11 +30,11 @@ DIODE: Final = 0.7
 """Forward voltage of a silicon diode, V; the usual textbook value."""
 
 RAIL: Final = 2.0
-"""Index of the decay path "rail" among those of a driver: "diode", "zener", "rail"."""
+"""Index of the decay path "rail" among the decay paths of a driver: "diode", "zener", "rail"."""
 
 _VOLTAGE, _WIDTH, _DECAY_VOLTAGE, _DECAY_RESISTANCE, _SOURCE_RESISTANCE, _COILS, _DIODE_VOLTAGE = range(7)
 _OWN: Final = 7
-"""Indices of the fields of a driver; those of its shape follow, and the index of the decay path is last."""
+"""Indices of the fields common to all drivers; fields of the shape follow; the decay path is last."""
 
 
 def put(table: Any, row: int, start: float, kind: float, p0: float, p1: float, p2: float, p3: float) -> int:

@@ -1,4 +1,4 @@
-"""Drives and waveforms as TOML text; `printhammer.drive.file` reads it.
+"""Conversion of drives and waveforms to TOML text, which `printhammer.drive.file` parses.
 
 Numbers are written in SI with all digits, so that reading restores the drive exactly.
 """

@@ -134,7 +134,7 @@ class _Tasks:
         future.add_done_callback(self._done.put)
 
     def _next(self) -> tuple[Index, Results | None] | None:
-        """Wait for a task; return its block and its results, None if the task killed several workers."""
+        """Wait for a task; return its block and results, or None for results if workers were killed."""
         try:
             future = self._done.get(timeout=_INTERVAL)
         except Empty:
@@ -193,7 +193,7 @@ class _Tasks:
 
 
 def _task(base: Base, outputs: Outputs, rows: FloatArray, wanted: dict[str, str]) -> Results | str:
-    """Compute a block on a worker with the same versions; return the results, or an error sentence."""
+    """Compute a block on a worker with equal software versions; return the results or an error message."""
     for name, version in versions().items():
         if version != wanted[name]:
             return f"a worker of the cluster has {name} {version}: expected {wanted[name]}"
@@ -254,6 +254,6 @@ def _quiet() -> Iterator[None]:
 
 
 async def _knock(distributed: Any, address: str) -> None:
-    """Fail early if no scheduler answers; a client without a connection waits long before it fails."""
+    """Raise an error early if no scheduler answers; a client would wait long before failing."""
     comm = await distributed.comm.connect(address, timeout=ANSWER)
     await comm.close()

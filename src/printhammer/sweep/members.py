@@ -89,7 +89,7 @@ class Maker:
     _drives: dict[tuple[Hashable, ...], Drive] = field(default_factory=dict)
 
     def member(self, row: Sequence[float]) -> Member:
-        """Return the member of a row of values, SI, one for each axis."""
+        """Build the member with the given axis values, SI, one value for each axis."""
         hammer = self._hammer(row)
         drive = self._drive(row, hammer)
         end = self.base.duration

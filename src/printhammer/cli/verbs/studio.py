@@ -40,7 +40,7 @@ def studio(
         "Open the page in the default browser.", flag="--open/--no-open", default=True
     ),
 ) -> Answer:
-    """Write the studio as one HTML file that computes by itself, and open it in the browser.
+    """Write the studio as one self-contained HTML file, and open the file in the browser.
 
     The file needs neither a server nor a network. Without --out it lies in the user's cache.
     """

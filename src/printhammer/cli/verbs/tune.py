@@ -119,7 +119,7 @@ def tune(
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:
-    """Tune pulse width and advance for each history of gaps, so that every dot equals one from rest.
+    """Tune pulse width and advance for each history of gaps, so that every dot equals a dot from rest.
 
     The exit status is 1 if the table exceeds the limits on the hammer for which it was tuned.
     """

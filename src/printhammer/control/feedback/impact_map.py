@@ -1,4 +1,4 @@
-"""The Poincaré map from one touch of the pack to the next, for every switching action of the coil.
+"""The Poincaré map from each pack contact to the next, for every switching action of the coil.
 
 At the touch the armature has a speed, and the coil is either on (a *pushed* touch) or off (a *free* touch:
 the armature was released before impact). An action then holds the coil at the push current until `release`,
@@ -215,7 +215,7 @@ def place_of(values: FloatArray, nodes: FloatArray) -> tuple[IntArray, FloatArra
 
 
 def blend(low: FloatArray, high: FloatArray, share: FloatArray) -> FloatArray:
-    """Interpolate linearly between two values, with weight `share` on the second."""
+    """Interpolate linearly between two values, with weight `share` on the second value."""
     return np.asarray((1.0 - share) * low + share * high)
 
 

@@ -155,7 +155,7 @@ class Pulse:
     levels: list[float] = field(default_factory=list)
 
     def switch(self, time: float, level: float) -> None:
-        """Append a switching, at least `APART` after the previous one."""
+        """Append a current switching, at least `APART` after the previous switching."""
         self.at.append(max(time, self.at[-1] + APART) if self.at else time)
         self.levels.append(level)
 

@@ -69,12 +69,12 @@ class Fronts:
 
     @property
     def landing(self) -> Landing:
-        """Landings for the nominal distance of the pack."""
+        """Soft landings for the nominal distance of the pack."""
         return self.landings[MIDDLE]
 
 
 def fronts(plant: Plant, forces: ForceMap, start: Launch, progress: Progress | None = None) -> Fronts:
-    """Compute impact maps and landings for every distance of the pack.
+    """Compute impact maps and soft landings for every distance of the pack.
 
     `progress(done, total)` is called after each step; there are `STEPS` steps per distance.
     """
@@ -111,7 +111,7 @@ def front_force(farther: Plant, table: ImpactMap) -> FloatArray:
 
 
 def between_fronts(front: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Locate M pack distances between those of the maps: index of the map below, weight of the map above.
+    """Locate M pack distances between the maps' distances: index of the map below, weight of the map above.
 
     A front is the distance beyond nominal as a fraction of the stroke; values outside the maps are clipped.
     """
@@ -134,7 +134,7 @@ _EFFORT: Final = 0.1  # Cost of the largest return current over a whole period
 
 
 class Committed(NamedTuple):
-    """Return currents and forces of M pack contacts that have begun, which a new choice cannot change.
+    """Past decisions at M pack contacts in progress: return current, printed force, and elapsed time.
 
     Return current, A; printed force relative to the single pulse; time since the touch, s.
     """

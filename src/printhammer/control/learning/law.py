@@ -241,7 +241,7 @@ class LearningLaw:
     first: OpenLoop  # Open-loop drive with the larger mean fraction of good dots over the production
 
     def update(self, belief: Belief, corrections: FloatArray, unexplained: FloatArray) -> Printing[Update]:
-        """Compute the corrections after a stage; yield the lines that simulated hammers have to print.
+        """Compute the corrections after a stage; yield the test lines that simulated hammers have to print.
 
         `unexplained`, shape (2, dots), is the model error of arrival and force of the dots of the line,
         normalised by the limits.
@@ -382,7 +382,7 @@ class LearningLaw:
         return Verdict(gains, loops[chosen], float(np.fmax.reduce(growth)), float(good.mean()), every)
 
     def _leads(self, share: FloatArray, others: FloatArray) -> bool:
-        """Whether a drive leads all others on average, and trails on at most the share `doubt` of hammers."""
+        """Whether a drive gains `_GAIN` on average, and loses on at most a fraction `doubt` of the hammers."""
         harmless = np.quantile(share - others.max(axis=0), self.doubt) >= 0.0
         return bool(harmless and share.mean() - others.mean(axis=1).max() >= _GAIN)
 

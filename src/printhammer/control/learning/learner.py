@@ -42,7 +42,7 @@ class Mean(NamedTuple):
 
 
 class Learner:
-    """Calibrates the table of one unit from run to run, by a learning law.
+    """Run-to-run calibration of the compensation table of one unit by a learning law.
 
     The better open loop is used during the first stage, and afterwards in each of three cases: no hammer of
     the production explains the readings; more posterior samples than the doubt allows would print fewer dots

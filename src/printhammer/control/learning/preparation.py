@@ -51,7 +51,7 @@ def law_for(
     threads: int | None = None,
     report: Callable[[], None] = lambda: None,
 ) -> tuple[LearningLaw, CompensationTable]:
-    """Prepare the learning law for a hammer at a rate, Hz, and the robust table that it starts from.
+    """Prepare the learning law, with a robust starting table, for a hammer at a slot rate, Hz.
 
     Arguments are those of `printhammer.learn`.
     """

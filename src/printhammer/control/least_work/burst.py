@@ -85,7 +85,7 @@ class NoBurstError(PrinthammerError):
 
 
 class SupplyCheck(Declared):
-    """Outcome of a burst at other supply levels than the planned one: arrays of shape (n,)."""
+    """Outcome of a burst at supply levels other than the planned level: arrays of shape (n,)."""
 
     changes: FloatArray = part("relative change of every current: 0.03 for 3 % more")
     adequate: IntArray = part(

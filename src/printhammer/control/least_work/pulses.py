@@ -42,7 +42,7 @@ _WRONG: Final = 10.0  # Penalty for an extra contact or a failed simulation, in 
 
 
 class PulsePlan:
-    """Plan of a burst of pulses: the firings planned, and the state of the armature after them.
+    """Plan of a burst of pulses: the planned firings, and the resulting state of the armature.
 
     The widths of `waveform` are optimised; the slope limit of the task is ignored. `period`, `past` (from a
     touch to the end of its slot), `lead` (length of the first slot) and `landing` (length of the landing) are
@@ -86,7 +86,7 @@ class PulsePlan:
         self.touches: list[float] = []
 
     def add_dot(self) -> bool:
-        """Plan the next dot of the burst; return False if no pulses were found that print it."""
+        """Plan the next dot of the burst; return False if no pulses that print the dot were found."""
         duration = self._period if self.touches else self._lead
         arrival = duration - self._past
 

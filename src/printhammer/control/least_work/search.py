@@ -1,4 +1,4 @@
-"""Optimal current of one slot, and the current that lands the armature softly.
+"""Search for the optimal current of a slot, and for the current that lands the armature softly.
 
 The currents at the nodes are optimised by sequential quadratic programming (SLSQP). A search starts from the
 current of the preceding slot, or from the best profiles of a few levels: brake, wait and throw for a dot;
@@ -46,7 +46,7 @@ def descend(
     linear: tuple[FloatArray, FloatArray] | None = None,
     inward: bool = False,
 ) -> tuple[FloatArray, float]:
-    """Minimise the first row of `measured` by SLSQP, subject to optional constraints.
+    """Minimise an objective by SLSQP, subject to optional constraints; `measured` evaluates both.
 
     `measured` maps points (places, n) to rows (1 or 3, places). With `conditions` there are three rows: the
     objective, an equality constraint (second row = 0) and an inequality constraint (third row >= 0). `bounds`
@@ -213,7 +213,7 @@ _INSIDE: Final = 1.0 - 1e-9  # Factor on a limit that keeps rounding errors with
 
 
 class NodePlan:
-    """Plan of a burst with piecewise linear current: the currents planned, and the state after them.
+    """Plan of a burst with piecewise linear current: the planned currents, and the resulting state.
 
     `period`, `past` (from a touch to the end of its slot), `spacing` (between nodes) and `flight` (of the
     single pulse) are times, s.
@@ -231,7 +231,7 @@ class NodePlan:
         self.touches: list[float] = []
 
     def add_dot(self) -> bool:
-        """Plan the next dot of the burst; return False if no current was found that prints it."""
+        """Plan the next dot of the burst; return False if no current that prints the dot was found."""
         nodes = self._nodes if self._currents else self._lead
         duration = nodes * self._step
         before = self._currents[-1] if len(self._currents) > 1 else None

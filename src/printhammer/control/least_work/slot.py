@@ -1,4 +1,4 @@
-"""One slot of a burst: simulation of many currents at once, and their cost.
+"""Slot of a burst: simulation of many trial currents at once, and the cost of each trial.
 
 A slot begins just after the armature has turned in the pack, with the final state of the preceding slot, and
 lasts one period; its own dot is due a fixed time before its end. The current is piecewise linear between

@@ -66,7 +66,7 @@ if TYPE_CHECKING:
 _NEAR: Final = 1e-9  # Rounding tolerance of a rate, relative, and of a time, s
 _CELLS: Final = "rate history"
 ANY_UNIT: Final = "any"
-"""Serial number that stands for every unit, to drive other units with a table that was learned on one."""
+"""Serial number that matches every unit, so that a table learned on one unit can drive other units."""
 
 
 class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".nc", ".zarr", ".parquet")):
@@ -408,7 +408,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
 
 
 def mixed(first: Settings, second: Settings, share: float) -> Settings:
-    """Interpolate linearly between two settings, with weight `share` on the second.
+    """Interpolate linearly between two table settings, with weight `share` on the second setting.
 
     Where the brake pulses of two entries differ, or one fires before a rebound and the other after it, the
     nearer entry is used unchanged.

@@ -50,7 +50,7 @@ def size_of(rates: int, entries: int, bits: int, values: int = 0) -> int:
 def whole_ticks(
     times: Mapping[str, FloatArray], rates: FloatArray, gaps: int, reach: int, tick: float
 ) -> dict[str, FloatArray]:
-    """Round the times of a table to whole ticks, such that no pulse begins before the preceding one ends.
+    """Round the times of a table to whole ticks, such that no pulse begins before the previous pulse ends.
 
     Where rounding to the nearest tick makes two pulses overlap, the brake pulse begins later or is shorter,
     or the dot is fired later, by a tick or two. Arguments as for `look_ahead`, with arrays of shape (rates,

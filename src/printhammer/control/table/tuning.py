@@ -1,4 +1,4 @@
-"""Tune a compensation table, so that every dot equals a dot from rest, independent of the dots before it.
+"""Tuning of compensation tables, such that every dot equals a dot from rest, whatever dots precede it.
 
 Where interpolation between two rates is poor, the grid of rates is refined.
 """
@@ -41,7 +41,7 @@ BETWEEN: Final = 0.5
 
 
 def refined(draft: Draft) -> Draft:
-    """Insert rates into a draft where interpolation halfway between two of its rates is poor.
+    """Insert rates into a draft table where interpolation halfway between neighbouring rates is poor.
 
     Interpolation is poor where the solution branch changes. A new entry follows the branch of the rate below
     or above, whichever costs less; if both are poor, a new search is run.
@@ -69,7 +69,7 @@ def refined(draft: Draft) -> Draft:
 
 
 def _halfway(draft: Draft, lower: IntArray) -> Draft:
-    """Interpolate a draft halfway between the rates `lower` and the next higher ones; evaluate the result."""
+    """Interpolate a draft halfway between the rates `lower` and the next higher rates; evaluate the rows."""
     table = draft.table()
     rates = 0.5 * (draft.rates[lower] + draft.rates[lower + 1])
     settings = np.array([table.at(float(rate)) for rate in rates])
@@ -80,7 +80,7 @@ def _halfway(draft: Draft, lower: IntArray) -> Draft:
 
 
 def _tuned_between(draft: Draft, lower: IntArray) -> Draft:
-    """Tune table rows halfway between the rates `lower` and the next higher ones."""
+    """Tune table rows halfway between the rates `lower` and the next higher rates."""
     task = draft.task
     rates = 0.5 * (draft.rates[lower] + draft.rates[lower + 1])
     halfway = Draft(task, rates, draft.values[:, lower])
@@ -265,7 +265,7 @@ def _spread(hammer: Hammer) -> list[Hammer]:
 
 
 def _counter(effort: Effort, total: int) -> Callable[[], None]:
-    """Return a function that reports the completion of one more step on each call."""
+    """Return a progress function that counts one step per call."""
     steps = iter(range(1, total + 1))
 
     def count() -> None:

@@ -77,7 +77,7 @@ def solve(
 
 
 def largest_of(off: FloatArray) -> FloatArray:
-    """Return the largest absolute deviation of each row; infinite if one is NaN."""
+    """Return the largest absolute deviation of each row; infinite for a row with NaN."""
     size = np.abs(off).reshape(off.shape[0], -1).max(axis=1)
     return np.asarray(np.where(np.isnan(size), np.inf, size))
 
@@ -175,7 +175,7 @@ def ways_of(cells: Sequence[tuple[float, float, float, float, float]]) -> Ways:
 
 
 def fits(task: Task, ways: Ways) -> BoolArray:
-    """Mask of the candidates whose firing time lies between the earliest and the latest possible one."""
+    """Mask of the candidates whose firing time lies between the earliest and the latest possible time."""
     first, last = task.earliest(ways.delay, ways.brake), ways.period + task.latest(ways.width)
     return np.asarray((ways.fired >= first - _ROUNDING) & (ways.fired <= last + _ROUNDING))
 

@@ -139,5 +139,5 @@ class Waveform(BaseModel):
         return Supply()
 
     def content(self) -> dict[str, FloatArray]:
-        """Return the arrays that identify the waveform besides its fields; empty unless it holds samples."""
+        """Return the arrays that identify the waveform besides its fields, e.g. samples."""
         return {}

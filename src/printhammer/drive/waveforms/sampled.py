@@ -164,7 +164,7 @@ class Sampled(Waveform):
         interpolation: Interpolation = "pchip",
         file: str = "",
     ) -> Self:
-        """Create a sampled waveform from arrays, SI; `file` is stored as its name only."""
+        """Create a sampled waveform from arrays, SI; of the path `file`, only the file name is stored."""
         record = checked(times, values, quantity, "sampled waveform")
         fields = {"file": file, "interpolation": interpolation}
         return cls.model_validate(fields, context={"record": record})

@@ -49,7 +49,7 @@ def eight_slot_patterns() -> BoolArray:
 
 @cache
 def de_bruijn(order: int = SLOTS) -> BoolArray:
-    """Return a binary de Bruijn cycle: read cyclically, it contains every word of `order` slots exactly once.
+    """Return a binary de Bruijn cycle, which contains every word of `order` slots exactly once.
 
     The cycle is the lexicographically smallest one: the concatenation of the Lyndon words whose length
     divides the order (H. Fredricksen and J. Maiorana, Discrete Math. 23 (1978) 207). The order is 1 to 16,
@@ -141,7 +141,7 @@ class OpenLoop:
 def checked_drives(
     strategy: Strategy, hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float
 ) -> Sequence[Drive]:
-    """Call a strategy and check its drives.
+    """Call a strategy and check that each drive has one firing per requested dot.
 
     Raises
     ------
@@ -181,7 +181,7 @@ KINDS: Final = get_args(Kind)
 
 
 class LongPattern(NamedTuple):
-    """A long test pattern: its kind, the slots of its dots, and the first slot that is evaluated."""
+    """Long test pattern: its kind, the slots with a dot, and the first slot that is evaluated."""
 
     kind: Kind
     slots: tuple[int, ...]

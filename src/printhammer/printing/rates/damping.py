@@ -1,4 +1,4 @@
-"""The damping study: safe rate and settling with other backstop and pack materials.
+"""The damping study: safe rate and settling with replaced backstop and pack materials.
 
 "Passive damping methods should be improved, probably requiring a breakthrough in materials", F. Hendriks, IBM
 J. Res. Develop. 27 (1983), discussion. The study replaces one material at a time at constant print force: the
@@ -38,7 +38,7 @@ from printhammer.run.effort import DISPLAY, Effort, Keywords, computation
 from printhammer.support.arrays import FloatArray, TextArray
 
 KINDS: Final = ("as it is", "hard", "elastomer", "pack")
-"""Kinds of material: as built, hard backstop with other constants, elastomer backstop, or other pack."""
+"""Kinds of material: as built, hard backstop with changed constants, elastomer backstop, changed pack."""
 
 STIFFNESSES: Final = (1.0 / 9.0, 1.0 / 3.0, 3.0)
 DAMPINGS: Final = (0.25, 0.5, 2.0, 4.0, 16.0)
@@ -137,7 +137,7 @@ _ROUNDS: Final = 5  # Number of refinements
 
 
 class DampingStudy(Result):
-    """Safe rate and settling of a hammer with other backstop and pack materials, at the same print force.
+    """Safe rate and settling of a hammer with replaced backstop and pack materials, at equal print force.
 
     The numbers are NaN unless `status` is "ok" or "current limit".
     """

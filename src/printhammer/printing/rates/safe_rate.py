@@ -91,7 +91,7 @@ class Failure(Declared):
 
     @property
     def text(self) -> str:
-        """The failure in one sentence: rate, pattern, dot and fault."""
+        """Description of the failure in one sentence: rate, pattern, dot and fault."""
         where = {
             "from rest": f"pattern {self.pattern}: its last dot",
             "cycle": f"the last dot in the cycle after {self.pattern[:-1]}",
@@ -324,7 +324,7 @@ def grid_of(
     step: float | str | None,
     spacing: float = STEP,
 ) -> tuple[FloatArray, float]:
-    """Return a grid of rates and its step, Hz; arguments that are None take the default of the device.
+    """Return a grid of rates and the grid step, Hz; None stands for the default of the device.
 
     `spacing` is the default step for the paper's hammer, Hz.
     """
