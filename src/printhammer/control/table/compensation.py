@@ -70,7 +70,7 @@ ANY_UNIT: Final = "any"
 
 
 class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".nc", ".zarr", ".parquet")):
-    """Pulse width and advance as a function of the last gaps: one row per rate, one column per history.
+    """Pulse width and advance as a function of the last gaps between dots: rows by rate, columns by history.
 
     A dot with history h is fired `advance` before its slot, with a pulse of `width`. In the gap before the
     dot, `brake_delay` after the slot of the preceding dot, a brake pulse of `brake_width` catches the

@@ -241,7 +241,7 @@ def brake_of(pulse: Waveform, width: float) -> Waveform:
 
 
 class Pulses(NamedTuple):
-    """Pulses of one pattern: arrays of shape (dots,), s.
+    """Times and widths of the pulses of one pattern, s: arrays of shape (dots,).
 
     Slot times `due`, `advance`, firing times `fired`, and `width` of the print pulses; of the brake pulses
     that follow, the width `braked`, 0 for none, and the `offset` from the firing.
@@ -256,7 +256,7 @@ class Pulses(NamedTuple):
 
 
 def pulses_of(settings: Settings, gaps: int, reach: int, slots: Sequence[int], rate: float) -> Pulses:
-    """Compute the pulses of a pattern from the settings at a rate, Hz."""
+    """Compute the pulses of a pattern from the table settings at a slot rate, Hz."""
     numbers = histories_of(slots, gaps, reach)
     here, after = numbers[:-1], numbers[1:]
     due, advance = slot_times(slots, rate), settings.advance[here]

@@ -35,7 +35,7 @@ PERTURBATIONS: Final = (
     *(Perturbation(magnet=share) for share in (0.01, -0.01)),
     *(Perturbation(damping=share) for share in (0.2, -0.2)),
 )
-"""Default perturbations of the compared hammers: supply, wire travel, forms, drift of magnet and damping."""
+"""Default perturbations of the compared hammers: supply, wire travel, paper forms, drift of magnet and damping."""
 
 STRATEGIES: Final = ("open loop", "table")
 
@@ -257,7 +257,7 @@ def _is_applicable(hammer: Hammer, by: Perturbation) -> bool:
 
 
 def _growth(driven: Sequence[Hammer], rate: float, strategy: Strategy, effort: Effort) -> FloatArray:
-    """Compute the largest multiplier of rows with a dot in every or every second slot, shape (hammers,)."""
+    """Compute the largest multiplier of rows of dots in every or every second slot, shape (hammers,)."""
     rates = [rate] * len(driven)
     each = np.array([multipliers(driven, rates, strategy, effort, step) for step in (1, 2)])
     largest = np.nan_to_num(np.abs(each), nan=-1.0).argmax(axis=0)

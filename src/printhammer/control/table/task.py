@@ -100,7 +100,7 @@ class Task:
     barred: tuple[tuple[float, float, float], ...] = ()
     """Period, delay and width of brake pulses, s, of candidates that failed in a tuned table."""
     located: bool = False
-    """Whether the fixed points of all rows are located, even of rows that look good after two dots."""
+    """Whether the fixed points of all rows of dots are located, even of rows that look good after two dots."""
     mean_square: bool = False
     """Whether the cost of a candidate is the RMS over all hammers instead of the worst case."""
 
@@ -122,7 +122,7 @@ class Task:
 
     @property
     def brake_from(self) -> float:
-        """Earliest time of a brake pulse after the slot of the preceding dot, s.
+        """Earliest time of a brake pulse, s, measured from the slot of the preceding dot.
 
         By then the armature has left the pack and the print pulse has decayed, even if it is late or wide by
         `_WIDE`.
@@ -140,7 +140,7 @@ class Task:
         return max(_TAIL, FLIGHTS * self.single.nominal.flight_time, _CONTACT * self.single.left)
 
     def earliest(self, delay: FloatArray, brake: FloatArray) -> FloatArray:
-        """Return the earliest firing time after the slot of the preceding dot, s.
+        """Return the earliest firing time, s, measured from the slot of the preceding dot.
 
         By then the armature has left the pack, so that no dot uses energy returned by the pack of the
         preceding dot, and a brake pulse has decayed so far that the current stays within its limit.
@@ -154,7 +154,7 @@ class Task:
     def deviations(
         self, hammer: Hammer, drives: Sequence[Drive], slots: FloatArray, ends: FloatArray
     ) -> tuple[FloatArray, BoolArray]:
-        """Simulate drives, and compare all dots with the single-pulse dot.
+        """Simulate drives; return the deviations of all dots from the single-pulse dot, and a mask of faults.
 
         The drives have a firing for each of `slots` (drives, dots), the slot times, s, NaN-padded; a
         simulation continues for `tail` after `ends` (drives,), s.

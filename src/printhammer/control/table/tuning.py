@@ -120,7 +120,7 @@ SPREAD: Final = (
 # Deviation, as a fraction of the limits, up to which a rate is kept in an automatic grid
 _USABLE: Final = 0.9
 _GAP: Final = 6
-"""Largest number of successive unusable rates that are tuned again; arbitrary: each takes some seconds."""
+"""Largest number of successive unusable rates that are tuned again; arbitrary: a rate takes some seconds."""
 _TRIES: Final = 4  # Maximum number of times to search a rate again, without the candidates that failed
 _POOR: Final = 0.5  # Deviation, as a fraction of the limits, above which a requested rate is tuned again
 # Offsets of additional periods at which candidates are then searched, s
@@ -325,7 +325,7 @@ def _tune_again(draft: Draft, poor: IntArray) -> None:
 
 
 def _failed_brakes(draft: Draft) -> tuple[tuple[float, float, float], ...]:
-    """Return period, delay and width of the brake pulses, s, of the candidates whose rows failed."""
+    """Return period, delay and width of the brake pulses, s, of the candidates whose rows of dots failed."""
     task, barred = draft.task, []
     for gap in range(1, task.reach + 1):
         columns = [number_of(each, task.reach) for each in histories(task.gaps, task.reach) if each[0] == gap]

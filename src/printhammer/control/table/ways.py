@@ -89,7 +89,7 @@ def changes(
     most: FloatArray,
     longest: float = LONGEST_STEP,
 ) -> FloatArray:
-    """Compute a Levenberg-Marquardt step, shape (dots, 2), for two times, s, with bounds on the second.
+    """Compute a Levenberg-Marquardt step in firing time and width, s, shape (dots, 2), with width bounds.
 
     `slopes`, shape (dots, deviations, 2), are the derivatives of the deviations `off`, shape (dots,
     deviations), with respect to firing time, or advance, and width, 1/s. The change of width, s, is clipped
@@ -122,7 +122,7 @@ _STEPS: Final = (1e-6, 0.5e-6)  # Finite-difference steps of firing time and wid
 _RIGHT: Final = 0.02
 _WRONG: Final = 1.0  # Additional cost of a candidate that is not a solution, so that solutions rank first
 STABLE: Final = 0.97
-"""Largest absolute multiplier, from dot to dot, of an admissible row: inside the unit circle, with a margin
+"""Largest absolute multiplier, from dot to dot, of an admissible row of dots: inside the unit circle, with a margin
 for interpolation and timer ticks."""
 
 _FAR_OFF: Final = 5.0  # Deviation, as a fraction of the limits, at which an RMS term is cut off
