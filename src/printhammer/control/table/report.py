@@ -35,7 +35,7 @@ PERTURBATIONS: Final = (
     *(Perturbation(magnet=share) for share in (0.01, -0.01)),
     *(Perturbation(damping=share) for share in (0.2, -0.2)),
 )
-"""Default perturbations of the compared hammers: supply, wire travel, paper forms, drift of magnet and damping."""
+"""Default perturbations of the hammers: supply, wire travel, paper forms, drift of magnet and damping."""
 
 STRATEGIES: Final = ("open loop", "table")
 

@@ -100,7 +100,7 @@ class Task:
     barred: tuple[tuple[float, float, float], ...] = ()
     """Period, delay and width of brake pulses, s, of candidates that failed in a tuned table."""
     located: bool = False
-    """Whether the fixed points of all rows of dots are located, even of rows that look good after two dots."""
+    """Whether to locate the fixed points of all rows of dots, even of rows that look good after two dots."""
     mean_square: bool = False
     """Whether the cost of a candidate is the RMS over all hammers instead of the worst case."""
 

@@ -122,8 +122,8 @@ _STEPS: Final = (1e-6, 0.5e-6)  # Finite-difference steps of firing time and wid
 _RIGHT: Final = 0.02
 _WRONG: Final = 1.0  # Additional cost of a candidate that is not a solution, so that solutions rank first
 STABLE: Final = 0.97
-"""Largest absolute multiplier, from dot to dot, of an admissible row of dots: inside the unit circle, with a margin
-for interpolation and timer ticks."""
+"""Largest absolute multiplier, from dot to dot, of an admissible row of dots: inside the unit circle,
+with a margin for interpolation and timer ticks."""
 
 _FAR_OFF: Final = 5.0  # Deviation, as a fraction of the limits, at which an RMS term is cut off
 _ROUNDING: Final = 1e-12  # Tolerance that includes the ends of a range of firing times, s
