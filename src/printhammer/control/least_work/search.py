@@ -133,15 +133,15 @@ def sobol(dimensions: int, count: int) -> FloatArray:
 PRINTING_SHARES, LANDING_SHARES = 5, 4  # Number of parameters of a profile, each in [0, 1]
 _SPREAD: Final = 512  # Number of Sobol profiles
 _KEPT: Final = 16  # Number of profiles refined
-_CLOUD: Final = 32  # Number of points in a cloud
-_MOVES: Final = 8  # Number of times the cloud is moved
+_CLOUD: Final = 32  # Number of trial points of the local search (the cloud)
+_MOVES: Final = 8  # Number of steps of the local search
 _REACH, _SHRINKS = 0.25, 0.7  # Half-width of the first cloud, and factor on the half-width per move
 
 
 def printing_profile(
     shares: FloatArray, largest: float, duration: float, arrival: float, nodes: int
 ) -> FloatArray:
-    """Return currents, A, shape (n, nodes), that brake, wait and throw, from parameters in [0, 1].
+    """Return currents, A, shape (n, nodes), that brake, hold and throw the armature, from parameters in [0, 1].
 
     `shares`, shape (n, `PRINTING_SHARES`), are the parameters: three current levels and two switching times.
     `largest` is the current limit, A; the slot lasts `duration`, and its dot is due at `arrival`, both in s.

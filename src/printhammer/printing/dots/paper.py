@@ -144,7 +144,7 @@ class PiecewiseMotion:
 
     @property
     def status(self) -> str:
-        """Status of the last segment."""
+        """Simulation status of the last segment."""
         return self._pieces[-1].status
 
     @property
@@ -250,7 +250,7 @@ def simulate_pieces(
 
 
 def _merge(first: Contact, then: Contact) -> Contact:
-    """Merge the two pieces of a contact that was split between segments."""
+    """Merge the two pieces of a contact that was split between two segments."""
     higher = then if then.depth > first.depth else first
     return replace(
         first,

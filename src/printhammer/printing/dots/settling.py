@@ -157,7 +157,7 @@ def rebounds(motion: Motion, position: float) -> list[Rebound]:
 
 
 def settled_from(away: BoolArray) -> int:
-    """Return the index of the first sample after the last True in a mask of samples away from rest."""
+    """Return the index from which on all samples are at rest, from the mask of samples away from rest."""
     places = np.flatnonzero(away)
     return int(places[-1]) + 1 if places.size else 0
 
