@@ -141,7 +141,7 @@ _REACH, _SHRINKS = 0.25, 0.7  # Half-width of the first cloud, and factor on the
 def printing_profile(
     shares: FloatArray, largest: float, duration: float, arrival: float, nodes: int
 ) -> FloatArray:
-    """Return currents, A, shape (n, nodes), that brake, hold and throw the armature, from parameters in [0, 1].
+    """Return currents, A, shape (n, nodes), that brake, hold and throw the armature; parameters in [0, 1].
 
     `shares`, shape (n, `PRINTING_SHARES`), are the parameters: three current levels and two switching times.
     `largest` is the current limit, A; the slot lasts `duration`, and its dot is due at `arrival`, both in s.
