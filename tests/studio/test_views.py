@@ -130,3 +130,19 @@ def test_a_page_that_becomes_wide_or_narrow_shows_what_is_chosen(page: Page) -> 
     page.wait(f"{shown}.join() === 'view-strobe'")
     page.size(1440, 900)
     page.wait(f"{shown}.length === 4 && {shown}.includes('view-strobe')")
+
+
+def test_a_state_that_follows_another_is_marked_while_it_takes_long(page: Page) -> None:
+    page.run(
+        "{ const { accept } = window.studio; let first = true; window.held = [];"
+        " window.studio.accept = (frame) => { if (frame.kind !== 'motion' || first) accept(frame);"
+        " else window.held.push(() => accept(frame));"
+        " if (frame.kind === 'motion') first = false; };"
+        f" {STUDIO}.store.set({{ rate: 900 }}); {STUDIO}.store.set({{ rate: 950 }}); }} 1"
+    )
+    page.wait("window.held.length === 1")
+    page.wait("document.querySelector('.view-motion.outdated') !== null")
+    assert page.run(f"{STUDIO}.frames.motion.fired[1]") == pytest.approx(1 / 900)
+    page.run("window.held[0](); 1")
+    page.wait("!document.querySelector('.view-motion.outdated')")
+    assert page.run(f"{STUDIO}.frames.motion.fired[1]") == pytest.approx(1 / 950)

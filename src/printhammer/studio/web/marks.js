@@ -35,10 +35,14 @@ export function marksFor(panel) {
   }
   const all = () => [...ROLES.curves, ...OWN];
   let refused = 0;
+  let latest = 0; // the number of the newest state that was sent
 
   return {
     /** A state is on its way. */
-    sent: () => mark(all(), "being computed for what is set now"),
+    sent: (serial) => {
+      latest = serial;
+      mark(all(), "being computed for what is set now");
+    },
     /** Nothing is computed, and why; what still comes of states up to a number is outdated too. */
     none(why, serial = 0) {
       refused = serial;
@@ -53,7 +57,8 @@ export function marksFor(panel) {
     },
     /** A frame has come. */
     arrived(frame) {
-      if (frame.serial <= refused) return;
+      // Dots follow their curves, while a newer state may be on its way.
+      if (frame.serial <= refused || (frame.kind === "dots" && frame.serial < latest)) return;
       if (frame.kind !== "motion") { clear(OF_FRAMES[frame.kind] ?? []); return; }
       clear(CURVES);
       for (const view of OWN) {

@@ -55,7 +55,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     const now = studio.changedAt ?? performance.now();
     studio.sentAt.set(message("state", { state: bare(studio.store.state) }), now);
     studio.changedAt = null;
-    marks.sent();
+    marks.sent(studio.serial);
     for (const serial of studio.sentAt.keys()) if (serial < studio.serial - 64) studio.sentAt.delete(serial);
   };
 
@@ -258,16 +258,19 @@ export function mount(element, send, address = { read: () => "", write: () => {}
       asked.delete(frame.serial);
       return;
     }
-    if (frame.kind === "motion" || frame.kind === "refusal") {
-      studio.busy = false;
-      if (studio.stale) studio.sendState();
-    }
     if (frame.kind === "refusal") {
+      studio.busy = false;
       studio.say(frame.reason, true);
-      if (!studio.busy) marks.none(`not computed: ${frame.reason}`, frame.serial);
+      if (studio.stale) studio.sendState();
+      else marks.none(`not computed: ${frame.reason}`, frame.serial);
       return;
     }
     marks.arrived(frame);
+    if (frame.kind === "motion") {
+      studio.busy = false;
+      // What has arrived is marked anew where a newer state follows it.
+      if (studio.stale) studio.sendState();
+    }
     studio.frames[frame.kind] = frame;
     if (frame.kind === "motion") {
       const text = frame.message || `${frame.steps} steps, ${frame.status}`;
