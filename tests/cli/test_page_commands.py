@@ -56,7 +56,6 @@ FEWER = {
     "--yield 64": "--yield 2",
     "--yield 32": "--yield 2 --first 700Hz --step 100Hz",
     "--damping --step 50Hz": "--damping --first 700Hz --step 200Hz",
-    "--safe-rate --table table.csv": "--safe-rate --table table.csv --first 700Hz --step 100Hz",
     "--safe-rate\n": "--safe-rate --first 700Hz --step 50Hz\n",
 }
 # Pages all of whose commands together take a few seconds with compiled kernels.
