@@ -162,6 +162,35 @@ def test_rates_that_failed_are_counted_in_the_map(page: Page) -> None:
 
 
 @pytest.mark.slow
+def test_a_page_is_saved_with_what_is_set_and_a_state_comes_back_as_a_file(
+    page: Page, opened_browser: Any, tmp_path: Path
+) -> None:
+    page.run(HELPERS)
+    page.run("window.studio.studio.store.set({ rate: 925, line: '</script><b>' }); 1")
+    settled(page, "state.rate === 925")
+    state_file = saved(page, "select.out", "state, file")
+    page.run(
+        "helpers.save('select.out', ''); [...document.querySelectorAll('button')]"
+        ".find((each) => each.textContent === 'save as a page').click()"
+    )
+    path = tmp_path / "studio-page.html"
+    path.write_text(page.wait("window.kept"), "utf-8")
+    shown = opened_browser()
+    shown.open(path.as_uri())
+    shown.wait("!!window.studio?.studio?.frames.motion")
+    assert (state(shown)["rate"], state(shown)["line"]) == (925, "</script><b>")
+    shown.run("window.studio.studio.store.set({ rate: 1000 }); 1")
+    shown.wait("window.studio.studio.frames.motion.fired[1] === 1e-3")
+    shown.run(HELPERS)
+    drop(shown, "state.json", state_file)
+    settled(shown, "state.rate === 925")
+    drop(shown, "bad.json", "{")
+    shown.wait("document.querySelector('.status').textContent.includes('bad.json: expected a state file')")
+    assert shown.complaints == page.complaints == []
+    shown.call("Page.close")
+
+
+@pytest.mark.slow
 def test_a_rail_in_the_place_of_the_current_and_back(page: Page) -> None:
     """Drivers, decay path and temperature are controls, both curves are there, and undo leads back."""
     page.run(HELPERS)

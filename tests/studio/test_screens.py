@@ -58,7 +58,7 @@ def test_nothing_is_cut_or_overlaps(page: Page, tmp_path: Path, ratio: float) ->
 def test_a_picture_is_the_same_at_every_pixel_ratio(page: Page, tmp_path: Path) -> None:
     import numpy as np
 
-    for view in ("motion", "forces", "map", "phase"):
+    for view in ("motion", "map", "line"):
         seen = []
         for ratio in RATIOS:
             resized(page, 1440, 900, ratio)
@@ -69,17 +69,17 @@ def test_a_picture_is_the_same_at_every_pixel_ratio(page: Page, tmp_path: Path) 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("width", [1024, 670, 390])
+@pytest.mark.parametrize("width", [1024, 670])
 def test_views_stack_on_small_screens(page: Page, width: int) -> None:
     resized(page, width, 800, 1.0)
     boxes = page.run(
-        "[...document.querySelectorAll('.panel')].map((panel) => panel.getBoundingClientRect().toJSON())"
+        "[...document.querySelectorAll('.panel')].filter((panel) => panel.checkVisibility())"
+        ".map((panel) => panel.getBoundingClientRect().toJSON())"
     )
     assert {box["left"] for box in boxes} == {boxes[0]["left"]}
     assert all(box["width"] > 0.65 * width for box in boxes)
     tops = sorted((box["top"], box["bottom"]) for box in boxes)
     assert all(upper[1] <= lower[0] for upper, lower in itertools.pairwise(tops))
-    assert page.run("document.documentElement.scrollHeight > 2000")
 
 
 @pytest.mark.slow
@@ -102,7 +102,7 @@ def test_forced_colours_leave_everything_to_be_seen(page: Page, tmp_path: Path) 
     page.run(HELPERS)
     page.run(DRAWN)
     page.picture(tmp_path / "forced.png")
-    for view in ("motion", "forces", "phase", "map", "line"):
+    for view in ("motion", "map", "line"):
         assert page.run(f"helpers.inked({view!r})") > 3, view
     colours = (
         "((each) => { const style = getComputedStyle(each); return [style.backgroundColor, style.color]; })"
