@@ -48,7 +48,7 @@ _STEP: Final = 1e-4
 """Relative step size of the finite differences: well above the integration error."""
 
 _SHORT: Final = 0.05
-"""Step of the finite differences with respect to times, in sampling intervals."""
+"""Finite-difference step of a parameter that is a time, in sampling intervals."""
 
 _REACH: Final = 1e3
 """Largest factor between a fitted constant and its initial guess; arbitrary."""
@@ -60,7 +60,7 @@ _SPARE: Final = 4
 """Smallest number of rows in excess of parameters for which standard errors are computed; arbitrary."""
 
 _EXACT: Final = 1e-6
-"""Residual, as a fraction of the current, below which integration errors dominate and no law is tested."""
+"""Residual, as a fraction of the current, below which integration errors dominate and the test is omitted."""
 
 _COARSE: Final = 1.5
 """Ratio of resolution to residual standard deviation above which quantisation dominates the residuals."""
@@ -87,7 +87,7 @@ def fit_coil(
     robust: bool = True,
     columns: str | None = None,
 ) -> Fit:
-    """Fit constants of the circuit to records of the current, one shot each.
+    """Fit constants of the coil circuit to records of the coil current, each of a single shot.
 
     A probe error is a number or a text with a unit; "1 +- 0.01", a value with its standard deviation, which
     enters as a prior; or "fit". Errors that are not stated are assumed absent, and the law is tested against
@@ -200,7 +200,7 @@ class CurrentLaw:
         self._slopes: dict[bytes, FloatArray] = {}
 
     def space(self, start: FloatArray) -> Parameters:
-        """Return initial values, bounds, prior and sizes of all parameters; `start` holds the constants."""
+        """Return initial guess, bounds, prior and scales of all parameters; `start` holds the constants."""
         longest = max(float(trace.times[-1]) for trace in self.traces)
         peak = max(float(np.abs(trace.table.values["current"]).max()) for trace in self.traces)
         ends = [bounds_of(error, longest) for error in self.fitted]
@@ -246,7 +246,7 @@ class CurrentLaw:
         return np.concatenate(shown)
 
     def missing(self, p: FloatArray) -> dict[str, FloatArray]:
-        """Return d(current)/d(error) of each undeclared probe error, keyed by the advice on the error."""
+        """Return the derivatives of the currents with respect to undeclared probe errors, keyed by advice."""
         short = _SHORT * self.step
         steps = {"offset": 1.0, "gain": 1.0, "delay": short, "time constant": short}
         unstated = [name for name in steps if name not in [error.name for error in self.errors]]
@@ -293,7 +293,7 @@ class CurrentLaw:
 
 
 class Averaged:
-    """A law averaged over quantisation plateaus, for readings whose step exceeds their noise.
+    """Law averaged over quantisation plateaus, for readings whose quantisation step exceeds the noise.
 
     Rows on the same plateau share their rounding error. Where the law crosses the step the rounding averages
     out; where the law stays on the step, the error is up to half a step.
@@ -337,12 +337,12 @@ class Averaged:
 
 
 def _within(p: FloatArray, space: Parameters) -> FloatArray:
-    """Return the initial guess of a second fit: the first result or, where there is a prior, its mean."""
+    """Return the initial guess of a second fit: prior means where they exist, else the first estimates."""
     return np.where(np.isfinite(space.deviation), space.start, np.clip(p, space.low, space.high))
 
 
 def _kept(known: dict[bytes, FloatArray], p: FloatArray, made: Callable[[], FloatArray]) -> FloatArray:
-    """Return the value at parameters `p`, cached since a fit evaluates the same point repeatedly."""
+    """Return the cached result of `made` at parameters `p`, since a fit evaluates a point repeatedly."""
     key = p.tobytes()
     if key not in known:
         known[key] = made()

@@ -1,4 +1,4 @@
-"""Coil current under a voltage as a current probe shows it: simulation, and reading of records.
+"""Current of a voltage-driven coil as shown by a current probe: simulation, and reading of records.
 
 A record has the columns ``time`` and ``current``, optionally ``voltage``; one shot per file. The armature is
 free or locked. The probe is a first-order low-pass; the current is interpolated linearly between points at

@@ -87,7 +87,7 @@ def fit(
 
 
 def _magnet_and_spring(paths: list[Any]) -> tuple[list[Any], Any]:
-    """Sort two tables: first the one with currents, then the one without currents."""
+    """Sort two force tables: the table with coil currents first, the table without currents second."""
     from printhammer.support.tables.readings import read_table
 
     columns = {"displacement": "m", "force": "N"}
@@ -126,7 +126,7 @@ _TAKEN: Final = {
     "pack": ("thickness", "pack.thickness"),
     "backstop": ("stiffness", "backstop.stiffness"),
 }
-"""Known constant that each static fit requires: name of its option, and its key in the hammer."""
+"""Known constant that each static fit requires: option name, and key in the hammer file."""
 
 
 def _known(hammer: Hammer | None, key: str) -> float | None:

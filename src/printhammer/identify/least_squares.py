@@ -35,7 +35,7 @@ _ALONE: Final = 0.9
 """Leverage above which a row alone determines a parameter."""
 
 _HOLDING: Final = 4.0
-"""Variance ratio without and with a set of rows above which the rows determine a parameter; arbitrary."""
+"""Increase of a parameter's variance by omitting rows above which they determine it; arbitrary."""
 
 _AT_BOUND: Final = 1e-6
 """Distance from a bound, as a fraction of the parameter, below which the parameter counts as at the bound."""
@@ -204,7 +204,7 @@ def _at_bound(solution: Solution) -> BoolArray:
 
 
 def _next_held(solution: Solution, data: FloatArray) -> int | None:
-    """Return the index of the parameter to hold next; None if the data determine all free parameters."""
+    """Return the index of the next parameter to fix; None if the data determine all free parameters."""
     space, free = solution.parameters, np.flatnonzero(solution.free)
     bound = [k for k in free.tolist() if _at_bound(solution)[k]]
     if bound:
@@ -227,7 +227,7 @@ def _next_held(solution: Solution, data: FloatArray) -> int | None:
 
 
 def _held_at(law: Law, data: FloatArray, solution: Solution, free: BoolArray, held: int) -> FloatArray:
-    """Hold a parameter at its rest value, or at its fit if the data exclude the rest value; refit."""
+    """Fix a parameter at its default, or at its estimate if the data exclude the default, and refit."""
     p, space = solution.p.copy(), solution.parameters
     if _at_bound(solution)[held]:
         return p

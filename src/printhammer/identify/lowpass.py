@@ -64,7 +64,7 @@ def lowpass_motion(times: FloatArray, x: FloatArray, v: FloatArray, tau: float) 
 
 
 def lowpass_lines(times: FloatArray, values: FloatArray, tau: float) -> FloatArray:
-    """Low-pass filter a piecewise linear signal, sampled at ascending times, s, shape (n,).
+    """Low-pass filter a piecewise linear signal, given by values at ascending times, s, shape (n,).
 
     At the first time the output equals the input.
     """

@@ -39,13 +39,13 @@ from printhammer.run.window import wait_of
 from printhammer.support.arrays import FloatArray
 
 DISPLACEMENTS: Final = 31
-"""Default number of displacements, from the backstop to the platen."""
+"""Default number of displacements in a static force table, evenly spaced from backstop to platen."""
 
 CURRENTS: Final = 6
-"""Default number of currents."""
+"""Default number of coil currents in a static force table, evenly spaced from zero."""
 
 HIGHEST_CURRENT: Final = 1.25
-"""Default highest current, as a multiple of the waveform's peak."""
+"""Default highest coil current, as a multiple of the waveform's peak."""
 
 PEAKS: Final = (0.3, 0.45, 0.6)
 """Default peak indentations of the load cycles, as fractions of the pack thickness.
@@ -57,7 +57,7 @@ BRANCH_POINTS: Final = 30
 """Default number of readings per branch of a load cycle."""
 
 SPEEDS: Final = (0.1, 2.0, 40)
-"""Default slowest and fastest impact on the backstop, m/s, and number of impacts."""
+"""Default lowest and highest impact speed on the backstop, m/s, and number of impacts."""
 
 BEFORE: Final = 100e-6
 """Default time between the start of the record and the firing, s."""
@@ -96,7 +96,7 @@ def magnet(
     displacements: npt.ArrayLike | None = None,
     currents: npt.ArrayLike | None = None,
 ) -> Bench:
-    """Measure the force with the armature held at displacements, m, at coil currents, A."""
+    """Measure the static force on the armature at given displacements, m, and coil currents, A."""
     if hammer.magnet is None:
         raise InputError(
             f"{hammer.path}: the hammer has no [magnet]",
@@ -131,7 +131,7 @@ def spring(
     *,
     displacements: npt.ArrayLike | None = None,
 ) -> Bench:
-    """Measure the spring force with the armature held at displacements, m, and the magnet removed."""
+    """Measure the static spring force at given displacements of the armature, m, with the magnet removed."""
     if hammer.spring is None:
         raise InputError(
             f"{hammer.path}: the hammer has no [spring]",
@@ -155,7 +155,7 @@ def pack(
     peaks: npt.ArrayLike | None = None,
     points: int = BRANCH_POINTS,
 ) -> Bench:
-    """Measure load cycles of the pack to peak indentations, m, each on fresh paper."""
+    """Measure load cycles of the pack up to given peak indentations, m, each cycle on fresh paper."""
     if hammer.pack is None:
         raise InputError(
             f"{hammer.path}: the hammer has no [pack]",
@@ -377,7 +377,7 @@ def _peaks(hammer: Hammer) -> FloatArray:
 
 
 def _rebound(bare: Hammer, speed: float) -> float:
-    """Compute the speed, m/s, at which an armature subject to no other force leaves the backstop."""
+    """Compute the rebound speed, m/s, of an armature thrown at the backstop, without any other force."""
     part = bare.backstop
     if isinstance(part, HertzBackstop):
         from scipy.optimize import brentq

@@ -85,7 +85,7 @@ class Measurement(Result):
         return f"measurement of the {self.kind} of {self.hammer.name}"
 
     def entries(self) -> Entries:
-        """Return the columns: readings, words, true values such as `true_force`, and the mask `wrong`."""
+        """Return the columns: readings, texts, true values such as `true_force`, and outlier mask `wrong`."""
         entries: Entries = {}
         for name, readings in self.values.items():
             key, si = name.replace(" ", "_"), SI[name]

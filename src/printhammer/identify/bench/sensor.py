@@ -79,7 +79,7 @@ class Channel(Declared):
             )
 
     def readings(self, true: FloatArray, normal: FloatArray) -> FloatArray:
-        """Simulate readings of true values, SI, with standard normal numbers for the noise, shape (n,)."""
+        """Simulate sensor readings, SI, from true values and standard normal random numbers, shape (n,)."""
         shown = true + self.offset.at(true) + self.noise.at(true) * normal
         return self.rounded(shown, true)
 
@@ -154,7 +154,7 @@ def full_scale(true: FloatArray) -> float:
 
 
 def wrong_rows(share: float, true: FloatArray, rng: np.random.Generator) -> tuple[IntArray, FloatArray]:
-    """Draw the rows with gross errors, ascending, and the errors, SI.
+    """Draw the indices of the rows with gross errors, ascending, and their gross errors, SI.
 
     The errors are normal, with a standard deviation of a tenth of full scale.
     """
@@ -167,7 +167,7 @@ NONE: Final = "none"
 """Text for an unlimited bandwidth."""
 
 PARTS: Final = ("noise", "resolution", "offset")
-"""Settings that every measured quantity has."""
+"""Names of the error settings of a measured quantity."""
 
 _OTHERS: Final = ("exact", "sampling_rate", "bandwidth", "outliers")
 

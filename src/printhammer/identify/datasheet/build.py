@@ -47,7 +47,7 @@ class Guess:
 
     value: float
     spread: float
-    """Standard deviation of the logarithm."""
+    """Standard deviation of the natural logarithm of the constant."""
     why: str
 
 

@@ -84,7 +84,7 @@ class DataSheet:
     """Contents of a data sheet."""
 
     where: str
-    """File name, for error messages."""
+    """File name of the data sheet, for error messages."""
     texts: dict[str, str]
     entries: dict[str, Entry]
     """Quantities by key, such as "mass" and "spring.preload"."""
@@ -96,7 +96,7 @@ class DataSheet:
     assumed: frozenset[str]
     """Keys whose values were guessed by the person who transcribed the data sheet."""
     why: dict[str, str] = field(default_factory=dict)
-    """Sources of single keys, by key."""
+    """Sources of individual quantities, by key."""
 
     def si(self, key: str, otherwise: float = math.nan) -> float:
         """Return a quantity of the data sheet in SI, or `otherwise` if it is missing."""

@@ -138,7 +138,7 @@ _REACH: Final = 3.0
 _POINTS: Final = 7
 """Half-width of a profile, in standard errors, and number of its points."""
 _LOST: Final = 1e-7
-"""Relative singular value below which rounding dominates."""
+"""Relative singular value below which rounding errors dominate."""
 _NO_MOTION: Final = "the simulated hammer does not move, so that the records cannot be compared"
 
 
@@ -351,7 +351,7 @@ class GaussNewton:
 
 @dataclass(frozen=True, eq=False)
 class _Weighted:
-    """Linear problem of one step: whitened rows and residuals, outliers, and residual scales."""
+    """Linearised problem of one Gauss-Newton step: whitened rows and residuals, outliers, residual scales."""
 
     design: FloatArray
     residuals: FloatArray

@@ -39,7 +39,7 @@ from printhammer.support.arrays import FloatArray
 _REJECTED: Final = 0.01
 """Significance level below which the F-test rejects the model."""
 _LARGER: Final = 1.1
-"""Largest accepted ratio of residuals to the noise estimate of a record, whose accuracy is limited."""
+"""Largest accepted ratio of RMS residual to estimated noise; allows for the error of the estimate."""
 _DEGREES: Final = 0.22
 """Degrees of freedom per sample of the noise estimate (median of third differences)."""
 _TOLD: Final = 0.05
@@ -48,7 +48,7 @@ _OFF: Final = 5.0  # Standard errors from which a deviation is reported
 
 
 def tested(shots: Sequence[Shot], solution: Solution, count: int) -> tuple[float, str]:
-    """Test the residuals against the noise of the records (F-test); return the p-value and the reason."""
+    """Test the residuals against the noise of the records (F-test); return p-value and rejection reason."""
     from scipy.stats import f
 
     p_value, worst = 1.0, ""

@@ -121,7 +121,7 @@ class Shooting:
     def _variants(
         self, values: FloatArray, derivatives: bool
     ) -> list[tuple[Hammer, float, list[PulseTrain]]]:
-        """Return hammer, rest state and drives at parameter values, then with each parameter perturbed."""
+        """Return hammer, rest position and drives for the nominal and for each perturbed parameter vector."""
         parameters = self.parameters
         count = len(parameters.keys)
         variants = []
@@ -152,7 +152,7 @@ class Shooting:
     def chains(
         self, values: FloatArray, states: Sequence[FloatArray], *, derivatives: bool
     ) -> list[Chain] | None:
-        """Integrate all segments; return None for an invalid hammer or a failed simulation.
+        """Integrate all segments of all shots; return None for an invalid hammer or a failed simulation.
 
         `values` are the parameters, SI; `states` the displacement, m, and velocity, m/s, at the joints of
         each shot, shape (j, 2).

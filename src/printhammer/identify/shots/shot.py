@@ -66,7 +66,7 @@ class Shot(Declared, eq=False):
     )
 
     def touching(self, surface: Surface) -> list[Touch]:
-        """Return the contacts with one surface, without the rest position at the start."""
+        """Return the contacts with the pack or the backstop, except a contact at the start of the record."""
         return [touch for touch in self.touches if touch.surface == surface and touch.first > 0]
 
 
@@ -125,7 +125,7 @@ def read_shot(
 def find_touches(
     t: FloatArray, x: FloatArray, noise: float, hammer: Hammer
 ) -> tuple[list[Touch], FloatArray, float]:
-    """Detect the contacts; return contacts, smoothed record, and the distance above noise, m.
+    """Detect the contacts in a record; return contacts, smoothed record and detection threshold, m.
 
     A contact begins where the smoothed record crosses the surface, and counts if it then goes clearly beyond;
     it ends where the record crosses back, if it then goes clearly away.
@@ -220,7 +220,7 @@ def _state(t: FloatArray, x: FloatArray, row: int, reach: int, noise: float) -> 
 
 
 def stroke_of(hammer: Hammer, x: FloatArray) -> float:
-    """Return the distance from backstop to pack, m; if one is missing, the range of the record."""
+    """Return the distance from backstop to pack, m; if either is missing, the range of the record."""
     if hammer.position is not None and hammer.front is not None:
         return hammer.front - hammer.position
     return float(np.ptp(x)) or 1e-4
@@ -346,7 +346,7 @@ def _fit_waveform(
 
 
 def _starts(t: FloatArray, current: FloatArray, values: dict[str, float], top: float) -> list[FloatArray]:
-    """Return two initial guesses: `values`, and the same with amplitude and width from the record."""
+    """Return two initial guesses: `values`, and `values` with amplitude and width taken from the record."""
     high = t[np.abs(current) > 0.5 * top]
     recorded = dict(values)
     recorded["amplitude"] = top

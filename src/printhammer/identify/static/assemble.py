@@ -45,7 +45,7 @@ _HARD_TO_TELL: Final = 30.0
 def judge(
     solution: Solution, terms: Mapping[str, FloatArray], abscissa: FloatArray, series: IntArray
 ) -> tuple[float, str]:
-    """Test a law against laws with one more term, and its residuals and outliers for runs.
+    """Test a law against laws with one additional term, and test residuals and outliers for runs.
 
     Each term is added to the linearised, weighted fit, and a t-test, with errors and degrees of freedom as in
     the fit, determines whether the term is significant. Two tests examine the residuals in the order of the
@@ -128,7 +128,7 @@ def ratio_p_value(values: FloatArray) -> float:
 
 
 def stretch_p_value(signs: FloatArray) -> float:
-    """Bound the probability that random gross errors are as consecutive as the excluded rows.
+    """Bound the p-value of the longest run of excluded rows, for gross errors at random rows.
 
     `signs` are those of the residuals, 0 for used rows. A run of k excluded rows of one sign begins at any of
     the n rows with probability (1/2)^(k - 1) q^k, with q the fraction of excluded rows. NaN without two
@@ -303,7 +303,7 @@ def assemble(
 
 
 def _unseen(constant: FittedConstant) -> str:
-    """Describe why a constant that must be positive is not: negative, or indistinguishable from zero."""
+    """Describe why an estimate is not significantly positive: negative, or indistinguishable from zero."""
     if constant.interval[1] < 0.0:
         return f"came out negative, {constant.value:.3g} {constant.unit}"
     return "cannot be distinguished from zero"

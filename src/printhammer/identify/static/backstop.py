@@ -34,14 +34,14 @@ _SERIES: Final = (1.0, -2 / 3, 4 / 9, -44 / 135, 104 / 405, -40 / 189, 7648 / 42
 """Coefficients of the power series of y / z in z, derived from the restitution law."""
 
 _SMALL: Final = 0.02
-"""Largest |z| for the power series, which is exact there, whereas the logarithms suffer cancellation."""
+"""Largest |z| at which the power series replaces the logarithms, which suffer cancellation."""
 
 
 def rebound(z: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the coefficient of restitution e = y / z of the damped Hertz contact, and de/dz, for z > -1.
+    """Return the restitution e and de/dz of a damped Hertz contact at normalised impact speed z > -1.
 
-    z = (l/k) v_in and y = (l/k) v_out solve z - ln(1 + z) = -(y + ln(1 - y)), so that dy/dz =
-    z (1 - y) / ((1 + z) y).
+    e = y / z is the coefficient of restitution; z = (l/k) v_in and y = (l/k) v_out solve
+    z - ln(1 + z) = -(y + ln(1 - y)), so that dy/dz = z (1 - y) / ((1 + z) y).
     """
     small = np.abs(z) < _SMALL
     wide = np.where(small, 1.0, z)

@@ -27,10 +27,10 @@ from printhammer.support.tables.readings import Readings, read_table
 from printhammer.units import from_si
 
 _TURN: Final = 0.05
-"""Reversal, as a fraction of the largest indentation, that counts as a change of direction."""
+"""Smallest reversal, as a fraction of the largest indentation, that counts as a change of direction."""
 
 _FALL: Final = 0.05
-"""Fall of the loading force, as a fraction of the largest force, that counts as a decrease."""
+"""Smallest drop of the loading force, as a fraction of the largest force, that counts as a decrease."""
 
 
 class Cycles(Declared, eq=False):
@@ -132,10 +132,10 @@ LOADING, UNLOADING = 2.7, 11.0
 _SPARE: Final = 4  # Smallest number of rows beyond the number of unknowns
 _LOADING_ROWS: Final = 4  # Smallest number of rows of a loading branch
 _MEETS: Final = 0.02
-"""Offset of a turning point, as a fraction of the largest indentation, up to which it is not reported."""
+"""Largest unreported error of a fitted turning point, as a fraction of the largest indentation."""
 
 _FAR: Final = 1.0
-"""Largest absolute logarithm of the ratio of fitted to measured turning point."""
+"""Largest accepted absolute logarithm of the ratio of fitted to measured turning point."""
 
 
 class PackLaw:
@@ -262,7 +262,7 @@ def fit_pack(
 
 
 def _start(law: PackLaw, table: Readings) -> FloatArray:
-    """Return the initial guess; raise `InputError` for too few or negative loading forces in the pack."""
+    """Estimate the initial guess; raise `InputError` for too few or negative loading forces."""
     force, cycles = table.values["force"], law.cycles
     rows = np.flatnonzero(law.inside & ~cycles.unloading)
     if len(rows) < _LOADING_ROWS:
@@ -322,7 +322,7 @@ def _judge(law: PackLaw, data: Data, solution: Solution) -> tuple[float, str]:
 
 
 def _notes(law: PackLaw, table: Readings, solution: Solution) -> list[str]:
-    """Return remarks on missing unloading rows, and on turning points away from the largest indentation."""
+    """Return remarks on missing unloading rows, and on fitted turning points off the largest indentation."""
     if not len(law.turns):
         return ["without rows of unloading the hysteresis of the pack is taken from equation (5), not tested"]
     sentences = []

@@ -41,7 +41,7 @@ _ABSENT_HIGH: Final = ("saturation_flux", "leakage_reach")
 """Constants whose effect vanishes when they are large; the effect of all others vanishes at zero."""
 
 _FACTOR: Final = 4.0
-"""Ratio of force to i^2/2 dL/dg that saturation cannot explain; a force in lbf instead of N gives 4.4."""
+"""Ratio of force to i^2/2 dL/dg beyond what saturation explains; forces in lbf instead of N give 4.4."""
 
 _SPARE: Final = 4
 """Smallest number of rows in excess of parameters for which standard errors are computed; arbitrary."""
@@ -143,7 +143,7 @@ def fit_solenoid(
 def _check_factor(
     path: Path, gap: FloatArray, current: FloatArray, force: FloatArray, linkage: FloatArray
 ) -> None:
-    """Raise `InputError` if the forces are far from the slope of the inductance at the same currents.
+    """Raise `InputError` if the forces differ greatly from i^2/2 dL/dg at the same currents.
 
     Between neighbouring gaps the force is i^2 / 2 times the difference quotient of the inductance; for an
     inductance inversely proportional to the gap, the geometric mean of the two forces equals it exactly.

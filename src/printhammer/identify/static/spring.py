@@ -35,7 +35,7 @@ class SpringLaw:
         return np.column_stack([1.0 - self.travel / p[1], p[0] * self.travel / (p[1] * p[1])])
 
     def variance_columns(self, p: FloatArray) -> FloatArray:  # noqa: ARG002
-        """Return one variance component: along a line, an error in x only adds to the error in the force."""
+        """Return one variance component: for a linear law, errors in x act as force errors of equal size."""
         return np.ones((len(self.travel), 1))
 
 
