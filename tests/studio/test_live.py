@@ -137,7 +137,7 @@ def test_it_opens_with_four_views_and_on_a_phone_with_one(address: str, opened_b
     [
         ("pulses=999&pattern=zzz", "pulses is expected to be a whole number from 1 to 64"),
         ("hammer=no-such", f"{NAME} is shown instead"),
-        ("text=<img src=x onerror=alert(1)>", "opened by `printhammer studio FILE`"),
+        ("text=<img src=x onerror=alert(1)>", "expected a TOML file"),
         ("mass=1", "mass = 1 kg: expected"),
         ("__proto__=5&views=sky", "views is expected to be one of"),
     ],
