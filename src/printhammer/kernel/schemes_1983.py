@@ -190,7 +190,7 @@ def integrate(
 
 
 def drive_value(time: float, table: Any, replace: bool) -> float:
-    """Return the drive at a time, A or N: the sum over all pulses under way, or the latest pulse alone.
+    """Return the drive at a time, A or N: the sum of all active pulses, or the latest pulse alone.
 
     The table holds firing times, first rows of the firings, rows of the waveforms and the number of earlier
     firings.
@@ -322,7 +322,7 @@ def keep(row: Array, time: float, x: float, v: float, peak: float, front: float)
 def write_steps(
     model: Any, steps: Any, reading: int, implicit: bool, moments: Array, at_moments: bool, rows: Array
 ) -> tuple[int, int]:
-    """Write the states at the ends of the steps, or at moments; return their number and the status index."""
+    """Write the states at the step ends, or at requested times; return their number and the status index."""
     packed, (firings, _begins, _segments, fired), (_replace, _is_force, rigid, along), places = model
     front, position, t_end, far = places[1], places[2], places[3], places[4]
     time, place, speed, peak = 0.0, places[5], places[6], places[5]

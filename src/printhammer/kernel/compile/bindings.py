@@ -122,7 +122,7 @@ def _modules_of(function: FunctionType) -> set[str]:
 
 
 def plain_digest(function: Callable[..., Any]) -> str:
-    """Return a digest of a plain function: of its module, of those of its helpers, and of their constants."""
+    """Return a digest of the sources of a plain function: its module, its helpers, and their constants."""
     modules: set[str] = set()
     constants: set[str] = set()
 

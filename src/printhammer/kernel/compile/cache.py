@@ -77,7 +77,7 @@ def _folders() -> Iterator[Path]:
 
 
 def _is_safe(folder: Path) -> bool:
-    """Whether only this user can have written code to the folder; checked for the temporary folder only."""
+    """Whether no other user can write code to the folder; checked for the temporary folder only."""
     if folder != _temporary_folder():
         return True
     try:
@@ -214,7 +214,7 @@ class File:
         return content
 
     def _alone(self) -> AbstractContextManager[None]:
-        """Return a context manager that locks the file; the content may have appeared by then."""
+        """Return a context manager that locks the file; another process may write the content first."""
         return nullcontext() if self._written is None else _alone(self._written / self.name)
 
 
@@ -240,7 +240,7 @@ class Code(File):
         self.kind, self.label, self._is_lowered = kind, label, is_lowered
         self.shipped, self._circuit = shipped, circuit
         self.with_it: tuple[Code, ...] = ()
-        """Other machine code that is often needed after this one, announced in the same message."""
+        """Machine code that is often needed next; announced in the same message."""
         self.is_begun = False
 
     def read(self) -> bytes | None:
@@ -266,7 +266,7 @@ class Code(File):
 
     @property
     def work(self) -> str:
-        """Kind of compilation in the records, with suffixes for a coil circuit and for modules to lower."""
+        """Kind of compilation in the records of compile times, such as "run", with suffixes for variants."""
         variants = {records.CIRCUIT: self._circuit, records.LOWERED: not self._is_lowered()}
         return ", ".join([self.kind, *(name for name, holds in variants.items() if holds)])
 

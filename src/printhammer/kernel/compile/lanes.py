@@ -1,4 +1,4 @@
-"""Kernel for lanes: which laws it supports, and the choices with which its template is linked."""
+"""Vector-lane kernel: the supported force laws, and the compile-time choices of its template."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.laws import Laws
 
 LaneKinds = tuple[int, bool, bool]
-"""Kinds of pieces in the drive: number of exponentials, whether it has a cubic, whether it has a sine."""
+"""Kinds of waveform pieces in the drive: number of exponentials; whether a cubic or a sine occurs."""
 
 
 def suits(laws: Laws) -> bool:
-    """Whether members of an ensemble with these force laws can run in lanes."""
+    """Whether the vector-lane kernel supports the force laws `laws`."""
     choices = _choices(laws)
     return bool(
         not is_interpreted()

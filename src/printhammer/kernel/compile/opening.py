@@ -51,12 +51,12 @@ class _ChoiceType(types.Type):
         super().__init__(f"choice({base})")
 
     def can_convert_to(self, typingctx: Any, other: Any) -> Any:
-        """Return the conversion to another type, as for the base type."""
+        """Return the conversion of a choice to another numba type: that of its base type."""
         conversion = typingctx.can_convert(self.base, other)
         return None if conversion is None else max(conversion, Conversion.safe)
 
     def unify(self, typingctx: Any, other: Any) -> Any:
-        """Return the common type with another type, as for the base type."""
+        """Return the common type of a choice and another numba type: that of its base type."""
         return typingctx.unify_pairs(self.base, other)
 
 
@@ -111,7 +111,7 @@ def _not(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
 
 
 def law(name: str, symbol: str, floats: int) -> Callable[..., float]:
-    """Return the stub of a law, for compiling its callers: constants, then `floats` numbers."""
+    """Return the stub of a law for compiling its callers; arguments: constants, then `floats` numbers."""
     arguments = ", ".join(f"a{i}" for i in range(floats))
     scope: dict[str, Any] = {"__name__": __name__}
     exec(f"def {name}(c, {arguments}):\n    return 0.0\n", scope)

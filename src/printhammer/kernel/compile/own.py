@@ -32,7 +32,7 @@ _OPTIONS: Final[dict[str, Any]] = {
 """Compiler options, the same as in :mod:`printhammer.kernel.compile.compiling`."""
 
 _NO_REASON: Final = ("Failed in", "Resolution failure")
-"""First words of the lines of a typing error that name a pass of the compiler, not the reason."""
+"""First words of lines in a numba typing error that name a compiler pass instead of the reason."""
 
 _FOR_C: Final = "cfunc."
 """Prefix of the symbol of numba's C wrapper of a function; the symbol of the function itself follows."""

@@ -33,14 +33,14 @@ if TYPE_CHECKING:
     from printhammer.kernel.single.stretch import deepen_dot, open_dot
 
 MODE_OF = (M.FREE, M.LOADING, M.UNLOADING, M.BACKSTOP)
-"""Mode of all members of a pool, indexed by pool."""
+"""Mode of motion of the members of each pool, indexed by pool."""
 
 STAYS = -1
-"""Code returned in place of a pool: the member stays in its lane."""
+"""Return value instead of a pool index: the member stays in its lane."""
 LEAVES = -2
-"""Code returned in place of a pool: the member leaves the lanes, and the scalar kernel repeats its run."""
+"""Return value instead of a pool index: the member leaves the lanes; the scalar kernel repeats its run."""
 DONE = -3
-"""Code returned in place of a pool: the run of the member is complete."""
+"""Return value instead of a pool index: the run of the member is complete."""
 
 
 @inlined
@@ -119,7 +119,7 @@ def position_in_step(pool: Any, i: int, which: int, time: float, b: float, sixth
 
 @compiled
 def part_at(pool: Any, i: int, time: float) -> float:
-    """Return the fraction of a contact lane's latest step in the regularised variable s at a time [s]."""
+    """Return the fraction of a lane's latest backstop step, in the regularised variable s, at a time [s]."""
     t0, t1 = pool[R.OLD_T * R.BLOCK + i], pool[R.NEW_T * R.BLOCK + i]
     w0, w1 = pool[R.OLD_X * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
     v0, v1 = pool[R.OLD_V * R.BLOCK + i], pool[R.NEW_V * R.BLOCK + i]

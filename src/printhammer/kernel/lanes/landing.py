@@ -26,7 +26,7 @@ CLOSE = 1e-3
 """Largest remainder, as a fraction of the step, that the Taylor expansion may close."""
 
 GOES_ON = -1
-"""Code returned in place of an event: the lane must take another step before the event is located."""
+"""Return value instead of an event code: the lane takes another step before the event is located."""
 
 
 @inlined

@@ -11,7 +11,7 @@ BLOCK = 16
 """Number of lanes of a block, which the compiled loops process together."""
 
 MANY_STEPS, SHORT = 2e4, 1e-12
-"""Number of steps and ratio of step size to elapsed time at which a member leaves the lanes.
+"""Step count above which, and step size over elapsed time below which, a member leaves the lanes.
 
 In a runaway, steps become ever shorter without underflow; the scalar kernel then determines the status.
 """
@@ -23,8 +23,8 @@ Locating a switching event takes four attempts and at most about forty halvings 
 """
 
 STILL = 1e-8
-"""Acceleration, normalised by scales of velocity and time, below which a member about to rest leaves the
-lanes."""
+"""Acceleration, normalised by scales of velocity and time, below which a member coming to rest leaves
+the lanes."""
 
 # Indices of a hammer's constants in lanes; more compact than in `printhammer.kernel.model.layout`.
 INVERSE_MASS = 0
@@ -64,12 +64,12 @@ POOLS = 4
 # Rows of a block.
 T = 0
 X = 1
-"""Row of the displacement [m]; in the contact pool, w = sqrt(b - x) [m^0.5]."""
+"""Row of the displacement [m]; in the pool of backstop contacts, w = sqrt(b - x) [m^0.5]."""
 V = 2
 A = 3
-"""Row of the acceleration [m/s^2]; in the contact pool, dv/ds with the regularised variable s."""
+"""Row of the acceleration [m/s^2]; in the pool of backstop contacts, dv/ds (s: regularised variable)."""
 H = 4
-"""Row of the next step size: time [s] or, in the contact pool, regularised variable s."""
+"""Row of the next step size: time [s] or, in the pool of backstop contacts, regularised variable s."""
 NEXT = 5
 """Row of the time of the next edge of the drive or of the end of the run, whichever is earlier [s]."""
 SAMPLE = 6
@@ -82,11 +82,11 @@ STEPS = 10
 LANDING = 11
 """Row of the code of the switching event at which the current step should end; 0 for none."""
 DRIVE = 12
-"""First row of the drive."""
+"""First row of the coefficients of the drive's closed formula."""
 EXPONENTIAL_DRIVE = DRIVE + 4
-"""Number of rows to copy when a member whose drive has exponentials only moves to another pool."""
+"""Number of rows to copy when a member with a purely exponential drive moves to another pool."""
 ANY_DRIVE = DRIVE + DRIVE_WIDTH
-"""Number of rows to copy when a member with any drive moves to another pool."""
+"""Number of rows to copy when a member with an arbitrary drive moves to another pool."""
 RATES = ANY_DRIVE
 CONTROL = RATES + RATES_WIDTH
 LOWEST = CONTROL + 4
@@ -95,7 +95,7 @@ MOST_STEPS = CONTROL + 6
 """Row of the number of steps after which the member leaves the lanes."""
 HAMMER = CONTROL + 7
 OWN = HAMMER + CONSTANTS
-"""First row after the data of the member and its hammer; the results of the latest step begin here."""
+"""First row of the results of the latest step, after the rows of the member and its hammer."""
 
 OLD_T = OWN
 OLD_X = OWN + 1
@@ -125,7 +125,7 @@ CONTACT_STEP = 5
 UNIT = 6
 """Column of the scale of the regularised variable s in a contact; 0 if the run began in this contact."""
 DOT = 7
-"""Column of the row of dot data of the open pack contact; -1 if no pack contact is open."""
+"""Column of the row index of the open pack contact in the dot data; -1 if none is open."""
 END = 8
 CAREFUL = 9
 """Column of a flag: 1 if the scalar kernel has to locate the next switching event, else 0."""
@@ -140,7 +140,7 @@ EVENTS = 14
 EXTRA = 15
 """Column of the number of extra contacts up to the present time."""
 SLOT_WIDTH = 16
-"""Number of columns of a slot."""
+"""Number of columns of a slot, the data of a member outside its lane."""
 
 # Bit flags of the events of a lane, to be added.
 SWITCH = 1.0

@@ -127,7 +127,7 @@ def time_to_level(distance: float, v: float, a: float) -> float:
 
 @inlined
 def start_at(pool: Any, i: int) -> State:
-    """Return time, position, velocity and acceleration of a lane; in the contact pool, t, w, v and dv/ds."""
+    """Return time, position, velocity and acceleration of a lane; in the backstop, t, w, v and dv/ds."""
     return pool[i], pool[R.X * BLOCK + i], pool[R.V * BLOCK + i], pool[R.A * BLOCK + i]
 
 

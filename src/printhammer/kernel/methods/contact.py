@@ -183,7 +183,7 @@ def reach_time(
 
 @called
 def end_push(start: ContactState, h: float, upper: float, hammer: Hammer, drive: Drive) -> ContactState:
-    """Locate by bisection the end of the push by the backstop in a step `h`, up to the fraction `upper`."""
+    """Locate by bisection where the backstop ceases to push in a step `h`, up to the fraction `upper`."""
     t, w, v, kv = start
     low, high = 0.0, upper
     for _ in range(60):

@@ -32,10 +32,10 @@ STILL = 1e-12
 scale."""
 
 BEGUN = 1e-9
-"""Largest value of a gap at the start of a step that counts as zero, as on a path that has just begun."""
+"""Largest event-function value that counts as zero at the start of a step, as on a new current path."""
 
 SHARE = 1e-5
-"""Difference step for the time derivative of a gap, as a fraction of the integration step."""
+"""Finite-difference step for the time derivative of an event function, as a fraction of the step."""
 
 PATH_GAP, REST_GAP = 0, 1
 """Codes of the event functions: change of the current path, and end of a rest of the armature."""
@@ -43,7 +43,7 @@ PATH_GAP, REST_GAP = 0, 1
 
 @compiled
 def closes(g0: float, d0: float, g1: float, d1: float) -> int:
-    """Decide whether a gap falls to zero in a step, from its values g and scaled slopes d at both ends.
+    """Decide whether an event function has a zero in a step, from values g and scaled slopes d at its ends.
 
     The slopes are derivatives with respect to the fraction of the step.
 

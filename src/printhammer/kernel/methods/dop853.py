@@ -227,7 +227,7 @@ def electric_error(e5: Point, e3: Point, h: float, hammer: Hammer) -> float:
 def whole_time_step(
     t0: float, x0: float, v0: float, a0: float, h: float, law: ForceLaw
 ) -> tuple[float, float, float, float, float, Electric, float]:
-    """Compute the same step as `time_step`; return also the electric state and its normalised error."""
+    """Compute the step of `time_step` together with the electric state and its normalised error."""
     y = point(t0, x0, v0, law.drive)
     k1 = slope_at(y, v0, a0, law)
     y2 = along(y, h, _sum1(T.A02, k1))
@@ -280,7 +280,7 @@ def time_step(
 def whole_contact_step(
     t0: float, w0: float, v0: float, kv0: float, h: float, hammer: Hammer, drive: Drive, scales: Any
 ) -> tuple[float, float, float, float, float, Electric]:
-    """Compute the same step as `contact_step`; return also the electric state; include its error."""
+    """Compute the step of `contact_step` together with the electric state; the error includes both."""
     y = point(t0, w0, v0, drive)
     k1 = contact_slope_at(y, kv0, hammer, drive)
     k2 = contact_slope(along(y, h, _sum1(T.A02, k1)), hammer, drive)

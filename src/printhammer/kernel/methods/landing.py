@@ -38,7 +38,7 @@ State = Any
 """State off the backstop: time [s], position [m], velocity [m/s], acceleration [m/s^2]."""
 
 FAILED = -1
-"""Code returned in place of an event if no step, however short, has a finite error below the tolerance."""
+"""Return value instead of an event code if the error exceeds the tolerance for every step size."""
 
 
 @inlined
@@ -61,7 +61,7 @@ def plain_step(
 def whole_step(
     t: float, x: float, v: float, a: float, h: float, law: ForceLaw
 ) -> tuple[float, float, float, float, float, Electric, float]:
-    """Compute the same step as `plain_step`; return also the electric state and its normalised error."""
+    """Compute the step of `plain_step` together with the electric state and its normalised error."""
     if HAS_CIRCUIT:
         return whole_time_step(t, x, v, a, h, law)
     x1, v1, a1, error_x, error_v = plain_step(t, x, v, a, h, law)

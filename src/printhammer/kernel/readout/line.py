@@ -18,8 +18,8 @@ X, Y, WANTED_X, WANTED_Y, DARKNESS, FAULT = range(6)
 the topmost wire down; the fraction of light absorbed; the index of its first fault (-1 for a good dot).
 NaN for a lost dot."""
 FORCE_RATIO, PLACEMENT, PRINTED = range(6, 9)
-"""Columns of the peak force over that of the single pulse, the offset from the intended position [m], and
-whether the dot is on the paper."""
+"""Columns of the ratio of peak force to the single pulse's peak force, the offset from the intended position
+[m], and whether the dot is on the paper."""
 DOT_WIDTH = 9
 NOT_RUN, LOST, EXTRA, WEAK, LATE, GOOD = 0, 1, 2, 3, 4, -1
 """Faults, as in `printhammer.printing.dots.judging.FAULTS`."""

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.laws import MEMORY
 
 TRY, CLOSED, FAILED = range(3)
-"""Outcomes of `improve`: images of the trial states are needed, the orbit is closed, or it is given up."""
+"""Outcomes of `improve`: the map must be evaluated at the trial states; converged; failed."""
 
 APPROACHES, GOES_ON, NO_DERIVATIVE = 1, 0, -1
-"""Outcomes of `has_settled`: the motion has settled to the orbit, has not, or the orbit has no derivative."""
+"""Outcomes of `has_settled`: motion settled to the orbit; not settled; map not differentiable there."""
 
 GOAL, ENOUGH, ITERATIONS = 1e-13, 1e-9, 20
 """Residual at which the iteration stops, residual that is accepted if it stops decreasing, and iteration
@@ -35,7 +35,7 @@ STILL_COIL = 1e-9
 """Current, relative to a typical one, below which the coil counts as currentless."""
 
 TRIED, SHARE, RESIDUAL, SMOOTH = range(4)
-"""Indices of `search`: number of images, damping factor, residual, and whether the orbit has a derivative."""
+"""Indices of `search`: number of map evaluations, damping factor, residual, differentiability flag."""
 
 IMAGE = 7
 """Number of columns of an image: displacement, m, velocity, m/s, the four elements of the derivative by
@@ -47,7 +47,7 @@ half-widths of the window, and the scaled derivative by rows."""
 
 
 def write_guess(states: Any, scales: Any, period: int, count: int, orbit: Any, trial: Any) -> int:
-    """Write the initial guess of an orbit of `count` firings; return 0 if the states are too far from one.
+    """Write the initial guess of an orbit of `count` firings; return 0 if the states are too far from any.
 
     If the states alternate about the orbit, their mean is closer to the orbit than any single state.
 
@@ -78,7 +78,7 @@ def write_guess(states: Any, scales: Any, period: int, count: int, orbit: Any, t
 def write_image(
     start: Any, ends: Any, current: float, columns: Any, smooth: float, hammer: Any, image: Any
 ) -> int:
-    """Write the image of a state after one firing; return 1 if displacement and velocity are the whole state.
+    """Write the image of a state after one firing; return 1 if (x, v) is the complete state.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def accept(images: Any, scales: Any, orbit: Any, search: Any) -> None:
 
 
 def is_aimed(images: Any, scales: Any, orbit: Any) -> bool:
-    """Write the directions of the full Newton step, clipped to `LONGEST_STEP`; False for a singular system.
+    """Write the Newton step of each state, clipped to `LONGEST_STEP`; return False if singular.
 
     The step of state i + 1 is J_i d_i + e_i with the defect e_i; around the orbit, d_0 = M d_0 + c.
     """
@@ -252,7 +252,7 @@ def has_settled(states: Any, scales: Any, orbit: Any, search: Any, outcome: int,
 
 
 def gap_at(states: Any, scales: Any, orbit: Any, block: int, shift: int) -> float:
-    """Return the largest distance of one turn of states from an orbit that is shifted by some firings."""
+    """Return the largest distance of one period of states from an orbit, shifted by `shift` firings."""
     count = orbit.shape[0]
     begin = states.shape[0] % count + block * count
     gap = 0.0
@@ -283,7 +283,7 @@ def is_approaching(states: Any, scales: Any, orbit: Any, lies_on: float) -> bool
 
 
 def apart(states: Any, scales: Any, count: int, late: bool) -> float:
-    """Return the mean distance of (x, v) `count` firings apart, at the end of the series or its beginning."""
+    """Return the mean distance between states (x, v) `count` firings apart, late or early in the series."""
     pairs = states.shape[0] - count
     used = min(count * max(pairs // (4 * count), 1), pairs)
     total = 0.0
@@ -296,7 +296,7 @@ def apart(states: Any, scales: Any, count: int, late: bool) -> float:
 
 
 def is_planar(hammer: Any) -> int:
-    """Whether displacement and velocity are the whole state at a section without current.
+    """Whether displacement and velocity are the complete state at a section without coil current.
 
     They are not if the coil has a shorted turn or the supply a capacitor.
     """

@@ -1,4 +1,4 @@
-"""Strobe section of an endless train: its largest exponent, and the distances at which states repeat."""
+"""Strobe section of an endless pulse train: largest Lyapunov exponent, and period by recurrence."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SHRINKS, NOISE = 1e-5, 1e-9
 
 
 def write_states(strobes: Any, front: float, states: Any, branches: Any) -> None:
-    """Write the states of a strobe section and the branch of the pack's law of each, 0 outside the pack.
+    """Write the states of a strobe section, and the pack-law branch of each state (0 outside the pack).
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def write_states(strobes: Any, front: float, states: Any, branches: Any) -> None
 
 
 def class_of(agreed: int, settled: int, value: float, error: float, smooth: bool, rests: int) -> int:
-    """Classify a motion by its states and its exponent; return its period or a code.
+    """Classify a motion by its strobe states and its Lyapunov exponent; return its period or a code.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def write_exponent(growth: Any, work: Any, out: Any) -> int:
 
 
 def write_distances(states: Any, branches: Any, scales: Any, distances: Any) -> tuple[int, int]:
-    """Write the largest distance of states q firings apart; return the q that repeats and the nearest q.
+    """Write the largest distance between states q firings apart; return the period and the closest q.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def write_distances(states: Any, branches: Any, scales: Any, distances: Any) -> 
 
 
 def mean_apart(states: Any, scales: Any, count: int, period: int, late: bool) -> float:
-    """Return the mean distance of states `count` firings apart, at the end of the series or its beginning."""
+    """Return the mean distance between states `count` firings apart, late or early in the series."""
     n, parts = states.shape
     pairs = n - count
     used = min(period * max(pairs // (4 * period), 1), pairs)
@@ -170,7 +170,7 @@ def mean_apart(states: Any, scales: Any, count: int, period: int, late: bool) ->
 
 
 def is_shrinking(states: Any, scales: Any, count: int, period: int) -> bool:
-    """Whether the distance of states `count` firings apart still decreases."""
+    """Whether the distance between states `count` firings apart still decreases."""
     early = mean_apart(states, scales, count, period, False)
     return early - mean_apart(states, scales, count, period, True) > SHRINKS * early + NOISE
 
@@ -184,7 +184,7 @@ def is_prime(number: int) -> bool:
 
 
 def is_shown(states: Any, scales: Any, period: int) -> bool:
-    """Whether states that agree `period` firings apart alone prove the period."""
+    """Whether the states alone prove the period `period`, without Newton's method."""
     if not mean_apart(states, scales, period, period, True) <= AGREES:
         return False
     for prime in range(2, period + 1):
@@ -198,7 +198,7 @@ def is_shown(states: Any, scales: Any, period: int) -> bool:
 
 
 def settled_period(states: Any, scales: Any, period: int, planar: bool) -> int:
-    """Return the period to which a motion has settled whose states agree `period` firings apart, or 0.
+    """Return the period of a settled motion whose states agree `period` firings apart; 0 if undecided.
 
     The period is 0 if the states do not decide it. The rules are those of
     `printhammer.chaos.orbits.settled`, without Newton's method: a `planar` motion

@@ -68,7 +68,7 @@ ON_BRANCH = 2.0
 
 
 class Setup(NamedTuple):
-    """Data that do not change during a run.
+    """Constant data of a run: pulse train, hammer, step-size control, bounds and limits.
 
     Attributes
     ----------

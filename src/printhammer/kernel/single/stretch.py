@@ -43,7 +43,7 @@ contact_number = compiled(D.contact_number)
 
 @compiled
 def clear_dots(dots: Any) -> None:
-    """Initialise the rows of dots: no contacts counted, all other columns NaN, which marks a lost dot."""
+    """Initialise the rows of dot data as lost dots: zero contacts, NaN in all other columns."""
     for i in range(dots.shape[0]):
         dots[i, D.CONTACTS] = 0.0
         for j in range(D.CONTACTS + 1, D.DOT_WIDTH):
@@ -54,7 +54,7 @@ def clear_dots(dots: Any) -> None:
 def open_dot(
     dots: Any, extra: int, surface: int, initial: bool, t: float, v: float, firings: Any
 ) -> tuple[int, int]:
-    """Assign a contact that begins at time `t` with velocity `v` to its firing, and write its row.
+    """Assign a contact that begins at time `t` with velocity `v` to its firing; start its row of dots.
 
     Returns
     -------

@@ -1,1 +1,1 @@
-"""Variational equations along a recorded run: derivatives of the motion by initial state and constants."""
+"""Variational equations along a recorded run: derivatives with respect to initial state and constants."""

@@ -111,7 +111,7 @@ def force_with_current(x: float, current: float, hammer: Hammer) -> float:
 
 @called
 def current_slopes(x: float, electric: Electric, hammer: Hammer, live: Any) -> tuple[float, float, float]:
-    """Return the derivatives of magnetising current and magnet force.
+    """Return the derivatives of the magnetising current, and of the magnet force with respect to current.
 
     Returns
     -------

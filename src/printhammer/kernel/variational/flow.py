@@ -129,7 +129,7 @@ def orthonormalise(columns: Any, scales: Any, grown: Any) -> None:
 
 @compiled
 def note_mark(node: Any, initial: Any, setting: Setting, carried: Carried) -> None:
-    """Store state, tangent columns and growth at an output time; initialise the columns at the first one."""
+    """Store state, tangent columns and growth at an output time; initialise the columns at the first time."""
     columns, work, track, states, changes, growth, _passed = carried
     hammer = setting.hammer
     mode = int(node[3])

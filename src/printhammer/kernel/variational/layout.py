@@ -33,7 +33,7 @@ FIRST_COLUMN = TIME + 1
 
 # Indices in `track`.
 DUE = 0
-"""Index of the element that counts the output times already passed."""
+"""Index of the number of output times already passed."""
 SMOOTH = 1
 """Index of a flag: 1 if the present state depends differentiably on the initial state, else 0."""
 GROWN = 2

@@ -1,4 +1,4 @@
-"""WebAssembly modules: emitted by llvmlite for wasm32, linked by the linker that the wheel `ziglang` holds.
+"""WebAssembly modules: emitted by llvmlite for wasm32, linked by the linker in the wheel `ziglang`.
 
 Each entry point becomes one object, from the same bitcode as its machine code. The linker joins the objects
 of a kernel with the mathematical functions that they call, from zig's C library, which is musl. The module
@@ -44,7 +44,7 @@ Lowered templates hold the sizes and offsets of structures as numbers, computed 
 with this alignment the numbers stay correct.
 """
 _STACK: Final = 1 << 20
-"""Size of the stack, bytes; several times what an entry point uses."""
+"""Size of the stack, bytes; several times the stack use of an entry point."""
 
 
 @cache
