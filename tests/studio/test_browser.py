@@ -206,6 +206,7 @@ def test_a_rail_in_the_place_of_the_current_and_back(page: Page) -> None:
         return page.run(f"{motion}.peak")
 
     assert took("rail") == pytest.approx(own, rel=0.2)
+    page.run("for (const part of document.querySelectorAll('details')) part.open = true")
     assert page.run("document.querySelector('[data-key=\"coil.temperature\"]').checkVisibility()")
     assert took("chopper") < own
     assert page.run("document.querySelector('[data-key=\"waveform.off_time\"]')") is None

@@ -17,6 +17,7 @@ import printhammer as ph
 from printhammer.drive.waveforms.drivers import Rail
 from printhammer.drive.waveforms.shapes import SHAPES
 from printhammer.studio import Shelf
+from printhammer.studio.coil import open_constants, rail_of
 from printhammer.studio.controls import fields_of
 
 NAME = "hendriks-1983-crude"
@@ -180,6 +181,21 @@ def test_the_command_runs_with_the_saved_file(
     texts = ask("texts", {**STATE, "hammer": "hendriks-1983-1"})["found"]
     assert texts["command"] == "printhammer run hendriks-1983-1 --rate '1200.0 Hz' --pulses 9"
     assert '"hendriks-1983-1"' in texts["python"]
+
+
+def test_a_rail_brings_the_coil_that_the_file_leaves_open(ask: Any) -> None:
+    hammer = ph.load("hendriks-1983-1")
+    wave = {"shape": "rail", **(rail_of(hammer) or {})}
+    state = {**STATE, "hammer": hammer.name, "constants": {"coil.temperature": 60.0}, "waveform": wave}
+    texts = ask("texts", state)["found"]
+    further = {key: constant.si for key, (constant, _) in open_constants(hammer).items()}
+    expected = hammer.replace({**further, "coil.temperature": 60.0})
+    assert ph.Hammer.from_toml(texts["hammer"]).fingerprint == expected.fingerprint
+    assert '"coil.resistance": 28.6' in texts["python"]
+    # Where a current is fired, the temperature is that of no coil.
+    texts = ask("texts", {**state, "waveform": None})["found"]
+    assert ph.Hammer.from_toml(texts["hammer"]).fingerprint == hammer.fingerprint
+    assert "coil" not in texts["python"]
 
 
 def test_the_start_of_the_page_is_a_state(ask: Any, request: pytest.FixtureRequest) -> None:

@@ -1,5 +1,5 @@
 // The arguments of the kernel for a state, in the memory of its module; see printhammer/run/problem.py.
-import { Refusal } from "./read.js";
+import { Refusal, settingsOf } from "./read.js";
 
 const FLIGHTS = { nodes: 2048, contacts: 256, each: 40, most: 1e6 }; // sizes of the first working space
 export const STATUS = ["ok", "range left", "runaway", "step limit", "step underflow"];
@@ -41,9 +41,7 @@ function check(code, entry, out, limits) {
 
 /** The arrays of numbers of a hammer by name, with the constants of a state. */
 function numbersOf({ numbers, described, circuit }, { constants }) {
-  // Of a coil that no voltage drives, what its file leaves open is not set; else, without a resistance of its own, all is.
-  const left = Object.fromEntries(described.open.map(({ key, value }) => [key, value]));
-  const taken = circuit ? { ...("coil.resistance" in left ? left : {}), ...constants } : Object.fromEntries(Object.entries(constants).filter(([key]) => !(key in left)));
+  const taken = settingsOf({ described, constants, byVoltage: circuit });
   const set = ([keys, own]) => own.map((number, k) => (keys[k] ? taken[keys[k]] : undefined) ?? Number(number));
   return Object.fromEntries(Object.entries(numbers).map(([name, pair]) => [name, set(pair)]));
 }

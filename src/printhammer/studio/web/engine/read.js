@@ -99,6 +99,13 @@ export function readState(content, readers) {
   return Object.fromEntries(Object.entries(readers).map(([key, read]) => [key, read(content[key])]));
 }
 
+/** The constants that a state sets: those that a file leaves open of a coil only where a voltage drives it, then all, without a resistance of its own. */
+export function settingsOf({ described, constants, byVoltage }) {
+  const left = Object.fromEntries(described.open.map(({ key, value }) => [key, value]));
+  if (byVoltage) return { ...("coil.resistance" in left ? left : {}), ...constants };
+  return Object.fromEntries(Object.entries(constants).filter(([key]) => !(key in left)));
+}
+
 /** Check that a hammer has a constant, and that a value lies in the range of its control. */
 export function checkConstant(described, key, value) {
   const all = [...described.constants, ...described.open];

@@ -1,5 +1,6 @@
 // A state as texts: the file of its hammer and of its drive, a script, a command line.
 import { driveText } from "./drive.js";
+import { settingsOf } from "./read.js";
 
 const HAMMER_FILE = "studio-hammer.toml";
 const DRIVE_FILE = "studio-drive.toml";
@@ -11,11 +12,14 @@ const python = (value) => (value === null ? "None" : typeof value === "number" ?
 /** Return the texts of a state by kind, as the exports of the studio name them. */
 export function textsOf(state, shelf) {
   const hammer = shelf.hammers[state.hammer];
+  const { constants, waveform } = state;
+  const byVoltage = (waveform ?? hammer.described.waveform)?.quantity === "voltage";
+  const set = { ...state, constants: settingsOf({ described: hammer.described, constants, byVoltage }) };
   return {
-    get hammer() { return hammerFile(state, hammer); },
+    hammer: hammerFile(set, hammer),
     drive: driveText(state, shelf),
-    python: scriptOf(state, hammer),
-    command: commandOf(state, hammer),
+    python: scriptOf(set, hammer),
+    command: commandOf(set, hammer),
     state: `${JSON.stringify({ ...shelf.stateFile, state }, null, 1)}\n`,
   };
 }
@@ -51,7 +55,9 @@ function changed(text, section, name, value, unit) {
       return lines.join("\n");
     }
   }
-  lines.splice(last + 1, 0, `${name} = ${whole}`);
+  const added = `${name} = { value = ${value}, ${unit === "1" ? "" : `unit = "${unit}", `}status = "assumed", source = "set in the studio" }`;
+  if (last < 0 && section) lines.push(`[${section}]`, added, "");
+  else lines.splice(last + 1, 0, added);
   return lines.join("\n");
 }
 
