@@ -42,7 +42,7 @@ RUN_QUANTITIES: Final = {
     "backstop_loss": ("J", "energy absorbed by the backstop"),
     "damping_loss": ("J", "energy dissipated by the armature's damping"),
 }
-"""Unit and meaning of the energies of a whole run, by name; the last is for hammers with damping."""
+"""Unit and meaning of the energies of a whole run, by name; the last energy only with damping."""
 
 _ENERGY: Final = 3  # First row of the energies in a column
 _PACK_LOSS: Final = 5  # Row of the pack loss in a column
@@ -52,7 +52,7 @@ _NEAR: Final = 1e-6
 
 
 class Struck(Declared):
-    """Printed dot: the rows of its contacts, and the times of largest indentation and force."""
+    """Printed dot: row indices of its contacts, and times of largest indentation and largest force."""
 
     index: int = part("number of the firing")
     touch: int = part("row of the contact with the pack")
@@ -91,7 +91,7 @@ def dot_values(motion: Motion) -> FloatArray:
 
 
 def _touches(contacts: Sequence[Contact]) -> list[int]:
-    """Return the row index of each contact that makes a dot, in order of the firings."""
+    """Return the row index of the contact that makes each dot, in order of the firings."""
     return [
         row
         for row, contact in enumerate(contacts)
@@ -174,7 +174,7 @@ def _acceleration(problem: Problem, row: FloatArray, *without: int) -> float:
 
 
 class Changes(Declared):
-    """Derivatives of the quantities of dots and run with respect to scaled constants, ``value / scale``."""
+    """Derivatives of the quantities of the dots and of the run with respect to ``value / scale``."""
 
     dots: FloatArray = part(
         "derivatives of `DOT_QUANTITIES`, shape (dots, quantities, n)",
@@ -224,7 +224,7 @@ class _Look:
     rows: dict[int, int]
 
     def columns(self, t: float) -> tuple[FloatArray, FloatArray]:
-        """Return the state and its derivatives with respect to the constants, at a recorded time, s."""
+        """Return the state and its derivatives with respect to the constants, at a time of `marks`, s."""
         row = int(np.searchsorted(self.marks, t))
         return self.flow.states[row], self.flow.changes[row]
 

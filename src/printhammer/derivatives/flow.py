@@ -46,7 +46,7 @@ _VALUE_SPACING: Final = 1e-3
 
 
 class Flow(Declared):
-    """Columns of the variational equations along a run, at requested times, the marks."""
+    """Tangent columns of the variational equations along a run, at requested times called marks."""
 
     states: FloatArray = part(
         "displacement, m, velocity, m/s, mode and latest local maximum, m, at the marks, shape (m, 4); with a"
@@ -84,7 +84,7 @@ def carry_columns(
     nodes: Sequence[int] = (),
     renormalise: bool = False,
 ) -> Flow:
-    """Integrate columns along a run, at the times `marks`; NaN after an early end of the run.
+    """Integrate tangent columns along a run to the times `marks`; NaN after an early end of the run.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def flow(
     initial: FloatArray,
     nodes: Sequence[int] = (),
 ) -> Flow:
-    """Integrate the columns of constants along a recorded run; most arguments are as for `carry_columns`.
+    """Integrate the derivatives with respect to constants along a recorded run; see `carry_columns`.
 
     Derivatives are with respect to the scaled constants, ``value / scale``.
     """

@@ -226,7 +226,7 @@ def _difference(function: Callable[[float], FloatArray], value: float, scale: fl
 
 
 def _natural(unit: str, hammer: Hammer, drive: Drive) -> float:
-    """Return the typical magnitude of a quantity of the motion, by its SI unit, such as "N s/m^2.5"."""
+    """Return the typical magnitude of a constant with a given SI unit, such as "N s/m^2.5"."""
     way, speed = scales_of(hammer, drive, (hammer.origin, 0.0))
     time, force = way / speed, hammer.mass * speed * speed / way
     known = {

@@ -1,4 +1,4 @@
-"""Rows of dots: the periodic orbit of a row, and its Floquet multipliers from dot to dot.
+"""Rows of dots: the periodic orbit of a row, and its Floquet multipliers over one dot interval.
 
 A drive that fires the same pulses for every dot of a row has a strobe map, from the state at one firing to
 the state at the next. A row of equal dots is a fixed point of this map. The eigenvalues of the derivative at
@@ -27,10 +27,10 @@ from printhammer.run.start import initial_state
 from printhammer.support.arrays import BoolArray, FloatArray
 
 FIRING: Final = 12
-"""Default index of the firing where the map starts; a row from rest is near its fixed point there."""
+"""Default index of the firing where the map starts; by then a row from rest is near the fixed point."""
 
 MORE: Final = 4
-"""Number of further dots in the row after the firing where the map starts, so that its end has no effect."""
+"""Number of dots after the firing where the map starts, so that the end of the row has no effect."""
 
 DOTS: Final = FIRING + MORE
 """Number of dots in a row that is long enough for the default starting firing."""
@@ -103,7 +103,7 @@ def row_multipliers(
 
 
 def leading(jacobians: FloatArray) -> FloatArray:
-    """Compute the eigenvalue of largest absolute value of each 2 x 2 matrix, shape (rows,); NaN is passed on.
+    """Compute the eigenvalue of largest absolute value of each 2 x 2 matrix, shape (rows,); NaN propagates.
 
     A real eigenvalue keeps its sign; a complex pair is represented by its absolute value.
     """
@@ -209,5 +209,5 @@ def _is_possible(hammer: Hammer, state: FloatArray) -> bool:
 
 
 def _with_memory(strobes: Strobes) -> BoolArray:
-    """Mask of the strobes at which the pack has a memory, so that (x, v) is not the whole state."""
+    """Mask of the strobes at which the pack has a memory, so that (x, v) is not the complete state."""
     return np.array([[components(mode) > 2 for mode in row] for row in strobes.branch.tolist()])

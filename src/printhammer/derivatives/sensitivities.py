@@ -265,7 +265,7 @@ class Spread(Result):
         return super().entries() | {name: kept[name] for name in (*names, "value", "run_value")}
 
     def plot(self, **options: Any) -> Figure:
-        """Draw the sensitivities on which the spread is based."""
+        """Draw the sensitivities from which the spread is computed."""
         return self.sensitivities.plot(**options)
 
 

@@ -71,7 +71,7 @@ class TangentMap(Declared):
 
     @property
     def determinant(self) -> float:
-        """Growth factor of volumes in state space; 0 if the state loses its memory in between.
+        """Growth factor of volumes in state space; 0 if the state has fewer components at the end.
 
         Raises
         ------
@@ -124,12 +124,12 @@ class Exponent(Declared):
 
     @property
     def per_second(self) -> float:
-        """Largest exponent per second, 1/s."""
+        """Largest Lyapunov exponent per unit time, 1/s."""
         return self.value / self.period
 
     @property
     def total(self) -> float:
-        """Sum of both exponents: mean logarithmic growth of areas, per firing."""
+        """Sum of both Lyapunov exponents: mean logarithmic growth of areas of the (x, v) plane per firing."""
         return self.value + self.second
 
 

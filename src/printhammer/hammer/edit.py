@@ -91,7 +91,7 @@ def _constant(key: str, si_unit: str, value: Any, status: str, source: str) -> d
 
 
 def _table(section: str, value: Any, status: str, source: str) -> dict[str, Any]:
-    """Return the TOML table of a part, waveform or mapping, as accepted by `edit_of`."""
+    """Convert a part, a waveform or a mapping to a TOML table of a hammer file."""
     selector = SELECTORS[section]
     content = dict(value) if isinstance(value, Mapping) else _fields(section, value)
     if content.get(selector, UNSAID.get(section)) not in kinds_of(section):

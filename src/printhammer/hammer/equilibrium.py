@@ -342,7 +342,7 @@ def _grid(force: StaticForce, low: float, high: float) -> list[float]:
 
 
 def _away_from_zero(first: float, limit: float) -> list[float]:
-    """Return 0 and a geometric sequence up to a limit, with 12 points per decade."""
+    """Return the currents 0 and a geometric sequence up to a limit, with 12 points per decade, A."""
     if limit <= first:
         return [0.0, limit]
     count = max(2, math.ceil(12.0 * math.log10(limit / first)) + 1)

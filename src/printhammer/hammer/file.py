@@ -63,7 +63,7 @@ _EXPECTED: Final = {
     "length_unit": (re.compile("um|mm|m"), "um, mm or m"),
     "time_unit": (re.compile("us|ms|s"), "us, ms or s"),
 }
-"""Patterns of optional text entries, and what they expect."""
+"""Regular expressions for optional text entries, with the expectation stated in error messages."""
 
 SELECTORS: Final = {**dict.fromkeys(ROLES, "law"), "waveform": "shape"}
 """Tables of a hammer file, each with the key that selects its law or shape."""

@@ -374,7 +374,7 @@ class Hammer:
         return rest_state(self)
 
     def check(self) -> None:
-        """Raise InputError if the hammer does not rest at its backstop.
+        """Raise InputError if the armature does not rest at the backstop.
 
         Raises
         ------

@@ -36,14 +36,14 @@ TIMING: Final = {
     PERIOD: Quantity("s", "T", "time between firings", gt=0.0),
     RATE: Quantity("Hz", "f", "firing rate", gt=0.0),
 }
-"""Names of the time between firings and the firing rate of a train."""
+"""Declarations of the time between firings and the firing rate of a pulse train, by name."""
 
 FORCE: Final = {
     "amplitude": Quantity("N", "F", "amplitude of the force"),
     "frequency": Quantity("Hz", "f", "frequency of the force", gt=0.0),
     "phase": Quantity("rad", "phi", "phase of the force"),
 }
-"""Names of the constants of a sinusoidal force."""
+"""Declarations of the constants of a sinusoidal force, by name."""
 
 PLACES: Final = ("platen", "pack.front", "backstop.position")
 """Constants that are positions on the axis of the armature, such as "backstop.position"."""

@@ -24,7 +24,7 @@ FARTHER: Final = (1.0, 10.0, 100.0, 1000.0)
 """Search radii for equilibria about the origin, m, tried in turn if the hammer sets no limit; arbitrary."""
 
 EVEN: Final = 1025
-"""Number of evenly spaced points of a search grid."""
+"""Number of evenly spaced points of the search grid for equilibria."""
 
 DECADE: Final = 12.0
 """Number of grid points per decade of distance from an anchor, where the search grid is refined."""
@@ -34,11 +34,11 @@ RESTS, CRUSHED, LIFTED, UNSTABLE, EMPTY = range(5)
 magnet law; the force at the backstop is not negative; no stable equilibrium; an empty range."""
 
 MOST_PLACES: Final = 8192
-"""Largest number of points of a search grid."""
+"""Largest number of points of the search grid for equilibria."""
 
 
 class Statics(NamedTuple):
-    """Law functions and constants of a hammer, as far as its static force depends on them."""
+    """Law functions and constants that determine the static force of a hammer."""
 
     magnet_force: Any
     spring_force: Any
@@ -57,7 +57,7 @@ class Statics(NamedTuple):
     rigid: bool
     """Whether the backstop is rigid."""
     memory: bool
-    """Whether the force of the pack depends on the past."""
+    """Whether the force of the pack depends on its largest past indentation."""
     has_magnet: bool
     """Whether the hammer has a magnet."""
     low: float
@@ -96,7 +96,7 @@ def origin_of(s: Statics) -> float:
 
 
 def limits_of(s: Statics) -> tuple[float, float]:
-    """Return the displacements, m, that the law of the magnet and a rigid backstop admit."""
+    """Return the range of displacements, m, that the magnet law and a rigid backstop permit."""
     return max(s.low, s.position) if s.rigid else s.low, s.high
 
 
@@ -143,7 +143,7 @@ def spacing(x: float) -> float:
 
 
 def is_stable(x: float, before: float, after: float, s: Statics) -> bool:
-    """Whether the force points to a root from both sides; a rigid backstop stands in for the lower side."""
+    """Whether the force points to a root from both sides; a rigid backstop replaces the lower side."""
     held = before > 0.0 or (s.rigid and x == limits_of(s)[0])
     return held and after < 0.0
 
@@ -196,12 +196,12 @@ class Work(NamedTuple):
     """Working space of a search for equilibria."""
 
     grid: Any
-    """Array, shape (`MOST_PLACES`,)."""
+    """Search grid, m, shape (`MOST_PLACES`,)."""
     places: Any
     values: Any
-    """Arrays, shape (3 `MOST_PLACES`,)."""
+    """Points at which the force was evaluated, m, and forces, N, shape (3 `MOST_PLACES`,)."""
     found: Any
-    """Array, shape (3 `MOST_PLACES`, 3): roots with the signs of the force on both sides."""
+    """Roots, m, with the signs of the force on both sides, shape (3 `MOST_PLACES`, 3)."""
     ascending: Any
     """Function that sorts the first numbers of the grid and returns the number of different ones."""
 
@@ -213,7 +213,7 @@ def equilibria_between(low: float, high: float, current: float, s: Statics, work
 
 
 def has_stable(count: int, s: Statics, work: Work) -> bool:
-    """Whether any of the roots found is stable."""
+    """Whether any root of the net force is a stable equilibrium."""
     found = False
     for k in range(count):
         found = found or is_stable(work.found[k, 0], work.found[k, 1], work.found[k, 2], s)

@@ -47,7 +47,7 @@ class Uncertainty:
         return float(np.sqrt(self.covariance.diagonal()[self.keys.index(key)])) if key in self.keys else 0.0
 
     def without(self, gone: Container[str]) -> Uncertainty:
-        """Return the uncertainty of the remaining constants, without the keys passed (marginalised)."""
+        """Return the marginal uncertainty of the other constants, without the constants `gone`."""
         rows = [row for row, key in enumerate(self.keys) if key not in gone]
         keys = tuple(self.keys[row] for row in rows)
         return Uncertainty(keys, self.covariance[np.ix_(rows, rows)], self.records)

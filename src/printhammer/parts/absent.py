@@ -1,4 +1,4 @@
-"""Absent part: no force, no energy, no memory.
+"""Law functions of an absent part: no force, no energy, no memory.
 
 These functions also stand in for functions that the module of a part omits.
 """
@@ -103,21 +103,21 @@ def backstop_rebound(c: Any, v_in: float) -> float:
 
 
 def magnet_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants for a law that does not pack them itself: the numbers before the domain."""
+    """Write the packed constants of a law without its own packing function: the numbers before the domain."""
     for k in range(len(q) - 2):
         c[k] = q[k]
     return max(len(q) - 2, 0)
 
 
 def magnet_domain(q: Any, ends: Any) -> None:
-    """Write the displacement range, m, for a law that does not define it itself: its last two numbers."""
+    """Write the displacement range, m, of a law without its own domain function: the last two numbers."""
     ends[0], ends[1] = -math.inf, math.inf
     if len(q) > 1:
         ends[0], ends[1] = q[len(q) - 2], q[len(q) - 1]
 
 
 def _copy(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants for a law that does not pack them itself: its numbers."""
+    """Write the packed constants of a law without its own packing function: the numbers of the part."""
     for k in range(len(q)):
         c[k] = q[k]
     return len(q)

@@ -40,7 +40,7 @@ class Part(BaseModel):
     role: ClassVar[str]
     law: ClassVar[str]
     variant: ClassVar[int] = 0
-    """Index of the law among those of its module, which share their functions."""
+    """Index of the law among the laws of its module, which share the law functions."""
 
     if not TYPE_CHECKING:
 
@@ -79,7 +79,7 @@ class Part(BaseModel):
         return (*quantities(cls), *further)
 
     def numbers(self) -> tuple[float, ...]:
-        """Return the fields as numbers, and the index of the law among those of the module.
+        """Return the fields as numbers, and the index of the law among the laws of its module.
 
         A missing constant is NaN, an option 0 or 1 or the index of its choice.
         """

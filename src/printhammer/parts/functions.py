@@ -69,7 +69,7 @@ def check_functions(part: Any, *, complete: bool = False) -> None:
 
 
 def _callees(law: Callable[..., Any]) -> list[FunctionType]:
-    """Return the Python functions of a law: the law and all that it calls, directly or not."""
+    """Return a law function and all Python functions that it calls, directly or indirectly."""
     waiting: list[object] = [law]
     functions: dict[FunctionType, None] = {}
     while waiting:

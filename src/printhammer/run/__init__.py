@@ -1,1 +1,1 @@
-"""Runs of a hammer: drive, motion and contacts."""
+"""Runs of a hammer under a drive: integration, motion, contacts, dots, energies, and ensembles."""

@@ -59,7 +59,7 @@ class Keywords(OfTolerance, OfThreads, OfProgress):
 
 @dataclass(frozen=True)
 class Effort:
-    """Tolerance, threads and progress of a computation. Only the tolerance changes its result."""
+    """Tolerance, threads and progress of a computation. Only the tolerance affects results."""
 
     tolerance: float = TOLERANCE
     """Error tolerance of one integration step."""
@@ -124,7 +124,7 @@ _TYPES: Final = {"tolerance": "float", "threads": "int | None", "progress": "Pro
 
 
 def computation(function: F) -> F:
-    """Decorate a public function to accept the keywords of an effort, and pass it one `Effort`.
+    """Decorate a public function to accept tolerance, threads and progress, and pass one `Effort`.
 
     The function has a parameter `effort`, whose default supplies the defaults of the keywords; the type of
     its `**` names the keywords it accepts: `Unpack[Keywords]`, or a dictionary with further keys, which stay

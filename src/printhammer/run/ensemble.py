@@ -52,7 +52,7 @@ _TIMES: Final = "member strobe"
 
 
 class Strobes(Result):
-    """States of all members at requested times, padded to the largest number; NaN after the end of a run."""
+    """States of all members at requested times, padded to the largest number of times; NaN after a run."""
 
     t: FloatArray = column("s", "time", _TIMES)
     x: FloatArray = column("m", "displacement", _TIMES)

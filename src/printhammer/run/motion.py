@@ -47,7 +47,7 @@ FORCES: Final = ("magnet", "spring", "pack", "backstop", "damping", "drag", "dri
 a force, and the total."""
 
 PATHS: Final = ("supply", "chopped", "blocked", "backward")
-"""Paths of the current of a coil: through the supply, through the diode of a chopper, none, and decay of a
+"""Paths of the coil current: through the supply, through the diode of a chopper, none, and decay of a
 negative current."""
 
 _BISECTIONS: Final = 52  # Bisections that exhaust the bits of a float
@@ -230,7 +230,7 @@ class Motion(Result, fields=False):
         return table
 
     def at(self, t: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return displacement, m, and velocity, m/s, at times of the run, s; at a jump, the later values."""
+        """Return displacement, m, and velocity, m/s, at times of the run, s; at a velocity jump, after it."""
         table = self._resampled(t)
         return table[:, 0], table[:, 1]
 

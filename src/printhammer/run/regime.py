@@ -56,7 +56,7 @@ class Window(Declared):
 
 
 PAPER_WINDOW: Final = Window(PAPER_X, PAPER_V)
-"""Window of Fig. 11."""
+"""Window of the strobe plot in Fig. 11 of Hendriks (1983)."""
 
 
 def window_of(hammer: Hammer, drive: Drive) -> Window:
@@ -206,7 +206,7 @@ class Regime(Declared):
 
     @property
     def is_planar(self) -> bool:
-        """Whether displacement and velocity are the whole state at a section without current.
+        """Whether displacement and velocity are the complete state at a section without coil current.
 
         Under a voltage they are not if the coil has a shorted turn, or the supply a capacitor.
         """
@@ -248,7 +248,7 @@ class Regime(Declared):
         return PulseTrain(self.fired, period=self.period, pulses=count, overlap=self.overlap)
 
     def train(self, firings: int) -> tuple[Drive, float]:
-        """Return a drive with the same history at each of `firings` firings, and the time of the first, s.
+        """Return a drive with the same history at each of `firings` firings, and the first firing time, s.
 
         All earlier pulses are active at the first firing; one more pulse is fired at the end, so that no
         state depends on the position of the end.

@@ -76,7 +76,7 @@ class SchemeProblem(Problem):
         return getattr(module, name, None) or getattr(absent, name)
 
     def integrate(self, end: float, moments: FloatArray | None = None) -> schemes_1983.SchemeRun:
-        """Integrate to time `end`, s; return the ends of the steps, or the states at given moments."""
+        """Integrate to time `end`, s; return the states at the step ends, or at given times."""
         hammer = self.hammer
         return schemes_1983.integrate(
             self.laws,
@@ -98,7 +98,7 @@ class SchemeProblem(Problem):
     def strobed(
         self, moments: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray, str]:
-        """Return time, displacement, velocity, mode and memory at moments, s, and the status.
+        """Return time, displacement, velocity, mode and memory at given times, s, and the status.
 
         After a failure of the scheme, these values are NaN, and the mode is -1.
         """

@@ -175,7 +175,7 @@ _SURFACE, _IN, _OUT, _INITIAL = 0, 1, 3, 6
 
 
 class Touches(Declared):
-    """Touches of one surface, pack or backstop, in a run."""
+    """Contacts with one surface, pack or backstop, in a run: times and speeds of touch."""
 
     rows: FloatArray = part(
         "time, s, and velocity, m/s, at touch and at leaving, shape (n, 4)",

@@ -55,7 +55,7 @@ HELD_BRANCHES: Final = {HELD_LOADING: LOADING, HELD_UNLOADING: UNLOADING}
 
 _UNITS: Final = ("m", "m/s")
 _UNITS_BEYOND: Final = ("1", "m", "A", "A", "V")
-"""Units of a state: of displacement and velocity, and of the fields of `Beyond`."""
+"""Units of the state components: displacement, velocity, and the fields of `Beyond`."""
 
 _BRANCHES = {LOADING: "loading", UNLOADING: "unloading", RELOADING: "reloading"}
 

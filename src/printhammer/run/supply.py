@@ -88,12 +88,12 @@ def linkage(hammer: Hammer, x: float, current: float) -> float:
 
 
 def inductance(hammer: Hammer, x: float, current: float) -> float:
-    """Return the slope of the flux linkage of the main path with the current, H."""
+    """Return the derivative of the main-path flux linkage with respect to the current, H."""
     return main_inductance(x, current, coil_of(hammer))
 
 
 def emf(hammer: Hammer, x: float, current: float) -> float:
-    """Return the slope of the flux linkage of the main path along the displacement, Wb/m."""
+    """Return the derivative of the main-path flux linkage with respect to displacement, Wb/m."""
     if hammer.magnet is None or not winding_of(hammer).back_emf:
         return 0.0
     law = _law(hammer, "magnet_emf")

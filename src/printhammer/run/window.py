@@ -116,12 +116,12 @@ def end_of(hammer: Hammer, drive: Drive) -> float:
 
 
 def longest_of(drive: Drive) -> Waveform:
-    """Return the waveform of a drive with the longest duration; the first one if several are equal."""
+    """Return the waveform of a drive with the longest duration; the first waveform if several are equal."""
     return max(waveforms_of(drive), key=lambda waveform: waveform.support)
 
 
 def has_window(hammer: Hammer, waveform: Waveform) -> bool:
-    """Whether a single pulse determines the window of a hammer: it has a pack, and rests before it."""
+    """Whether a single pulse determines the window: the hammer has a pack, and rests clear of the pack."""
     if hammer.front is None or not math.isfinite(waveform.support):
         return False
     try:
@@ -149,6 +149,6 @@ def is_enough(hammer: Hammer, seen: Single, wait: float) -> bool:
 
 
 def last_wait(hammer: Hammer, waveform: Waveform) -> float:
-    """Return the largest window, s, beyond which a window is not doubled."""
+    """Return the largest window, s; the search for a window does not double a window beyond it."""
     way, speed = scales_of(hammer, PulseTrain(waveform), (hammer.rest, 0.0))
     return last_window(least_wait(waveform), way, speed)

@@ -1,4 +1,4 @@
-"""Constants of the Hertz backstop from measurable quantities: two bodies, and one restitution."""
+"""Hertz backstop constants from measurable quantities: two bodies, and the restitution at one speed."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ def stiffness_from_bodies(
 def hertz_stiffness(
     radius1: float, radius2: float, modulus1: float, modulus2: float, ratio1: float, ratio2: float
 ) -> float:
-    """Return the stiffness of `stiffness_from_bodies`; the second radius is NaN for a flat."""
+    """Return the Hertz stiffness of two bodies, N/m^1.5; the second radius is NaN for a flat."""
     compliance = (1.0 - ratio1 * ratio1) / modulus1 + (1.0 - ratio2 * ratio2) / modulus2
     curvature = 1.0 / radius1 + (0.0 if math.isnan(radius2) else 1.0 / radius2)
     return 4.0 / (3.0 * compliance * math.sqrt(curvature))
 
 
 def damping_from_restitution(k: float, restitution: float, speed: float) -> float:
-    """Return the damping l of equation (7), N s/m^2.5, for a given restitution of a free rebound.
+    """Return the damping l of equation (7), N s/m^2.5, for the coefficient of restitution of a free rebound.
 
     With z = (l/k) v_in and y = (l/k) v_out a free contact obeys z - ln(1 + z) = -(y + ln(1 - y)), at any mass
     and stiffness: divide m v dv = -(k - l v) delta^1.5 d(x) by (k - l v) and integrate both ways. Solved for

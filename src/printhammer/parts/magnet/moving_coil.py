@@ -27,7 +27,7 @@ from printhammer.support.constants import quantity
 
 
 def magnet_force(c: Any, x: float, current: float) -> float:
-    """Return the force k i, N."""
+    """Return the force k i on the moving coil, N."""
     return float(c[0] * current)
 
 

@@ -1,4 +1,4 @@
-"""Solenoid or pot magnet as a magnetic circuit: gap with fringing, core that saturates, leakage.
+"""Solenoid or pot magnet as a magnetic circuit: gap with fringing, saturating core, leakage.
 
     N i = Phi / P(g) + Rc Phi / (1 - Phi / Phi_s),    P = mu0 [A / (g + g0) + (U / pi) ln(1 + 2 h / (g + g0))]
     lambda = N Phi + Ls (1 - g / gs) i,               g = closed_at - x, or x - closed_at

@@ -1,1 +1,1 @@
-"""Plain functions of numbers and arrays: entry points of the page, and arithmetic of runs."""
+"""Plain functions of numbers and arrays: entry points of the web page, and scales and windows of runs."""

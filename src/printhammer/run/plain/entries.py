@@ -1,4 +1,4 @@
-"""Plain functions that are entry points of the page's WebAssembly module, beside those of the kernel.
+"""Plain functions compiled as entry points of a web page's WebAssembly module, besides the kernel.
 
 A plain function takes numbers, arrays and tuples of them, allocates nothing, raises nothing, and returns
 integers; it and all functions that it calls are ordinary functions of any room. Python calls it as it is, or
@@ -88,7 +88,7 @@ Numbers = dict[str, tuple[tuple[str | None, ...], tuple[float, ...]]]
 
 
 def numbers_of(hammer: Hammer) -> Numbers:
-    """Return the arrays of a hammer from which the entry points `constants` and `rest` compute.
+    """Return the numbers of a hammer as input arrays of the entry points `constants` and `rest`.
 
     The arrays are `body`, those of the parts by role, and `limits`, whose first two numbers `constants`
     writes. Numbers whose key changes are replaced; positions of backstop and front occur twice.
@@ -116,7 +116,7 @@ def _numbers_of(part: Part, origin: float) -> tuple[tuple[str | None, ...], tupl
 
 
 def entries() -> dict[str, Plain]:
-    """Return the plain functions of the page, by name."""
+    """Return the plain functions of the web page, by name."""
     from printhammer.kernel.compile.signatures import Plain
 
     return {name: Plain(*entry) for name, entry in _ENTRIES.items()}

@@ -1,4 +1,4 @@
-"""Entry points with which a page poses a run: constants, rest, supply, scales and window from plain numbers.
+"""Entry points for a web page that sets up a run: constants, rest position, supply, scales, window.
 
 They compute what `printhammer.run.problem` computes from a hammer and a drive. An outcome other than 0 is a
 refusal, see `REFUSALS`.
@@ -74,7 +74,7 @@ CURRENT, FORCE, VOLTAGE = 0.0, 1.0, 2.0
 """Codes of the driven quantity."""
 
 FITS, WEAK_HOLD, FALLING_LINKAGE = range(3)
-"""Outcomes of `supply`."""
+"""Outcomes of `supply`: valid; hold current out of reach; flux linkage that does not increase."""
 
 
 def fill_constants(
@@ -121,7 +121,7 @@ def fill_constants(
 
 
 def statics_at(constants: Any, limits: Any) -> Statics:
-    """Return the statics of a hammer from its constants.
+    """Build the functions and constants of the static force from the constants of a hammer.
 
     `limits` are the range of the law of the magnet, m, the position of the platen and the thickness of the
     pack, m, NaN without one, and the mass, kg.
@@ -185,7 +185,7 @@ def find_rest(constants: Any, limits: Any, grid: Any, points: Any, found: Any, o
 
 
 def coil_at(constants: Any) -> Coil:
-    """Return the coil of a hammer from its constants."""
+    """Build the functions and constants of the coil from the constants of a hammer."""
     coupled = False
     if HAS_MAGNET:
         coupled = constants[COUPLED] != 0.0
@@ -286,7 +286,7 @@ def fill_scales(
 
 
 def begin_window(about: Any, rest: float, front: float, out: Any) -> int:
-    """Write the smallest window of a device, s; return whether a single pulse is needed to confirm it.
+    """Write the smallest window of a device, s; return whether a single pulse has to confirm the window.
 
     `about` are the numbers about the pulse, `rest` and `front` positions, m, the latter NaN without a pack.
     """
@@ -296,7 +296,7 @@ def begin_window(about: Any, rest: float, front: float, out: Any) -> int:
 
 
 def judge_window(status: int, contacts: Any, nodes: Any, places: Any, wait: float, out: Any) -> int:
-    """Return whether a window is long enough for a single pulse from rest; the caller doubles a shorter one.
+    """Whether a window is long enough for a single pulse from rest; the caller doubles a shorter window.
 
     Parameters
     ----------

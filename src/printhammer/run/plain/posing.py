@@ -1,4 +1,4 @@
-"""Scales of a run, coil of a hammer, and window of a device, as plain functions of numbers.
+"""Scales of a run, coil circuit, and window (time from last firing to end of run), as plain functions.
 
 `printhammer.run.problem`, `printhammer.run.supply` and `printhammer.run.window` call these functions, and so
 do the entry points of a page in `printhammer.run.plain.page`.
@@ -16,7 +16,7 @@ FAR: Final = 1e4
 """Distance from the origin, in strokes, beyond which the motion counts as a runaway; arbitrary."""
 
 PLACES: Final = 33
-"""Positions along the travel of the armature at which the inductance is checked; arbitrary."""
+"""Number of positions along the travel of the armature at which the inductance is checked; arbitrary."""
 
 SHORT: Final = 1e-3
 """Time, s, in which a coil without resistance is assumed to reach its typical current; arbitrary."""
@@ -25,19 +25,19 @@ CYCLE: Final = 4e-3
 """Smallest default time from switch-off of the supply to the end of a run, s."""
 
 FLIGHTS: Final = 3.0
-"""Smallest length of a window, in flight times of the single pulse; a later dot may fly longer."""
+"""Smallest time from last firing to end of run, in flight times of a single pulse."""
 
 SETTLED: Final = 0.05
-"""Distance from rest at the end of a window, as a fraction of the distance to the pack."""
+"""Largest distance from rest at the end of a run, as a fraction of the distance from rest to the pack."""
 
 PATIENCE: Final = 16.0
-"""Largest window of a device that does not settle, in flight times."""
+"""Largest time from last firing to end of run if the armature does not settle, in flight times."""
 
 LONGEST: Final = 64.0
-"""Largest window of a device that makes no dot, in time scales."""
+"""Largest time from last firing to end of run if no dot is made, in units of displacement over speed."""
 
 LAST: Final = 1.0
-"""Upper limit of a window, s."""
+"""Upper limit of the time from last firing to end of run, s."""
 
 
 PAPER_X: Final = (38.1e-6, 88.9e-6)
@@ -53,10 +53,10 @@ PAPER_FRONT: Final = 203.2e-6
 """Front of the pack in Hendriks (1983), m: 0.008 in."""
 
 SAME: Final = 1e-3
-"""Relative difference within which positions equal the positions of the paper."""
+"""Relative tolerance within which positions count as the positions of the paper."""
 
 PART: Final = 1.0 / 6.0
-"""Half-width of the paper's window, relative to the distance from backstop to pack."""
+"""Half-width of the strobe window of Fig. 11, as a fraction of the distance from backstop to pack."""
 
 
 def is_the_paper(position: float, front: float) -> bool:
@@ -109,7 +109,7 @@ def main_linkage(x: float, current: float, coil: Coil) -> float:
 
 
 def main_inductance(x: float, current: float, coil: Coil) -> float:
-    """Return the slope of the flux linkage of the main path with the current, H."""
+    """Return the derivative of the main-path flux linkage with respect to the current, H."""
     if not coil.coupled:
         return coil.inductance
     return coil.inductance + float(coil.magnet_inductance(coil.magnet, x, current))
@@ -211,7 +211,7 @@ def least_window(support: float, replaces: bool) -> float:
 
 
 def last_window(least: float, way: float, speed: float) -> float:
-    """Return the largest window, s, from the smallest one and the scales of the single pulse, m and m/s."""
+    """Return the largest window, s, from the smallest window and typical displacement, m, and speed, m/s."""
     return least + min(LONGEST * way / speed, LAST)
 
 
@@ -234,7 +234,7 @@ def is_window(ok: bool, flight: float, x: float, v: float, rest: float, front: f
 
 
 def flight_of(contacts: Any) -> float:
-    """Return the time of the first touch of the pack after the start, s; NaN without one."""
+    """Return the time of the first pack contact after the start, s; NaN without a contact."""
     for k in range(len(contacts)):
         if contacts[k, 0] == PACK_SURFACE and contacts[k, 6] == 0.0:
             return float(contacts[k, 1])
