@@ -274,7 +274,7 @@ class Job:
         return Ragged(self.kept.dots[places], starts)
 
     def make_room(self) -> bool:
-        """Allocate rows for members with more extra contacts than rows; return whether there are such members.
+        """Allocate rows for members with more extra contacts than rows; return whether any were allocated.
 
         The next integration covers these members only, and fills their rows again.
         """
