@@ -1,4 +1,4 @@
-"""Units: conversion of text with a unit to SI and back; no other module knows units.
+"""Conversion of numbers with units, as text, to SI and back; the only module that knows units.
 
 All internal quantities are floats in SI; units occur in hammer files, drives, tables, the command line and on
 the axes of figures. Units are written in the usual way: "N/m^1.5", "N^0.5 m^0.25/A", "in", "us", "lbf", "1"
@@ -77,7 +77,7 @@ _COMMON = {
     "H": (3, 2, 1, -2, -2),
     "F": (-3, -2, -1, 4, 2),
 }
-"""Common units: power of ten of the size in m, g, s and A, and powers of `_BASES`."""
+"""Common units by symbol: power of ten in m, g, s and A, then the exponents of the `_BASES`."""
 
 _ZEROS = {"degF": 32, "fahrenheit": 32}
 """Zero offset of a unit: number in the unit that corresponds to 0 in SI; 0 for units not listed."""
@@ -120,7 +120,7 @@ def to_si(value: float, unit: str, si_unit: str) -> float:
 
 
 def all_to_si(values: Sequence[float], unit: str, si_unit: str) -> list[float]:
-    """Convert many numbers to SI as `to_si` does each; NaN stays NaN."""
+    """Convert an array of numbers to SI, element by element as `to_si`; NaN stays NaN."""
     factor = _factor(unit, si_unit)
     if factor == 1:
         return [value + 0.0 for value in values]
@@ -270,7 +270,7 @@ def _measure(unit: str) -> tuple[Fraction, _Dimension]:
 
 @lru_cache(maxsize=1)
 def _common() -> dict[str, tuple[Fraction, _Dimension]]:
-    """Return size and dimension of common SI units by symbol; looking them up takes 0.3 s at start-up.
+    """Return size and dimension of common SI units by symbol, to avoid a look-up of 0.3 s at start-up.
 
     A test compares the table with `units.txt`.
     """
@@ -287,7 +287,7 @@ def _dimension(powers: Sequence[int]) -> _Dimension:
 
 
 def _looked_up(name: str) -> tuple[Fraction, _Dimension]:
-    """Return size and dimension of a unit by name from `units.txt`; LookupError if it is not known."""
+    """Return size and dimension of a unit by name from `units.txt`; LookupError if the unit is unknown."""
     from pint import UndefinedUnitError
 
     registry = _registry()
@@ -300,7 +300,7 @@ def _looked_up(name: str) -> tuple[Fraction, _Dimension]:
 
 
 def _factors(unit: str) -> Iterator[tuple[str, Fraction]]:
-    """Split a unit into names and powers; a slash divides by the one factor that follows it."""
+    """Split a unit into names and powers; a slash divides by the next factor only."""
     text, position, sign = unit.translate(_SIGNS), 0, 1
     while unit.isprintable() and (match := _FACTOR.match(text, position)):
         if match["name"] != "1":

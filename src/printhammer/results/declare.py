@@ -32,7 +32,7 @@ import numpy as np
 from printhammer.support.html import html_table, titled
 
 MOST_ROWS: Final = 40
-"""Largest number of table rows shown; of longer tables the first and last rows are shown. Arbitrary."""
+"""Maximum number of displayed table rows; longer tables show their first and last rows. Arbitrary."""
 
 
 def cell(value: Any) -> str:
@@ -61,7 +61,7 @@ def span(values: Any) -> str:
 
 
 def shortened(rows: Sequence[Sequence[str]], most: int = MOST_ROWS) -> list[Sequence[str]]:
-    """Return at most `most` rows: the first and last ones, and between them the number of omitted rows."""
+    """Return at most `most` rows: the first and last rows, and between them the number of omitted rows."""
     hidden, half = len(rows) - most, most // 2
     if hidden <= 0:
         return list(rows)
@@ -139,7 +139,7 @@ class Column:
 
 
 def heading(name: str, unit: str) -> str:
-    """Return the heading of a column, such as "x [m]"; a pure number or a word has no unit."""
+    """Return the heading of a column, such as "x [m]", without unit for a pure number or a text."""
     return name if unit in ("", "1") else f"{name} [{unit}]"
 
 
@@ -188,7 +188,7 @@ def scalar(unit: str, meaning: str, *, more: str = "", name: str = "", **default
 
 
 def part(meaning: str, *, more: str = "", repr: bool = True, **default: Any) -> Any:
-    """Declare a field outside the Dataset, such as the hammer; it may contribute to the provenance.
+    """Declare a field outside the Dataset, such as the hammer; the field may enter the provenance.
 
     `default` and `default_factory` are passed to `dataclasses.field`.
     """

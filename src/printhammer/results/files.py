@@ -141,7 +141,7 @@ def reopen(path: str | Path) -> Reopened:
 
 
 def need_for(path: str | Path, kind: str = "") -> None:
-    """Check that the optional package for a file format is installed; `kind`, if set, replaces the ending."""
+    """Check that the package for a file format is installed; `kind` names the format (default: ending)."""
     package, what, extra = _NEEDED.get(kind or Path(path).suffix.lower(), ("json", "", ""))
     if find_spec(package) is None:
         raise missing_extra(f"{path}: {what} {package}", extra)
@@ -172,7 +172,7 @@ def dataset_of(entries: Mapping[str, tuple[Column, Any]], attributes: Mapping[st
 
 
 def frame_of(dataset: xr.Dataset, attributes: Mapping[str, Any] | None = None) -> pd.DataFrame:
-    """Convert to a table the arrays of a Dataset that share the dimensions of the first array."""
+    """Build a table from the arrays of a Dataset that have the dimensions of the first array."""
     first = next(iter(dataset.data_vars.values()), None)
     dims = () if first is None else tuple(map(str, first.dims))
     columns = {}

@@ -1,4 +1,4 @@
-"""Provenance of results: definition of the keys.
+"""Provenance of results: inputs, versions and settings by which a result can be reproduced.
 
 | key | |
 |---|---|
@@ -27,7 +27,7 @@ from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.hammer.hammer import Hammer
 
 VERSIONS: Final = ("printhammer", "numpy", "llvmlite", "scipy")
-"""Keys of the versions, which every result has."""
+"""Provenance keys of the package versions, which every result states."""
 
 KEYS: Final = (
     "hammer",
@@ -78,7 +78,7 @@ def provenance(
 
 
 def versions() -> dict[str, str]:
-    """Return the package versions on which the bits of a result depend."""
+    """Return the package versions on which a result depends bit by bit."""
     from printhammer import __version__
 
     return {"printhammer": __version__, **{name: _installed(name) for name in VERSIONS[1:]}}

@@ -58,7 +58,7 @@ if TYPE_CHECKING:
 Entries = dict[str, tuple[Column, Any]]
 
 RESULTS: dict[str, type[Result]] = {}
-"""Result classes that have been imported, by name."""
+"""Imported result classes, by class name."""
 
 
 @dataclass_transform(
@@ -247,7 +247,7 @@ class Result:
 
 
 def _worded(summary: Callable[..., Summary]) -> Callable[..., Summary]:
-    """Decorate `summary` so that the text uses the hammer's noun for the result of a pulse."""
+    """Decorate `summary` to write the hammer's noun for the result of a pulse instead of "dot"."""
 
     @wraps(summary)
     def said(self: Result, *args: Any, **options: Any) -> Summary:
@@ -351,7 +351,7 @@ class Rows(tuple[_T, ...]):
 
     @property
     def _heads(self) -> dict[str, str]:
-        """Headings of the columns, such as "t_in [s]", by attribute name."""
+        """Column headings, such as "t_in [s]", by attribute name."""
         return {name: note.heading(name) for name, note in columns_of(self.kind).items()}
 
     def to_dataframe(self) -> pd.DataFrame:

@@ -1,4 +1,4 @@
-"""Store of sweep results: a Zarr v3 group, written block by block, that survives a crash at any moment.
+"""Store of sweep results: a Zarr v3 group, written block by block, that survives a crash at any time.
 
 All arrays are laid out before the first result. A block of members is one chunk of every array, so that
 stored data are never rewritten. Each file is written to a temporary name, flushed to disk, and renamed; the
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MARK: Final = "status"
-"""Name of the array whose chunk marks a block as done."""
+"""Name of the array whose chunk, written last, marks a block as complete."""
 
 _ROOT: Final = "zarr.json"
 _FLUSHES: Final = 8  # Files flushed at once; arbitrary
@@ -58,7 +58,7 @@ class Layout(Declared):
 
 
 class Store:
-    """Store of results that this process locks and writes; a context manager.
+    """Store of sweep results, opened for writing and locked by this process; a context manager.
 
     Parameters
     ----------

@@ -55,17 +55,17 @@ def interval(values: npt.NDArray[Any], unit: str) -> str | None:
 
 
 def styled(style: Style, said: object) -> str:
-    """Mark words with a display style."""
+    """Mark a text with a display style."""
     return f"⟪{style} {said}⟫"
 
 
 def judged(good: bool, said: object, otherwise: Style = "poor") -> str:
-    """Mark words with the style "good" or, if `good` is false, with the style `otherwise`."""
+    """Mark a text with the style "good" or, if `good` is false, with the style `otherwise`."""
     return styled("good" if good else otherwise, said)
 
 
 def repeated(name: str, sentences: Iterable[str]) -> list[FactRow]:
-    """Return sentences as facts; only the first fact has the name."""
+    """Return sentences as facts of a summary, with the name on the first fact only."""
     return [("" if row else name, sentence) for row, sentence in enumerate(sentences)]
 
 
@@ -76,13 +76,13 @@ def multiplier(value: complex) -> str:
 
 
 def sign(unit: str, system: System) -> str:
-    """Return the symbol of the unit in which quantities of an SI unit are displayed."""
+    """Return the symbol of the display unit for quantities with a given SI unit."""
     name = SHOWN[unit][system][0]
     return _SIGNS.get(name, name)
 
 
 def shown(value: float, unit: str, system: System) -> str:
-    """Format a quantity, SI, in the displayed unit, without the unit symbol."""
+    """Format a quantity, SI, as a number in its display unit, without the unit symbol."""
     from printhammer.units import from_si
 
     name, digits = SHOWN[unit][system]
@@ -140,7 +140,7 @@ class Cells:
 
 @dataclass(frozen=True)
 class Grid:
-    """Small table of a summary; of more than `most` rows only the first and last ones are shown."""
+    """Small table of a summary; a table of more than `most` rows shows its first and last rows only."""
 
     columns: Sequence[Cells]
     title: str = ""
@@ -171,7 +171,7 @@ class Summary(tuple[str | Facts | Grid, ...]):
     __slots__ = ()
 
     def worded(self, strike: str) -> Summary:
-        """Return the summary with another noun in place of "dot", such as "closing"."""
+        """Return a copy of the summary with another noun, such as "closing", in place of "dot"."""
         return Summary(worded(each, strike) for each in self)
 
     def text(self, system: System = "si") -> str:
@@ -196,7 +196,7 @@ class Summary(tuple[str | Facts | Grid, ...]):
 
 
 def worded(each: Any, strike: str) -> Any:
-    """Replace "dot" and "printed" in texts, also those of facts, tables and sequences."""
+    """Replace the words "dot" and "printed" in texts, and in facts, tables and sequences of texts."""
     if strike == "dot":
         return each
     if isinstance(each, str):

@@ -29,7 +29,7 @@ _KINDS: Final = {
 class _Argument(NamedTuple):
     name: str
     place: int
-    """Index among the positional arguments; for a keyword-only parameter, the number of positional ones."""
+    """Positional index of the argument; if keyword-only, the number of positional arguments."""
 
     classes: frozenset[str]
     expected: str

@@ -34,9 +34,9 @@ class Quantity:
     """Declaration of a physical constant, stored as metadata of a model field."""
 
     si: str
-    """SI unit of the stored float, as `printhammer.units` writes it; "1" for a pure number."""
+    """SI unit of the stored value, in the notation of `printhammer.units`; "1" for a pure number."""
     symbol: str
-    """Symbol in the paper or the usual textbook, plain text."""
+    """Symbol of the constant in the paper or in textbooks, as plain text."""
     meaning: str
     """Meaning of the constant in one phrase, for tables and help texts."""
     also: tuple[str, ...] = ()
@@ -112,7 +112,7 @@ def quantities(model: type[BaseModel]) -> dict[str, Quantity]:
 
 
 def options(model: type[BaseModel]) -> dict[str, Any]:
-    """List the other fields of a model class (choices, flags, file names): annotation by field name."""
+    """List the fields that are no physical constants (choices, flags, file names): annotation by name."""
     known = quantities(model)
     return {name: field.annotation for name, field in model.model_fields.items() if name not in known}
 

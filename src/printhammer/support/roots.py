@@ -30,7 +30,7 @@ MOST_POINTS: Final = 3
 
 @dataclass(frozen=True)
 class Root:
-    """Root of a function, with the sign of the function on either side: -1 or 1; 0 at an end of the grid."""
+    """Root of a function, with the sign of the function on either side, -1 or 1, or 0 outside the grid."""
 
     x: float
     before: int
@@ -113,7 +113,7 @@ def find_roots(function: Any, about: Any, grid: Any, count: int, places: Any, va
 
 
 def with_probes(function: Any, about: Any, grid: Any, count: int, places: Any, values: Any) -> int:
-    """Evaluate a function on the grid, and beside grid points that are roots, for the signs on both sides.
+    """Evaluate a function on a grid and, for its sign on both sides, next to grid points that are roots.
 
     Returns
     -------

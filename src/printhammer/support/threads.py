@@ -1,4 +1,4 @@
-"""Threads over ranges, and cooperative computations that share their expensive evaluations.
+"""Thread pools over index ranges, and coroutines that evaluate their queries in common batches.
 
 `in_threads` splits ranges of indices into chunks, which threads fetch one at a time.
 
@@ -152,7 +152,7 @@ Work: TypeAlias = Generator[list[A], list[B], T]
 
 
 def together(works: Sequence[Work[A, B, T]]) -> Work[A, B, list[T]]:
-    """Run several `Work` coroutines together, answering the queries of all at once; return their results."""
+    """Run several `Work` coroutines in step, with one batch of queries per step; return their results."""
     ends: dict[int, T] = {}
     answers: dict[int, list[B] | None] = dict.fromkeys(range(len(works)))
     while answers:
@@ -169,7 +169,7 @@ def together(works: Sequence[Work[A, B, T]]) -> Work[A, B, list[T]]:
 
 
 def translated(work: Work[A, B, T], answer: Callable[[list[A]], Work[C, D, list[B]]]) -> Work[C, D, T]:
-    """Run a `Work` whose queries are answered by further works with queries of another kind."""
+    """Run a `Work` coroutine; `answer` converts its queries to a coroutine with queries of another kind."""
     answers: list[B] | None = None
     while True:
         try:
@@ -182,7 +182,7 @@ def translated(work: Work[A, B, T], answer: Callable[[list[A]], Work[C, D, list[
 
 
 def answered(work: Work[A, B, T], answer: Callable[[list[A]], list[B]]) -> T:
-    """Run a `Work` to its end; a function answers its queries."""
+    """Run a `Work` coroutine to its end; the function `answer` evaluates the queries."""
     answers: list[B] | None = None
     while True:
         try:

@@ -1,4 +1,4 @@
-"""Declarations of the columns of a table, in a text or in a file beside the table.
+"""Declarations of table columns, in a text or in a TOML file next to the table.
 
 ``time=1, current=2*-10 A/V, displacement=3*50 um/V+120 um, delay(current)=2 us``: columns are counted from 1.
 The factor converts the number in the table to the quantity; if the table states a unit for the column, the
@@ -50,14 +50,14 @@ class Source:
     place: int
     """Number of the column in the table, counted from 1."""
     factor: float = 1.0
-    """Factor that converts a number in the table to the quantity, in `unit`."""
+    """Factor by which a number in the table is multiplied to get the quantity, in `unit`."""
     unit: str = ""
     """Unit of the factor, such as "A/V" or "A"; empty where the factor is a pure number."""
     offset: str = ""
     """Offset added after multiplication, with its unit; empty for no offset."""
 
     def scale(self, own: str, si: str) -> float:
-        """Compute the factor that converts numbers of the table to SI; `own` is their unit, if stated.
+        """Compute the factor that converts table numbers to SI; `own` is the unit of the table, if stated.
 
         Raises
         ------

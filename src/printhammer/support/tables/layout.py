@@ -42,14 +42,14 @@ _VOLTAGES: Final = re.compile(r"V\(.+\)")
 
 
 class Heading(NamedTuple):
-    """Name and unit of a column; each is empty if the heading lacks it."""
+    """Name and unit of a column; empty where the heading has no name or no unit."""
 
     name: str
     unit: str = ""
 
     @property
     def shown(self) -> str:
-        """Heading as text for messages, such as "CH1 [V]"."""
+        """Column heading as text for messages, such as "CH1 [V]"."""
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
     @property
@@ -81,7 +81,7 @@ def split_heading(cell: str) -> Heading:
 
 
 def unit_of(text: str) -> str:
-    """Parse a cell such as "(us)", "Volts" or "V DC" as a unit; empty if the cell is no unit."""
+    """Parse a cell such as "(us)", "Volts" or "V DC" as a unit; empty text if the cell is not a unit."""
     bare = re.sub(r"\s*(DC|AC|dc|ac)$", "", text.strip().strip("()[]{}").strip()) or text.strip()
     if _NUMBERED.fullmatch(bare):
         return ""
@@ -162,7 +162,7 @@ class Clock(NamedTuple):
 
 @dataclass(frozen=True)
 class Table:
-    """A table of numbers before its columns are assigned to quantities."""
+    """Table of numbers, before the columns are assigned to quantities."""
 
     where: str
     """Name of the file, for error messages."""
@@ -177,7 +177,7 @@ class Table:
     comments: dict[str, str]
     """Comments of the form ``# key: value``."""
     clock: Clock | None
-    """Times of the rows, if metadata in the file state them; else None."""
+    """Sample times of the rows, if metadata in the file state the sampling; else None."""
 
     def cells(self, place: int) -> list[str]:
         """Return the cells of a column, stripped of white space."""
@@ -251,7 +251,7 @@ def layout_of(text: str, where: str, words: Collection[str] = ()) -> Table:
 
 
 def _separator(text: str) -> str:
-    """Determine the separator: the one that makes most lines rows of numbers, or else splits most lines."""
+    """Determine the separator that makes most lines rows of numbers, or else splits most lines."""
     lines = [line for line in text.split("\n", _LINES)[:_LINES] if line.strip() and line.strip()[0] != "#"]
     best, chosen = 0, ""
     for sign in _SEPARATORS:
@@ -373,7 +373,7 @@ def _with_units(columns: list[Heading], facts: dict[str, list[str]], above: list
 
 
 def _beside_names(columns: list[Heading], facts: dict[str, list[str]]) -> list[Heading]:
-    """Return the headings for an older Tektronix oscilloscope: time, and the source named in the metadata."""
+    """Return the headings of an older Tektronix oscilloscope: time, and the channel named in the metadata."""
     source = _fact(facts, ("source",), [""])[0]
     unit = split_heading(f"x [{facts[_TIME_UNIT[0]][0]}]").unit
     return [Heading("time", unit), *(column._replace(name=source) for column in columns[1:])]

@@ -36,7 +36,7 @@ BEFORE: Final = 0.1
 
 _TINY: Final = float(np.finfo(np.float64).tiny)
 _BY_UNIT: Final = {"time": "s", "current": "A", "force": "N"}
-"""Quantities of a record that a unit identifies without a name; a voltage may be any quantity."""
+"""Quantities of a record that are identified by their unit alone; a voltage may be any quantity."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class Readings:
     values: dict[str, FloatArray]
     """Columns of numbers by quantity, SI, shape (rows,)."""
     words: dict[str, list[str]]
-    """Columns of words by name, in lower case."""
+    """Text columns by name, in lower case."""
     lines: IntArray
     """Line number in the file of each row, counted from 1, shape (rows,)."""
     comments: dict[str, str]
@@ -143,7 +143,7 @@ def read_table(
 
 
 def columns_of(path: Path, columns: str | None) -> Columns | None:
-    """Return the declared columns of a table, from `columns` or the file beside it; None without either."""
+    """Return the declared columns of a table, from `columns` or the file next to the table; else None."""
     return columns_beside(path) if columns is None else read_columns(columns)
 
 
@@ -196,7 +196,7 @@ def assigned(
     wanted: str,
     columns: Columns | None,
 ) -> tuple[dict[str, Source], dict[str, int]]:
-    """Assign columns to quantities and words, by declaration if there is one, else by heading."""
+    """Assign columns to quantities and text columns, by the declaration or, without one, by the heading."""
     if columns is None:
         return _by_heading(table, numbers, text, wanted)
     for name, source in columns.sources.items():
@@ -397,7 +397,7 @@ def _words(table: Table, name: str, place: int, allowed: tuple[str, ...]) -> lis
 def _in_time(
     values: dict[str, FloatArray], lines: IntArray, columns: Columns, where: str
 ) -> tuple[dict[str, FloatArray], IntArray]:
-    """Remove the delays: interpolate all columns at the times of the first; drop incomplete rows.
+    """Remove column delays: interpolate all columns to the times of the first column; drop incomplete rows.
 
     The times of the first column are shifted; the others are interpolated linearly.
     """
