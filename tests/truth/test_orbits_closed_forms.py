@@ -245,6 +245,20 @@ def test_a_longer_search_finds_what_a_shorter_one_does() -> None:
 
 
 @pytest.mark.slow
+def test_orbits_near_chatter_are_found_near_others() -> None:
+    """Newton's method from a fine grid of states, on the exact flights of the ball, finds these orbits."""
+    ball = ph.load("tufillaro-1992")
+    force = ph.SineForce(1.1705e-4 * (2.0 * math.pi * 60.0) ** 2 * ball.mass, 60.0)
+    every = ph.orbits(ball, drive=force, longest=3)
+    exact = {509.707: (8.637200107e-06, 1.9766846923e-03), -1023.899: (8.365746153e-06, 5.8140712776e-03)}
+    for multiplier, (x, v) in exact.items():
+        gaps = [(np.abs(own.x - x) / 1e-4 + np.abs(own.v - v)).min() for own in every if own.firings == 3]
+        near = [own for own in every if own.firings == 3][int(np.argmin(gaps))]
+        assert min(gaps) < 1e-7
+        assert near.multipliers[0].real == pytest.approx(multiplier, rel=1e-5)
+
+
+@pytest.mark.slow
 def test_mirror_images_of_orbits_are_found() -> None:
     force = ph.SineForce(0.3, 1.0 / (2.0 * math.pi), phase="90 deg")
     found = ph.orbits(ph.load("duffing-holmes"), drive=force, longest=1, starts=128, guesses=8)

@@ -86,6 +86,12 @@ _TOUCHES: Final = 4
 _COMPLETED: Final = 6
 _MORE: Final = 512
 """Largest period, in firings, that is searched again if its index sum is not 1; number of further guesses."""
+_NEAR: Final = 64  # Number of guesses near each known orbit of a period whose index sum is not 1
+_ROUNDS: Final = 3  # Largest number of rounds of these guesses; arbitrary
+_SIZES: Final = (-6.0, -1.5)
+"""Decimal logarithms of the sizes of the displacements of these guesses, in half-widths of the strobe window.
+
+Near chatter, orbits that differ by one bounce lie close together. From the ball of Tufillaro at 60 Hz."""
 _SAME: Final = 1e-6
 """Distance, in half-widths of the strobe window, below which two orbits share a state."""
 _FAST: Final[dict[str, Any]] = {"goal": 1e-9, "enough": 1e-7, "iterations": 30}
@@ -245,16 +251,35 @@ class Search:
                 self._try(fast, different, more, (len(self.blocks) - 1, last))
 
     def _complete(self, fast: FastMaps, different: list[_Known], records: Records) -> None:
-        """Try more close returns for each period whose fixed-point indices do not sum to 1."""
+        """Try more guesses for each period whose fixed-point indices do not sum to 1.
+
+        The guesses are close returns, and then states near known orbits.
+        """
         stage = len(self.blocks) - 1, len(self.batches) - 1
         for period in range(1, min(self.longest, _COMPLETED) + 1):
-            own = [
-                (int(known.closing.firings.sum()), multipliers_of(known.closing.jacobians))
-                for known in different
-            ]
-            if index_sums(own, period)[period] != 1:
-                returns = close_returns(records, period, _MORE, self.scales, firings_for(period))
-                self._try(fast, different, [guess for both in returns for guess in both], stage)
+            if _index_sum(different, period) == 1:
+                continue
+            returns = close_returns(records, period, _MORE, self.scales, firings_for(period))
+            self._try(fast, different, [guess for both in returns for guess in both], stage)
+            rng = np.random.default_rng(period)
+            for _ in range(_ROUNDS):
+                if _index_sum(different, period) != 1:
+                    self._try(fast, different, self._displaced(different, period, rng), stage)
+
+    def _displaced(self, different: list[_Known], period: int, rng: np.random.Generator) -> list[Guess]:
+        """Displace the states of known orbits of a period by random amounts of several magnitudes."""
+        backstop, lowest = self.regime.hammer.backstop, np.full(2, -np.inf)
+        if backstop is not None and backstop.law == "rigid":
+            lowest[0] = self.regime.hammer.position
+        # The same displacements for every orbit, so that a larger search includes those of a smaller one.
+        sizes = 10.0 ** rng.uniform(*_SIZES, (_NEAR, 1, 1))
+        moves = sizes * self.scales * rng.uniform(-1.0, 1.0, (_NEAR, period, 2))
+        own = [known.closing for known in different if known.closing.firings.sum() == period]
+        return [
+            Guess(np.maximum(closing.states + move[: len(closing.states)], lowest), closing.firings)
+            for closing in own
+            for move in moves
+        ]
 
     def _batch(self, guesses: list[Guess], batch: int, period: int) -> list[Guess]:
         """Return the guesses that a batch adds to the preceding batches."""
@@ -391,6 +416,12 @@ class Search:
         nearest = int(np.argmin(gaps))
         memory = abs(orbit.memory[0] - other.memory[nearest]) / self.scales[0]
         return bool(max(gaps[nearest], memory) <= _SAME and orbit.branch[0] == other.branch[nearest])
+
+
+def _index_sum(different: Sequence[_Known], period: int) -> int:
+    """Compute the sum of the fixed-point indices of known orbits over a number of firings."""
+    own = [(int(known.closing.firings.sum()), multipliers_of(known.closing.jacobians)) for known in different]
+    return index_sums(own, period)[period]
 
 
 def _share(guesses: int, period: int) -> int:
