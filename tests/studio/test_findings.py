@@ -136,7 +136,7 @@ def test_pins_of_a_hostile_link_harm_nothing(address: str, opened_browser: Any, 
     page.wait("!window.studio.studio.busy")
     page.run("window.studio.studio.store.set({ rate: 1300 })")
     page.wait("!window.studio.studio.busy && window.studio.studio.frames.motion.fired[1] < 1 / 1290")
-    assert page.run("document.querySelectorAll('.pins .chip').length") <= 4
+    assert page.run("document.querySelectorAll('.chips .chip').length") <= 4
     assert page.run("window.studio.studio.ghosts.length") == 0
     assert page.complaints == []
     page.call("Page.close")

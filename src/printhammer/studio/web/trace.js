@@ -22,7 +22,7 @@ export function traceRow(studio) {
   const name = make("input", { type: "text", "aria-label": "name of the trace", maxlength: 60, size: 18, spellcheck: "false" });
   const residual = make("output", { class: "residual", role: "status" });
   const rows = make("div", { class: "offsets" });
-  const holder = make("section", { class: "pins trace", "aria-label": "measured trace", hidden: true },
+  const holder = make("section", { class: "trace", "aria-label": "measured trace", hidden: true },
     make("span", { class: "chip" }, make("i", { "aria-hidden": "true" }), name, make("button", { type: "button", title: "take the trace away", "aria-label": "take the trace away", onclick: () => studio.store.set({ trace: null }) }, "×")), rows, residual);
   const change = (patch, control) => studio.store.set({ trace: { ...studio.store.state.trace, ...patch } }, control);
   name.addEventListener("change", () => { if (name.value.trim()) change({ name: name.value.trim() }); else name.value = studio.store.state.trace.name; });
