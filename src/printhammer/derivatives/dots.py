@@ -122,7 +122,7 @@ def _peak_time(problem: Problem, record: Record, contact: Contact) -> float:
 
 
 def _force_time(problem: Problem, record: Record, contact: Contact, t_peak: float) -> float:
-    """Return the time of the largest pack force, s; the touch time if the force is largest there."""
+    """Return the time of the largest pack force, s; the time of touch if the force is largest then."""
     from scipy.optimize import minimize_scalar
 
     t_in, t_out = contact.t_in, _end(record, contact)

@@ -74,7 +74,7 @@ def load(name_or_path: str | Path) -> Hammer:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Hammer:
-    """Actuator: armature, magnet, spring, backstop, the pack in front of it, pulse waveform and coil.
+    """Actuator: armature, magnet, coil, spring, backstop, the pack that the armature strikes, waveform.
 
     Created by `load` or `Hammer.from_toml`. Two hammers are equal if their files have equal contents.
     """
@@ -330,7 +330,7 @@ class Hammer:
         return changed_text(self._text, self._edits) if self._edits else self._text
 
     def save(self, path: str | Path) -> None:
-        """Write the hammer file, and the tables it refers to beside it.
+        """Write the hammer file and, into the same folder, the tables to which the file refers.
 
         Raises
         ------

@@ -56,7 +56,7 @@ _PIECE: Final = 4 * lane_layout.LANES
 
 
 class Group:
-    """Members with the same laws, overlap rule, kinds of waveform pieces and kind of start.
+    """Ensemble members with the same laws, overlap rule, kinds of waveform pieces and kind of start.
 
     The assignment depends on each member alone, so that its kernel does not depend on the other members.
     `members` are their indices in the ensemble; `hammers` and `hammer_of` hold the distinct hammers and the

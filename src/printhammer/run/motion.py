@@ -121,7 +121,7 @@ class Motion(Result, fields=False):
 
     @property
     def step_times(self) -> FloatArray:
-        """Times of the ends of all steps, s, shape (n,); every discontinuity of the force is among them."""
+        """End times of all steps, s, shape (n,), including every discontinuity of the force."""
         return self._record.nodes[:, 0].copy()
 
     @property

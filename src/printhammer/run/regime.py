@@ -365,7 +365,7 @@ class Regime(Declared):
 
 
 def waveform_of(hammer: Hammer, waveform: Waveform | None) -> Waveform:
-    """Return the waveform to fire, by default that of the hammer; InputError if there is none."""
+    """Return the waveform to fire, by default the hammer's waveform; raise InputError without a waveform."""
     fired = hammer.waveform if waveform is None else waveform
     if fired is None:
         raise InputError(

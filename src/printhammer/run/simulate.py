@@ -104,7 +104,7 @@ def simulate(
 
 
 def announce_compiling(callback: Callable[[str], None], *, helped: bool = True) -> Callable[[], None]:
-    """Register a callback that receives a sentence before compilation; return a function to unregister it.
+    """Register a callback that receives a message before compilation; return a function to unregister it.
 
     The sentence names what is compiled and the expected duration. Further sentences report, once, that
     machine code cannot be cached, or why cached code does not fit. If `helped`, a second process compiles as

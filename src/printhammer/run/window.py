@@ -35,7 +35,7 @@ _known: dict[tuple[str, str], Window] = {}
 
 
 class Window(NamedTuple):
-    """Window of a device under a waveform, and the flight time of its single pulse."""
+    """Window of a device under a waveform (last firing to end of run), and single-pulse flight time."""
 
     wait: float  # Time from the last firing to the end of a run, s
     flight: float  # Flight time of the single pulse, s; NaN without a dot

@@ -221,7 +221,7 @@ def backstop(hammer: Hammer, sensor: Sensor, *, speeds: npt.ArrayLike | None = N
 def motion(
     hammer: Hammer, sensor: Sensor, *, duration: float | str | None = None, before: float | str = BEFORE
 ) -> Bench:
-    """Record one shot from rest, from `before`, s, before the firing to `duration`, s, after it."""
+    """Record one shot from rest, from the time `before`, s, before firing to `duration`, s, after firing."""
     from printhammer.drive.trains import PulseTrain
 
     if hammer.waveform is None:

@@ -99,7 +99,7 @@ class SheetMagnet:
     forces: FloatArray
     """Forces of the fitted law at the gaps of the data sheet, N."""
     misfit: float
-    """Largest relative deviation of the fitted forces from those of the data sheet."""
+    """Largest relative deviation of the fitted forces from the forces in the data sheet."""
     inductance: float
     """Inductance of the fitted law at small currents, at the sheet's inductance gap or the full gap, H."""
 

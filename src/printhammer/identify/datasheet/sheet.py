@@ -103,7 +103,7 @@ class DataSheet:
         return self.entries[key].si if key in self.entries else otherwise
 
     def origin(self, key: str) -> tuple[str, str]:
-        """Return status and source of a key; a key without its own source inherits that of its table."""
+        """Return status and source of a key; a key without a source inherits the source of its table."""
         holder = key.partition(".")[0]
         guessed = not self.assumed.isdisjoint((key, holder))
         otherwise = "assumed beside the data sheet" if guessed else f"data sheet: {self.texts['source']}"

@@ -1,4 +1,4 @@
-"""Multiple shooting: every segment of a shot has its own initial state; at the solution no gap remains.
+"""Multiple shooting: each segment of a shot has an initial state; at the solution the gaps are closed.
 
 The model of a record is a chain of segments. The first segment begins at rest at the firing; every later
 segment begins in free flight, with displacement and velocity as additional unknowns. At the solution each

@@ -310,7 +310,7 @@ def _unseen(constant: FittedConstant) -> str:
 
 
 def profile(law: Law, data: FloatArray, solution: Solution, index: int) -> Profile:
-    """Compute the profile of one parameter: hold it at values around the optimum, and refit the others.
+    """Compute the profile of one parameter: fix it at values around the optimum; refit the other parameters.
 
     The values extend to four standard errors, within the bounds; rows and weights are those of the fit.
     """

@@ -47,7 +47,7 @@ _SPARE: Final = 4
 """Smallest number of rows in excess of parameters for which standard errors are computed; arbitrary."""
 
 _STARTS: Final = 8
-"""Number of starts of the multi-start search; the first is an estimate, the others are random around it."""
+"""Number of initial guesses of the multi-start search: an estimate, and random points around the estimate."""
 
 
 def fit_solenoid(

@@ -203,7 +203,7 @@ class File:
             say_once(f"{self._written}: machine code cannot be kept ({error.strerror or error}); {_OTHER}")
 
     def get(self, make: Callable[[], bytes]) -> bytes:
-        """Return the cached content; if it is missing, create it and write it to the cache."""
+        """Return the cached content; if missing, create the content and write it to the cache."""
         content = self.read()
         if content is None:
             with self._alone():

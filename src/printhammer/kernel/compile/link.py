@@ -134,7 +134,7 @@ def emit(module: Any, machine: Any = None) -> bytes:
 
 
 _engines: list[Any] = []
-"""Execution engines that own the loaded machine code; they live as long as the process."""
+"""Execution engines that own the loaded machine code; kept until the process exits."""
 
 
 def load(code: bytes) -> int:

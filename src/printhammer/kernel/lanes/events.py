@@ -241,7 +241,7 @@ def enter(pool: Any, i: int, t: float, x: float, v: float, mode: int, h: float, 
 
 @compiled
 def remember_step(pool: Any, i: int, which: int, slot: Any) -> None:
-    """Store the step size that suited the start of the present mode, for the next start of the same mode."""
+    """Store the step size that suited the start of the present mode, for the next start of that mode."""
     first = pool[R.FIRST * R.BLOCK + i]
     if first > 0.0:
         if which == R.FREE_POOL:

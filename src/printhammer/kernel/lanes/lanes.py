@@ -1,4 +1,4 @@
-"""Vector lanes: members of an ensemble in the same mode step together, each with its own step size.
+"""Vector lanes: members of an ensemble in the same mode step together, each with a separate step size.
 
 A thread has up to `LANES` active members, stored in pools, one pool per mode. A sweep takes one step in every
 lane of every pool, then handles the lanes with events. When a member is finished, the next member takes its

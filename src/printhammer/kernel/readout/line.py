@@ -1,4 +1,4 @@
-"""Printed line: where each dot lands on the paper, how dark it is, and its fault.
+"""Printed line: position on the paper, darkness and fault of each dot.
 
 The rules are those of `printhammer.printing.page.page` and `printhammer.printing.dots.judging` for a
 hammer in open loop: each wire of each line is a run from rest, a member of an ensemble with dots and extra

@@ -95,7 +95,7 @@ def close_now(state: State, contacts: Any) -> None:
 
 @inlined
 def reach_backstop(state: State, setup: Setup, nodes: Any, contacts: Any) -> None:
-    """Update the run state at a touch of the backstop: contact, or rebound or rest if it is rigid."""
+    """Update the run state at a touch of the backstop: contact or, on a rigid backstop, rebound or rest."""
     open_now(M.BACKSTOP_SURFACE, state, contacts)
     if RIGID:
         hammer = setup.hammer
@@ -115,7 +115,7 @@ def reach_backstop(state: State, setup: Setup, nodes: Any, contacts: Any) -> Non
 
 @inlined
 def reach_front(state: State, setup: Setup, contacts: Any) -> None:
-    """Update the run state when the armature reaches the pack front; begin a contact if it moves inward."""
+    """Update the run state when the armature reaches the pack front; begin a contact on inward motion."""
     v = max(state[C.VELOCITY], 0.0)
     state[C.VELOCITY] = v
     # A touch with zero velocity begins a contact only if the forces push the armature into the pack.

@@ -53,7 +53,7 @@ def backstop_switch(c: Any, w: float, v: float) -> float:
 
 
 _STIFFNESS, _DAMPING, _RESTITUTION, _SPEED, _PULL = 1, 8, 9, 10, 11
-"""Indices of constants in `numbers`; those of the two bodies are between stiffness and damping."""
+"""Indices of constants in `numbers`; the constants of both bodies lie between stiffness and damping."""
 
 
 def backstop_packed(q: Any, origin: float, c: Any) -> int:
