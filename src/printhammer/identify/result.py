@@ -401,7 +401,7 @@ class Fit(Result):
         return [*lines, *self.indistinct, *self.remarks]
 
     def outlier_lines(self, most: int = 20) -> str:
-        """List the excluded rows as text, with the name of their file if there are several files."""
+        """List the excluded rows as text, with the names of their series if there are several files."""
         rows = [int(row) for row in np.flatnonzero(self.outliers)]
         count = f"{len(rows)} outlier{'s' if len(rows) > 1 else ''} left out"
         if not len(self.lines):
