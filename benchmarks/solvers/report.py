@@ -81,7 +81,7 @@ class Report(Declared):
         if not ratios:
             return "There is no other solver to compare with."
         nearest = min(ratios, key=ratios.__getitem__)
-        return f"The closest other solver is {nearest}: ours / theirs = {ratios[nearest]:.3g}."
+        return f'The closest other solver is "{nearest}", with a speed ratio of {ratios[nearest]:.3g}.'
 
     def frames(self) -> Rows:
         """Return the rows of Figure 9."""

@@ -170,7 +170,7 @@ def sections(
     Parameters
     ----------
     hammers, periods, waveform, overlap
-        Hammers or regimes, and the firing of hammers, see `printhammer.run.regime.regimes_of`.
+        Hammers or regimes, and the firing of hammers; see `printhammer.run.regime.regimes_of`.
     surface, touches, transient, firings
         As for `section`, for all trains.
 

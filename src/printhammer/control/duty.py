@@ -65,7 +65,7 @@ class DotHeat:
     on_time: float = 0.0
     """On-time of the driver per dot, s; 0 if unknown."""
     strike: str = "dot"
-    """Noun for a dot of the hammer, see `Hammer.strike`."""
+    """Noun for a dot of the hammer; see `Hammer.strike`."""
     lasts: float = 0.0
     """Time from the firing until the current has decayed to 1 % of its largest value, s; 0 if unknown."""
 
@@ -179,7 +179,7 @@ class ThermalDuty(Result, rows="ambient burst"):
 
     @property
     def strike(self) -> str:
-        """Noun for a dot of the hammer, see `Hammer.strike`."""
+        """Noun for a dot of the hammer; see `Hammer.strike`."""
         return self.heat.strike
 
     def summary(self) -> Summary:
@@ -238,7 +238,7 @@ def thermal_duty(
     ----------
     heat : float, str or DotHeat
         Coil heat per dot with the winding at 20 degC, J or text with a unit; or a function of the winding
-        temperature, see `printhammer.control.duty.heat_of`.
+        temperature; see `printhammer.control.duty.heat_of`.
     thermal_resistance : float or str
         Thermal resistance from the winding to ambient, or to the body if there is one, K/W.
     limit : float or str

@@ -98,7 +98,7 @@ def carry_columns(
         no current flows, the displacement determines the linkage, and the given change of the linkage is
         ignored.
     forcing : tuple, optional
-        Derivatives of the equations with respect to constants, see `forcing_of`; by default none, and only
+        Derivatives of the equations with respect to constants (see `forcing_of`); by default none, and only
         the initial state changes.
     nodes : sequence of int, optional
         Ascending indices of nodes at which the columns are also returned; requires an undivided record.

@@ -194,7 +194,7 @@ class Sensitivities(Result):
         )
 
     def summary(self) -> Summary:
-        """Summarise number of dots, constants, and status of the run."""
+        """Summarise the number of dots, the constants, and the status of the run."""
         struck = len(self.dots) - len(self.lost)
         rows = [
             ("dots", f"{struck} of {len(self.dots)} dots struck"),

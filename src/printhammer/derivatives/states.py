@@ -196,7 +196,7 @@ def problem_between(
     state: Sequence[float] | None,
     tolerance: float,
 ) -> Problem:
-    """Build the run for a map from `start` to `end`, s, with arguments checked as for `tangent_map`."""
+    """Build the problem of a tangent map from `start` to `end`, s; check the arguments of `tangent_map`."""
     if not (math.isfinite(start) and math.isfinite(end) and 0.0 <= start < end):
         raise InputError(
             f"start = {start!r} s and end = {end!r} s",
@@ -348,7 +348,7 @@ def _strobes(
 
 
 def follow(problem: Problem, marks: FloatArray, initial: FloatArray, *, renormalise: bool) -> Flow:
-    """Simulate a problem up to the last of the times `marks`, with perturbations integrated from the first.
+    """Simulate a problem to the last time in `marks`; integrate perturbations from the first time on.
 
     The record is processed in segments, so that memory does not grow with the length of the run.
     """

@@ -297,7 +297,7 @@ def largest_value(table: Any) -> float:
 SUPPORT, TABLE_END, LARGEST, REPLACES, SERIES_OF_PULSE, HOLD_UPPER, UPPER = range(7)
 SUPPLY_OF_PULSE: Final = 7
 SHOWN: Final = 13
-"""Indices of the numbers that describe a pulse, see `pulse`."""
+"""Indices of the numbers that describe a pulse; see `pulse`."""
 
 (
     HALF_SINE,

@@ -221,7 +221,7 @@ def has_stable(count: int, s: Statics, work: Work) -> bool:
 
 
 def rest_position(s: Statics, work: Work, out: Any) -> int:
-    """Find the position at which the armature rests at zero current, see `hammer.equilibrium.rest_state`.
+    """Find the position at which the armature rests at zero current; see `hammer.equilibrium.rest_state`.
 
     Returns
     -------

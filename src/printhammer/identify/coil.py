@@ -5,7 +5,7 @@
 Data: columns ``time`` and ``current``, optionally ``voltage``; one shot per file. Without a voltage column
 the hammer's own driver supplies the voltage. The final current determines the resistance, its rise the
 inductance, and the curvature of the rise a shorted turn or saturation; a moving armature adds a back-EMF. The
-errors of the current probe are declared or fitted, see `printhammer.identify.current`.
+errors of the current probe are declared or fitted; see `printhammer.identify.current`.
 """
 
 from __future__ import annotations

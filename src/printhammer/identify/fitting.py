@@ -38,7 +38,7 @@ def fit(
         uncertainty of a known constant is propagated, except for "coil".
     **options
         Options of the kind; lengths in m or with a unit. For all: `robust` (true), whether to exclude
-        outliers, and `columns`, the contents of the columns, see `printhammer.support.tables.columns`. For
+        outliers, and `columns`, the contents of the columns (`printhammer.support.tables.columns`). For
         "magnet": `spring`, a table of the spring alone; `position` of the backstop; `zero`, the reading of
         the displacement sensor at x = 0, or None to fit it. For "solenoid": see
         `printhammer.identify.static.solenoid.fit_solenoid`. For "spring": `position`. For "pack":

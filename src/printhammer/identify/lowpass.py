@@ -82,7 +82,7 @@ def lowpass_lines(times: FloatArray, values: FloatArray, tau: float) -> FloatArr
 def lowpass_waveform(segments: FloatArray, t: npt.ArrayLike, tau: float) -> FloatArray:
     """Low-pass filter a waveform, A or N, fired at time 0; return the output at ascending times, s.
 
-    The waveform is a segment table, see `printhammer.drive.segments`, with finite support; the time constant
+    The waveform is a segment table (`printhammer.drive.segments`) with finite support; the time constant
     is positive.
     """
     times = np.asarray(t, dtype=np.float64)

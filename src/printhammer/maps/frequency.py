@@ -181,7 +181,7 @@ def frequency_map(
         The hammer.
     rates : array, optional
         Firing rates, Hz or text with units, ascending; by default 512 from 500 Hz to 2 kHz for a
-        flight time of 0.28 ms, lower for a slower device, see `printhammer.run.window.time_scale`.
+        flight time of 0.28 ms, lower for a slower device; see `printhammer.run.window.time_scale`.
     pulses : int, optional
         Number of firings at each rate.
     times : array or int, optional

@@ -166,7 +166,7 @@ def load_measured_map(
     Parameters
     ----------
     path : path
-        A CSV file, see `printhammer.maps.measured`; or a NetCDF file or Zarr store with the variables `rate`,
+        A CSV file (`printhammer.maps.measured`), or a NetCDF file or Zarr store with the variables `rate`,
         `time` and `displacement`, each with any unit in the attribute `units`. The dimensions of
         `displacement` are `rate` and one more; those of `time` are the latter, or both if each rate has
         different times.

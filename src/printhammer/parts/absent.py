@@ -103,7 +103,7 @@ def backstop_rebound(c: Any, v_in: float) -> float:
 
 
 def magnet_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants of a law without its own packing function: the numbers before the domain."""
+    """Write the packed constants of a law without its own packing function: the values before the domain."""
     for k in range(len(q) - 2):
         c[k] = q[k]
     return max(len(q) - 2, 0)
@@ -117,7 +117,7 @@ def magnet_domain(q: Any, ends: Any) -> None:
 
 
 def _copy(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants of a law without its own packing function: the numbers of the part."""
+    """Write the packed constants of a law without its own packing function: the values of the part."""
     for k in range(len(q)):
         c[k] = q[k]
     return len(q)

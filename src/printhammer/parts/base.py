@@ -123,7 +123,7 @@ class MagnetPart(Part):
 class CoilPart(Part):
     """Coil circuit of the magnet, with the law of `printhammer.kernel.model.circuit`.
 
-    The constants are in the order of the kernel's parameter array, see `printhammer.kernel.model.layout`.
+    The constants are in the order of the kernel's parameter array; see `printhammer.kernel.model.layout`.
     """
 
     role: ClassVar[str] = "coil"

@@ -39,7 +39,7 @@ def warm_resistance(resistance: float, temperature: float) -> float:
 
 
 def coil_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants from the numbers of the part; return their number."""
+    """Write the packed constants from the values of the part; return their count."""
     c[0] = 0.0 if math.isnan(q[0]) else warm_resistance(q[0], q[2])
     c[1] = q[1]
     c[2] = 0.0 if math.isnan(q[3]) else q[3]

@@ -45,22 +45,22 @@ _STYLED: Final = re.compile("⟪([a-z]+) ([^⟪⟫]*)⟫")
 
 
 def quantity(value: float | None, unit: str, *, bare: bool = False) -> str:
-    """Mark a quantity in SI for display, with a unit in `SHOWN`; `bare` hides the unit; None gives a dash."""
+    """Return the mark of a quantity in SI, with a unit in `SHOWN`; `bare` hides the unit; a dash for None."""
     return NONE if value is None else f"⟦{float(value)!r} {unit}{'!' * bare}⟧"
 
 
 def interval(values: npt.NDArray[Any], unit: str) -> str | None:
-    """Mark the range of an array of quantities in SI for display; None for an empty array."""
+    """Return the range of an array in SI as text, with marked quantities; None for an empty array."""
     return f"{quantity(values.min(), unit)} to {quantity(values.max(), unit)}" if values.size else None
 
 
 def styled(style: Style, said: object) -> str:
-    """Mark a text with a display style."""
+    """Return a text marked with a display style."""
     return f"⟪{style} {said}⟫"
 
 
 def judged(good: bool, said: object, otherwise: Style = "poor") -> str:
-    """Mark a text with the style "good" or, if `good` is false, with the style `otherwise`."""
+    """Return a text with the style "good" or, if `good` is false, with the style `otherwise`."""
     return styled("good" if good else otherwise, said)
 
 

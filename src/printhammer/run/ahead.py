@@ -3,8 +3,8 @@
     python -m printhammer.run.ahead LAWS
 
 compiles, for laws passed as JSON, the functions that evaluate a motion after its run. The first process then
-loads them from disk; if that is impossible, because the laws come from a part file or the cache cannot be
-written, the first process compiles them too.
+loads them from disk. If the second process cannot compile, because the laws come from a part file or the
+cache cannot be written, the first process compiles these functions too.
 """
 
 from __future__ import annotations

@@ -46,7 +46,7 @@ class Contact(Declared):
 class Dot(Declared):
     """Dot that one firing makes on the paper.
 
-    The first pack contact after a firing makes its dot, see `printhammer.kernel.model.dots`; a firing without
+    The first pack contact after a firing makes its dot; see `printhammer.kernel.model.dots`; a firing without
     one is a lost dot.
     """
 
@@ -80,7 +80,7 @@ def touches_of(record: Record) -> list[tuple[Literal["pack", "backstop"], float]
 
 
 def contact_rows(problem: Problem, record: Record, increments: FloatArray, rigid: bool) -> FloatArray:
-    """Compute the contacts of a run, one row each, see `printhammer.kernel.readout.contacts`.
+    """Compute the contacts of a run, one row each; see `printhammer.kernel.readout.contacts`.
 
     `increments` is the result of `printhammer.run.energy.increments_of`; `rigid` states whether the backstop
     is rigid.

@@ -345,7 +345,7 @@ class Ensemble:
         progress : callable, optional
             Called from time to time with the number of members done and in total.
         engine : str, optional
-            "plain": one member at a time; "lanes": in vector lanes, see `printhammer.kernel.lanes`; "auto":
+            "plain": one member at a time; "lanes": in vector lanes (`printhammer.kernel.lanes`); "auto":
             in lanes if the laws of the members allow it. The two engines agree within the tolerance.
 
         Returns

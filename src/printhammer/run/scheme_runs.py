@@ -23,7 +23,7 @@ from printhammer.run.problem import Problem, Record
 from printhammer.support.arrays import FloatArray, IntArray
 
 READINGS = schemes_1983.READINGS
-"""Rules for the short step, see `printhammer.kernel.schemes_1983`."""
+"""Rules for the short step; see `printhammer.kernel.schemes_1983`."""
 
 Reading = schemes_1983.Reading
 Scheme = schemes_1983.Scheme

@@ -27,7 +27,7 @@ _LAST: Final = 1.19
 """Ratio of the time constant of coil and magnet to the pulse width; arbitrary."""
 
 _REACH: Final = 1.0 / (1.0 - math.exp(-1.0 / _LAST))
-"""Ratio of rail voltage to peak current times resistance, for a current that rises exponentially."""
+"""Rail voltage divided by R × peak current, where R is the resistance, for exponential rise."""
 
 _PULSE: Final = (1.97, 177e-6)
 """Current, A, and width, s, of the pulse if the hammer has no current pulse; as for the shipped hammer."""

@@ -66,7 +66,7 @@ def _call(x: float, function: Callable[[float], float]) -> float:
 
 
 def bisected(function: Any, about: Any, low: float, high: float) -> float:
-    """Find a root of ``function(x, about)`` by bisection, see `bisect`."""
+    """Find a root of ``function(x, about)`` by bisection; see `bisect`."""
     at_low, at_high = function(low, about), function(high, about)
     while True:
         middle = 0.5 * (low + high)
@@ -82,7 +82,7 @@ def bisected(function: Any, about: Any, low: float, high: float) -> float:
 
 
 def find_roots(function: Any, about: Any, grid: Any, count: int, places: Any, values: Any, found: Any) -> int:
-    """Find the roots of ``function(x, about)`` on the first `count` points of an ascending grid, see `roots`.
+    """Find the roots of ``function(x, about)`` on the first `count` points of an ascending grid; see `roots`.
 
     Parameters
     ----------

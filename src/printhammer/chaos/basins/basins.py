@@ -166,7 +166,7 @@ CELLS: Final = 128
 """Default number of cells along each side of the plane of initial states."""
 
 MOST_CELLS: Final = 10_000_000
-"""Number of cells above which a plane is refused, in `basins` and in `printhammer.quench_map`."""
+"""Largest number of cells of a plane that `basins` and `printhammer.quench_map` accept."""
 
 UNDECIDED: Final = 0
 FAILED: Final = -1

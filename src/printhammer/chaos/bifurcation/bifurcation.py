@@ -35,7 +35,7 @@ REFINE: Final = 2
 """Default number of times to halve the parameter step between neighbours that differ."""
 
 MOST_STATES: Final = 100_000_000
-"""Largest number of states in a diagram; a larger diagram is refused."""
+"""Largest number of states in a diagram; a larger diagram raises `InputError`."""
 
 Direction = Literal["from rest", "up", "down", "both"]
 DIRECTIONS: Final = get_args(Direction)

@@ -241,7 +241,7 @@ def state_or_rest(regime: Regime, state: State) -> State:
 def scales_of_columns(regimes: Sequence[Regime]) -> FloatArray:
     """Compute the scales of displacement, velocity, memory and current for each train, shape (M, 4).
 
-    The scales are the half-widths of the strobe window of the train, see `printhammer.run.regime`, and a
+    The scales are the half-widths of the strobe window of the train (`printhammer.run.regime`) and a
     typical current.
     """
     known: dict[tuple[int, float], tuple[float, ...]] = {}
@@ -293,7 +293,7 @@ def confirm(
 ) -> None:
     """Confirm ambiguous periods from `cycles_of` by Newton's method; update periods and distances.
 
-    Periods are ambiguous if the states alone do not show them, see `printhammer.chaos.orbits.settled`; an
+    Periods are ambiguous if the states alone do not show them (`printhammer.chaos.orbits.settled`); an
     unconfirmed period becomes 0.
     """
     doubtful: list[int] = []
@@ -314,7 +314,7 @@ def confirm(
 
 
 def orbit_distance(one: FloatArray, other: FloatArray) -> float:
-    """Compute the distance of two periodic orbits of the same period, minimised over the phase.
+    """Compute the distance between two periodic orbits of the same period, minimised over the phase.
 
     The distance is the largest difference of any component of the scaled states, shape (q, 2), for the cyclic
     shift of the smallest distance.

@@ -145,7 +145,7 @@ class RegimeFamily:
         return MapValue(image, jacobian, slope, passage.sequence, extra=passage)
 
     def margin(self, state: FloatArray, parameter: float) -> float:
-        """Compute the signed distance from a grazing, see `printhammer.chaos.strobe.map.Image`."""
+        """Compute the signed distance from a grazing; see `printhammer.chaos.strobe.map.Image`."""
         problem, end = self._problem(self.regime.with_(self.name, parameter), state)
         return margin_of(problem, problem.run(end))
 

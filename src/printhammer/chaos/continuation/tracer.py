@@ -48,7 +48,7 @@ _SAME_PHASE: Final = 1e-3
 _CLEAR: Final = 1e-3
 """Scaled distance from the end of a segment within which orbits are removed before a section change."""
 _LEAST_CHORD: Final = 1e-5
-"""Smallest scaled distance of two orbits whose chord defines the direction of the branch."""
+"""Smallest scaled distance between two orbits whose chord defines the direction of the branch."""
 _NO_STOP: Final = Stop("section", math.nan, np.zeros(0), "the section moves")
 
 

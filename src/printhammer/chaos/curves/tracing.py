@@ -295,7 +295,7 @@ class CurveTracer:
         return self.kind.removeprefix("period ")
 
     def distance(self, one: CurvePoint, other: CurvePoint) -> float:
-        """Compute the distance of two points in the parameter plane, in units of the parameter scales."""
+        """Compute the distance between two points in the parameter plane, in units of its scales."""
         away = np.array([one.first - other.first, one.second - other.second]) / self.plane.scales[2:]
         return float(np.linalg.norm(away))
 

@@ -133,7 +133,7 @@ class LyapunovChart(Result, rows="period"):
         return {**super().entries(), "exponent": EXPONENT}
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Convert the chart to a table with one row per train; both exponents are columns."""
+        """Convert the chart to a table with one row per train; both Lyapunov exponents are columns."""
         table = super().to_dataframe()
         for k in (1, 0):
             table.insert(1, f"standard error {k + 1} [{PER_FIRING}]", self.standard_errors[:, k])
@@ -158,7 +158,7 @@ def lyapunovs(
     Parameters
     ----------
     hammers, periods, waveform, overlap
-        Hammers or regimes, and the firing of hammers, see `printhammer.run.regime.regimes_of`.
+        Hammers or regimes, and the firing of hammers; see `printhammer.run.regime.regimes_of`.
     firings, transient
         As for `lyapunov`, for all trains.
 

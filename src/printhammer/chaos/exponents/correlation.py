@@ -96,7 +96,7 @@ def correlation_dimension(
     states : array, Strobe or Regime
         One row, or one number, per state; 200 to 50,000 states. Displacement, velocity and pack memory of
         strobe points are used. For a regime, a thousand points are computed after a thousand firings; a few
-        thousand points are more accurate. The distance of two states is the largest difference of a
+        thousand points are more accurate. The distance between two states is the largest difference of a
         component.
     scales : array, optional
         Scales of the components; by default the half-widths of the window of a strobe, and 1 for other

@@ -96,7 +96,7 @@ def recurrence(
         One row, or one number, per state; at most 4096 states. Displacement, velocity and pack memory of
         strobe points are used. For a regime, a thousand points are computed after a thousand firings.
     threshold : float, optional
-        Largest distance of two recurrent states, in units of the scales. The distance is the largest
+        Largest distance between two recurrent states, in units of the scales. The distance is the largest
         difference of a component.
     rate : float, optional
         Recurrence rate from which the threshold is computed, instead of `threshold`; 0.05 if neither is

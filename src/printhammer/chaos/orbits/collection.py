@@ -159,7 +159,7 @@ class Orbits(Result):
 
         The larger of two bounds: f1 (f1 - 1) / (2 (f2 + 1)), with f1 and f2 the numbers of orbits reached
         from exactly one and exactly two guesses (A. Chao, Scand. J. Statist. 11 (1984) 265); and the least
-        number of orbits that the fixed-point indices lack, see `fewest_missing`.
+        number of orbits that the fixed-point indices lack; see `fewest_missing`.
         """
         once, twice = self.hits.count(1), self.hits.count(2)
         return max(0.5 * once * max(once - 1, 0) / (twice + 1), float(fewest_missing(self.indices)))

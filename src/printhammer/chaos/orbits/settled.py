@@ -28,7 +28,7 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray
 
 AGREES: Final = 1e-8
-"""Distance, in half-widths of the strobe window, below which two states agree without doubt."""
+"""Distance, in half-widths of the strobe window, up to which two states are considered equal."""
 
 DISTINCT: Final = 1e-3
 """Distance, in half-widths of the strobe window, above which two states differ by more than noise."""

@@ -76,7 +76,7 @@ _LONG: Final = 400
 """Number of firings of the train from rest whose close returns are guesses."""
 _BLOCKS: Final = (128, 1024)  # Numbers of starts, ascending; requests are rounded up, as for `_BATCHES`
 _BATCHES: Final = (8, 48)
-"""Numbers of guesses, ascending; a request is rounded up to one of them, or to a doubling of the last."""
+"""Numbers of guesses, ascending; requests are rounded up to an entry or a repeated doubling of the last."""
 _EVEN: Final = 8
 """Orbit period, in firings, below which orbits get more guesses, in inverse proportion to the period."""
 _JOINED: Final = 48

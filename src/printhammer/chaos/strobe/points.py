@@ -211,7 +211,7 @@ def strobes(
     Parameters
     ----------
     hammers, periods, drives, waveform, overlap, phase
-        Hammers or regimes, and the firing of hammers, see `printhammer.run.regime.regimes_of`.
+        Hammers or regimes, and the firing of hammers; see `printhammer.run.regime.regimes_of`.
     points, transient, verdict
         As for `strobe`, for all trains.
     states : sequence, optional
@@ -299,11 +299,11 @@ def scheme_strobes(
     Parameters
     ----------
     hammers, periods
-        Hammers and the times between their firings, see `printhammer.run.regime.regimes_of`.
+        Hammers and the times between their firings; see `printhammer.run.regime.regimes_of`.
     scheme : str
         "runge-kutta-4" or "trapezoid".
     reading : str, optional
-        Rule for the short step, see `printhammer.run.scheme_runs.READINGS`.
+        Rule for the short step; see `printhammer.run.scheme_runs.READINGS`.
     points, firings, progress
         As for `printhammer.chaos.strobes`; the points begin at the first firing.
 

@@ -86,7 +86,7 @@ def pack_branches(x: FloatArray, branch: npt.NDArray[np.integer[Any]], front: fl
 def handed_on(
     hammer: Hammer, x: float, v: float, mode: int, memory: float, electric: Sequence[float] = NO_CURRENT
 ) -> State:
-    """Return the start of the next train: the final state, or `FROM_REST` if that is no valid start."""
+    """Return the start of the next train: the final state if valid as a start, else `FROM_REST`."""
     begun = state_to_begin(hammer, x, v, mode, memory)
     return FROM_REST if begun is None else (*begun, *electric)
 

@@ -42,7 +42,7 @@ _FILES: Final = {
     ),
 }
 _measured = partial(opt.source, argument=True)
-_earlier = partial(opt.source, panel="Tables of the parts, fitted first")
+_earlier = partial(opt.source, panel="Tables of the parts, fitted before the records")
 
 _HAMMER: Final = opt.text(
     "HAMMER", "Hammer file or name that supplies the known constants; template for --into.", is_input=True
@@ -252,10 +252,10 @@ def motion(
         "KEYS",
         "Constants to fit (default: 'mass', and 'backstop.damping' if a record shows a backstop contact).",
     ),
-    magnet: Path | None = _earlier("Table of magnet and spring together, fitted first."),
-    spring: Path | None = _earlier("Table of the spring alone, fitted first."),
-    pack: Path | None = _earlier("Table of the pack, fitted first."),
-    backstop: Path | None = _earlier("Table of rebounds from the backstop, fitted first."),
+    magnet: Path | None = _earlier("Table of the force of magnet and spring, fitted before the records."),
+    spring: Path | None = _earlier("Table of the force of the spring, fitted before the records."),
+    pack: Path | None = _earlier("Table of load cycles of the pack, fitted before the records."),
+    backstop: Path | None = _earlier("Table of rebounds from the backstop, fitted before the records."),
     strict: bool = _STRICT,
     **passed: Any,
 ) -> Answer:
@@ -263,7 +263,7 @@ def motion(
 
     Constants with standard errors in the hammer file, as written by --into of other fits, enter as priors and
     are refined; all other constants count as exact. The tables of --magnet, --spring, --pack and --backstop
-    are fitted first.
+    are fitted before the records.
     """
 
     def made(known: Hammer | None) -> Fit:

@@ -301,7 +301,7 @@ def print_(
     ),
     pitch: float | None = _length("Distance between slots (default: 1/60 in for 9 wires)."),
     wire_pitch: float | None = _length(
-        "Distance between neighbouring wires (default: 1/72 in for 9 wires; else for the same print height)."
+        "Distance between neighbouring wires (default: 1/8 in divided by the number of wires)."
     ),
     wire_diameter: float | None = _length(
         "Diameter of a wire (default: 0.35 mm for 9 wires).", flag="--wire"

@@ -36,7 +36,7 @@ class Leg(NamedTuple):
 
 
 class FeedbackStrategy(Declared):
-    """Feedback as a drive strategy, see `printhammer.printing.dots.strategy.Strategy`."""
+    """Position feedback as a drive strategy; see `printhammer.printing.dots.strategy.Strategy`."""
 
     name: ClassVar[str] = "feedback"
     controller: Controller = part("controller designed for the nominal hammer")
@@ -48,7 +48,7 @@ class FeedbackStrategy(Declared):
     )
 
     def along(self, places: tuple[Hammer, ...]) -> FeedbackStrategy:
-        """Return a copy that drives a different hammer in each slot, see `places`."""
+        """Return a copy that drives a different hammer in each slot; see `places`."""
         return replace(self, places=places)
 
     def __call__(

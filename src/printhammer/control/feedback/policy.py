@@ -94,7 +94,7 @@ def fronts(plant: Plant, forces: ForceMap, start: Launch, progress: Progress | N
 
 
 def front_force(farther: Plant, table: ImpactMap) -> FloatArray:
-    """Compute the derivative of the peak force with respect to the distance of the pack, see `Fronts`.
+    """Compute the derivative of the peak force with respect to the distance of the pack; see `Fronts`.
 
     `farther` has the farthest front; `table` is the map of the nominal hammer.
     """

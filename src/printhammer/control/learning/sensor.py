@@ -24,7 +24,7 @@ class Readings(NamedTuple):
 
 
 class ImpactSensor(Declared):
-    """Sensor of one impact time per dot and, if the noise of the force is stated, one peak force per dot."""
+    """Sensor that reads the impact time of each dot and, if `force` is set, the peak force of each dot."""
 
     noise: float = scalar("s", "standard deviation of the time of impact", default=5e-6)
     force: float | None = part(

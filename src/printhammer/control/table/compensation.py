@@ -227,7 +227,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         )
 
     def strategy(self, hammer: Hammer, serial: str | None = None) -> TableStrategy:
-        """Return the table as a drive strategy, see `printhammer.printing.dots.strategy.Strategy`.
+        """Return the table as a drive strategy; see `printhammer.printing.dots.strategy.Strategy`.
 
         Parameters
         ----------

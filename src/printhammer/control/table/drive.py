@@ -332,7 +332,7 @@ def driven_by(hammer: Hammer, driver: str, largest: float) -> Hammer:
 
 
 def of_force(hammer: Hammer, pulse: Waveform, force: float, low: float, high: float) -> Hammer:
-    """Return the hammer with the pulse width, `low` to `high`, s, that prints with `force`, N."""
+    """Return the hammer with the pulse width, between `low` and `high` [s], that prints with `force` [N]."""
     for _ in range(_ROUNDS):
         widths = np.linspace(low, high, _GRID).tolist()
         pulses = [of_width(pulse, width) for width in widths]

@@ -132,7 +132,7 @@ def header_text(
     Parameters
     ----------
     head : mapping
-        Metadata of the table, see `printhammer.control.table.formats.HEAD` and `OPTIONAL`.
+        Metadata of the table; see `printhammer.control.table.formats.HEAD` and `OPTIONAL`.
     rates : array, shape (R,)
         Slot rates, Hz.
     times : mapping

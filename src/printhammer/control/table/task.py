@@ -112,7 +112,7 @@ class Task:
 
     @cached_property
     def scale(self) -> float:
-        """Factor on all times that are stated for the paper's hammer, see `search_scale`."""
+        """Factor on all times that are stated for the paper's hammer; see `search_scale`."""
         return search_scale(self.hammers[0], self.pulse)
 
     @cached_property

@@ -133,7 +133,7 @@ class Ways(NamedTuple):
     """Candidate pulses for a dot: arrays of shape (ways,), times after the slot of the preceding dot, s.
 
     The dot is due at `period`. A brake pulse of width `brake` begins at `delay`, both 0 without one; the dot
-    is `fired` with a pulse of `width`. `cost` is the deviation of a row of such dots, see `costs`.
+    is `fired` with a pulse of `width`. `cost` is the deviation of a row of such dots; see `costs`.
     """
 
     period: FloatArray

@@ -2,7 +2,7 @@
 
 The latest firing always replaces earlier ones, because a driver is a single output stage. Voltages are those
 of the supply; a diode, the resistance of the supply and the thresholds of a chopper act in the circuit of the
-coil, see `printhammer.kernel.model.circuit`. After the supply is switched off the current decays against a
+coil; see `printhammer.kernel.model.circuit`. After the supply is switched off the current decays against a
 voltage to zero, and stays zero until the coil drives it again.
 
 `Switched` is a current switched between levels by a driver of finite speed.
@@ -238,7 +238,7 @@ class Switched(Waveform):
 def switched_table(
     at: tuple[float, ...], levels: tuple[float, ...], edge: float, initial: float = 0.0
 ) -> FloatArray:
-    """Return the segment table of a switched drive, see `Switched`."""
+    """Return the segment table of a switched drive; see `Switched`."""
     rows = []
     now, level, current = 0.0, 0.0, initial
     if at[0] > 0.0 and initial:

@@ -49,7 +49,7 @@ _SIGMAS: Final = 3.0
 
 @styled
 def plot(spectrum: Lyapunov) -> Figure:
-    """Draw the running estimates of both exponents of a train against the number of firings.
+    """Draw the running estimates of both Lyapunov exponents of a train against the number of firings.
 
     Bands are three standard errors wide on either side.
     """
@@ -105,7 +105,7 @@ def _running(ax: Axes, counts: Any, means: FloatArray, errors: FloatArray, colou
 
 @styled
 def plot_chart(chart: LyapunovChart) -> Figure:
-    """Draw both exponents and K of the 0-1 test of many trains against the time between firings.
+    """Draw both Lyapunov exponents and K of the 0-1 test of many trains against the firing period.
 
     Error bars extend three standard errors on either side. Open marks are trains for which the exponent and
     the 0-1 test disagree, or either is undecided.

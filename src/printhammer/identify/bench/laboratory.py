@@ -138,7 +138,7 @@ def measure(
         "current": record of the coil current in one voltage-driven shot.
     sensor : Sensor or mapping, optional
         Sensors; by default `SENSORS`. A mapping states only the settings that differ, such as {"noise":
-        {"force": "0.1 N"}, "outliers": "2 %"}, see `printhammer.identify.bench.sensor.adjusted`.
+        {"force": "0.1 N"}, "outliers": "2 %"}; see `printhammer.identify.bench.sensor.adjusted`.
     seed : int, optional
         Seed of the random number generator; the same seed gives the same table.
     **bench

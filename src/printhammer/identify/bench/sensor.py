@@ -2,7 +2,7 @@
 
     reading = resolution * round((true + offset + noise) / resolution)
 
-The noise is white and normal. A limited bandwidth acts first, see `printhammer.identify.lowpass`. Users
+The noise is white and normal. A limited bandwidth acts first; see `printhammer.identify.lowpass`. Users
 describe sensors by text with units, per quantity.
 """
 

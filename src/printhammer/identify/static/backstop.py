@@ -169,10 +169,11 @@ def fit_backstop(
     robust: bool = True,
     columns: str | None = None,
 ) -> Fit:
-    """Fit l/k to rebounds, compute "backstop.stiffness" from the bodies, and "backstop.damping" from both.
+    """Fit the damping ratio l/k to rebounds, and compute stiffness k and damping l of the backstop.
 
-    The table has the columns ``impact speed`` and ``rebound speed``; a stiffness k that is a float, N/m^1.5,
-    is taken as known. See `printhammer.identify.fitting.fit`.
+    The table has the columns ``impact speed`` and ``rebound speed``. The stiffness k is computed from radii
+    and moduli of the two bodies in contact; a float, N/m^1.5, is taken as known. See
+    `printhammer.identify.fitting.fit`.
 
     Raises
     ------

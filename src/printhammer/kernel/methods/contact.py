@@ -41,7 +41,7 @@ def contact_rate(w: float, v: float, t: float, hammer: Hammer, drive: Drive) -> 
 
 @compiled
 def length_while_pushed_in(left: float, w: float, v: float, kv: float) -> float:
-    """Convert a time interval `left` [s] under inward force to the regularised variable s of the backstop.
+    """Return the increment of the regularised variable s over the time `left` [s], for inward acceleration.
 
     Solves 2 w ds - v ds^2 - kv ds^3 / 3 = left for ds by Newton's method; the left side increases with ds.
     """
@@ -57,7 +57,7 @@ def length_while_pushed_in(left: float, w: float, v: float, kv: float) -> float:
 
 @compiled
 def length_of(left: float, w: float, v: float, kv: float) -> float:
-    """Convert a time interval `left` [s] in the backstop to the regularised variable s, approximately.
+    """Return the approximate increment of the regularised variable s over the time `left` [s].
 
     Solves 2 w ds - v ds^2 = left for ds; the root is regular also at release, w = 0. The cubic term is
     included if it matters and the armature does not leave. `s_at` iterates this approximation.

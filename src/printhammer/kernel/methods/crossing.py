@@ -1,7 +1,7 @@
 """Event location within a step: change of the coil current's path, or end of a rest of the armature.
 
 The event is the first root of an event function, called `gap`: a smooth function of the state that is
-positive until the event, see `printhammer.kernel.model.circuit.path_gap`. The Bernstein coefficients of the
+positive until the event; see `printhammer.kernel.model.circuit.path_gap`. The Bernstein coefficients of the
 cubic through the gaps and slopes at both ends of a step show whether a root lies inside; their deviation from
 a straight line measures the reliability of the cubic. The root is located with the integrator.
 """

@@ -83,8 +83,8 @@ LAW_FUNCTIONS = {
 PACKING = {role: (f"{role}_packed",) for role in LAW_FUNCTIONS} | {
     "magnet": ("magnet_packed", "magnet_domain")
 }
-"""Names of the functions of each part that pack its constants, and write the range of displacements of a
-magnet's law."""
+"""Names of the functions that pack the constants of a part, by role; a magnet has a second function, which
+writes the displacement range of its law."""
 
 
 def floats_of(law: str) -> int:

@@ -40,14 +40,14 @@ it, number of coils that share it; typical current [A] and flux linkage [Wb], th
 estimates."""
 
 CUBIC_PIECE, EXPONENTIAL_PIECE, SINE_PIECE, END = 0.0, 1.0, 2.0, 3.0
-"""Kinds of waveform pieces, see `printhammer.kernel.model.pulses`; END marks the end of a waveform."""
+"""Kinds of waveform pieces; see `printhammer.kernel.model.pulses`; END marks the end of a waveform."""
 
 SWITCHED_PIECE, DECAY_PIECE, RESERVOIR_PIECE = 4.0, 5.0, 6.0
-"""Kinds of pieces of a driver waveform, see `printhammer.kernel.model.circuit`."""
+"""Kinds of pieces of a driver waveform; see `printhammer.kernel.model.circuit`."""
 
 
 NODE_WIDTH = 5
-"""Number of columns of a node in the record of a run, see `printhammer.kernel.single.record`."""
+"""Number of columns of a node in the record of a run; see `printhammer.kernel.single.record`."""
 ELECTRIC = NODE_WIDTH
 """Index of the first of four additional columns of a node with a coil circuit: electric state, current
 path."""
@@ -55,7 +55,7 @@ CIRCUIT_NODE_WIDTH = NODE_WIDTH + 4
 
 
 class Train(NamedTuple):
-    """Pulse train of n firings as arrays, see `printhammer.kernel.model.pulses`, and working space for a run.
+    """Pulse train of n firings as arrays (`printhammer.kernel.model.pulses`), and working space for a run.
 
     Attributes
     ----------

@@ -58,7 +58,7 @@ def write_guess(states: Any, scales: Any, period: int, count: int, orbit: Any, t
     period, count : int
         Period in which the states agree, and one of its divisors.
     orbit : float64 array, shape (count, 10)
-        Output, see `ORBIT`.
+        Output; see `ORBIT`.
     trial : float64 array, shape (count, 2)
         Trial states, m and m/s.
     """
@@ -85,7 +85,7 @@ def write_image(
     start : float64 array, shape (2,)
         Displacement, m, and velocity, m/s, at the start.
     ends : float64 array, shape (2, any)
-        States at both ends, see `printhammer.kernel.variational.layout.Carried`.
+        States at both ends; see `printhammer.kernel.variational.layout.Carried`.
     current : float
         Coil current at the end as a fraction of a typical one.
     columns : float64 array, shape (any, 2)
@@ -95,7 +95,7 @@ def write_image(
     hammer : float64 array
         Constants of the hammer.
     image : float64 array, shape (7,)
-        Output, see `IMAGE`.
+        Output; see `IMAGE`.
     """
     image[0], image[1] = ends[1, 0], ends[1, 1]
     for row in range(2):
@@ -121,7 +121,7 @@ def improve(images: Any, usable: bool, scales: Any, orbit: Any, trial: Any, sear
     Parameters
     ----------
     images : float64 array, shape (m, 7)
-        Images of the trial states, see `IMAGE`.
+        Images of the trial states; see `IMAGE`.
     usable : bool
         Whether all images are known.
     scales : float64 array
@@ -131,7 +131,7 @@ def improve(images: Any, usable: bool, scales: Any, orbit: Any, trial: Any, sear
     trial : float64 array, shape (m, 2)
         Trial states, m and m/s.
     search : float64 array, shape (4,)
-        Zeros before the first call, see `TRIED`.
+        Zeros before the first call; see `TRIED`.
 
     Returns
     -------
@@ -234,7 +234,7 @@ def largest_multiplier(orbit: Any) -> float:
 
 
 def has_settled(states: Any, scales: Any, orbit: Any, search: Any, outcome: int, out: Any) -> int:
-    """Judge by the outcome of Newton's method whether a motion has settled to an orbit, see `APPROACHES`.
+    """Judge by the outcome of Newton's method whether a motion has settled to an orbit; see `APPROACHES`.
 
     `out`, shape (1,), is the largest absolute value of a Floquet multiplier.
     """
@@ -264,7 +264,7 @@ def gap_at(states: Any, scales: Any, orbit: Any, block: int, shift: int) -> floa
 
 
 def is_approaching(states: Any, scales: Any, orbit: Any, lies_on: float) -> bool:
-    """Whether states lie on an orbit or approach it, see `printhammer.chaos.orbits.settled`."""
+    """Whether states lie on an orbit or approach it; see `printhammer.chaos.orbits.settled`."""
     count = orbit.shape[0]
     blocks = states.shape[0] // count
     shift, least = 0, math.inf

@@ -107,7 +107,7 @@ def run(posed: Any, t_end: float, nodes: Any, contacts: Any, state: Any) -> tupl
         End of the run [s].
     nodes : float64 array, shape (any, 5), with a coil circuit (any, 9)
     contacts : float64 array, shape (any, 7)
-        Filled with the record, see `printhammer.kernel.single.record`. After a pause, the first node is the
+        Filled with the record; see `printhammer.kernel.single.record`. After a pause, the first node is the
         last node before the pause; a contact that was open at the pause stays in row 0, with a negative
         node index.
     state : float64 array, shape (32,)

@@ -1,6 +1,6 @@
 """Variational equations between two switching events, integrated together with the motion by DOP853.
 
-A tangent column (dx, dv, dp, ...), see `printhammer.kernel.variational.layout`, is a change of the motion at
+A tangent column (dx, dv, dp, ...; see `printhammer.kernel.variational.layout`) is a change of the motion at
 fixed time. Off the backstop
 
     d(dx)/dt = dv,    d(dv)/dt = a_x dx + a_v dv + a_p dp + a_c,    dp constant,

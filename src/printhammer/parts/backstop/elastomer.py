@@ -50,7 +50,7 @@ def backstop_switch(c: Any, w: float, v: float) -> float:
 
 
 def backstop_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants (k, 1.5 k A, pull) from the numbers of the part; return their number."""
+    """Write the packed constants (k, 1.5 k A, pull) from the values of the part; return their count."""
     c[0], c[1], c[2] = q[1], 1.5 * q[1] * q[2], q[3]
     return 3
 

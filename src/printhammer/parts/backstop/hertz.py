@@ -57,7 +57,7 @@ _STIFFNESS, _DAMPING, _RESTITUTION, _SPEED, _PULL = 1, 8, 9, 10, 11
 
 
 def backstop_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants (k, l, pull) from the numbers of the part; return their number."""
+    """Write the packed constants (k, l, pull) from the values of the part; return their count."""
     c[0] = q[_STIFFNESS]
     if math.isnan(c[0]):
         c[0] = hertz_stiffness(q[2], q[3], q[4], q[5], q[6], q[7])

@@ -25,7 +25,7 @@ def backstop_rebound(c: Any, v_in: float) -> float:
 
 
 def backstop_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants (e,) from the numbers of the part; return their number."""
+    """Write the packed constants (e,) from the values of the part; return their count."""
     c[0] = q[1]
     return 1
 

@@ -82,7 +82,7 @@ def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float
 
 
 def magnet_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants (F0, Am, Bm) from the numbers of the part; return their number."""
+    """Write the packed constants (F0, Am, Bm) from the values of the part; return their count."""
     c[0], c[1], c[2] = q[0], q[1], q[2]
     return 3
 

@@ -57,7 +57,7 @@ def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float
 
 
 def magnet_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants (k,) from the numbers of the part; return their number."""
+    """Write the packed constants (k,) from the values of the part; return their count."""
     c[0] = q[0]
     return 1
 

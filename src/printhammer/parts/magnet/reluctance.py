@@ -140,7 +140,7 @@ _CORE, _SATURATION, _LEAKAGE, _REACH, _PULL = range(6, 11)
 
 
 def magnet_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants in the order stated by the module; return their number."""
+    """Write the packed constants in the order stated by the module; return their count."""
     square = q[_TURNS] ** 2
     scale = MU0 * square
     c[0] = -1.0 if q[_PULL] == 0.0 else 1.0

@@ -50,7 +50,7 @@ def pack_switch(c: Any, x: float, v: float) -> float:
 
 
 def pack_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants (K, C, xp, pull) from the numbers xp, K, C, pull; return their number."""
+    """Write the packed constants (K, C, xp, pull) from the values xp, K, C, pull; return their count."""
     c[0], c[1], c[2], c[3] = q[1], q[2], q[0], q[3]
     return 4
 

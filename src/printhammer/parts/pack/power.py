@@ -55,7 +55,7 @@ def pack_unloading(c: Any, x: float, v: float, q: float) -> float:
 
 
 def pack_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants (S, xp, 1/d) from the numbers xp, S, d; return their number."""
+    """Write the packed constants (S, xp, 1/d) from the values xp, S, d; return their count."""
     c[0], c[1], c[2] = q[1], q[0], 1.0 / q[2]
     return 3
 

@@ -1,4 +1,4 @@
-"""Linear spring after equation (4), by the constants of the paper or by preload and stiffness.
+"""Linear spring, equation (4), defined by the constants of the paper or by preload and stiffness.
 
     Fs = Bs - (Bs / As)(x - b)  =  preload - stiffness (x - b)
 
@@ -32,7 +32,7 @@ def spring_energy(c: Any, x: float) -> float:
 
 
 def spring_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants (preload, stiffness, b) from the numbers of the part; return their number.
+    """Write the packed constants (preload, stiffness, b) from the values of the part; return their count.
 
     The numbers are Bs and As, or preload and stiffness; then 0 or 1 for the former or the latter.
     """

@@ -109,8 +109,8 @@ def head_of(
     pitch : float, optional
         Distance between slots, m; by default 1/60 in for 9 wires, else the wire pitch.
     wire_pitch : float, optional
-        Distance between neighbouring wires, m; by default the height of nine wires 1/72 in apart over their
-        number.
+        Distance between neighbouring wires, m; by default 9/72 in divided by the number of
+        wires.
     wire_diameter : float, optional
         Diameter of the wires, m; by default 0.35, 0.25 and 0.2 mm for 9, 18 and 24 wires, else 4/3 of the
         wire pitch.

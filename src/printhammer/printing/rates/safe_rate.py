@@ -266,7 +266,7 @@ def safe_rate(
         cases = [Case(hammer, single, rate) for rate in grid[len(rows) :][:size].tolist()]
         size = min(2 * size, _AT_ONCE)
         if stop:
-            # Most devices fail in the second or third slot: what follows such a rate is not simulated.
+            # Most devices fail in the second or third slot: the slots that follow are not simulated.
             quick = attempt(cases, [each for each in patterns if each[-1] < _FEW], strategy, **options).passed
             cases = cases[: int(np.argmin(quick)) + 1] if not quick.all() else cases
         brief = attempt_words(cases, every, apart_below, strategy, **options) if long else None

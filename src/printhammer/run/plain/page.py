@@ -1,7 +1,7 @@
 """Entry points for a web page that sets up a run: constants, rest position, supply, scales, window.
 
 They compute what `printhammer.run.problem` computes from a hammer and a drive. An outcome other than 0 is a
-refusal, see `REFUSALS`.
+refusal; see `REFUSALS`.
 """
 
 from __future__ import annotations
@@ -160,7 +160,7 @@ def statics_at(constants: Any, limits: Any) -> Statics:
 
 
 def find_rest(constants: Any, limits: Any, grid: Any, points: Any, found: Any, out: Any) -> int:
-    """Find the rest position of the armature, see `printhammer.hammer.statics.rest_position`.
+    """Find the rest position of the armature; see `printhammer.hammer.statics.rest_position`.
 
     Parameters
     ----------
@@ -210,7 +210,7 @@ def fill_supply(constants: Any, limits: Any, about: Any, out: Any) -> int:
     limits : float64 array, shape (5,)
         See `statics_at`.
     about : float64 array, shape (14,)
-        Numbers about the pulse, see `printhammer.drive.tables.pulse`.
+        Numbers about the pulse; see `printhammer.drive.tables.pulse`.
     out : float64 array, shape (4,)
         Of a weak hold: the hold current and the largest current, A, voltage, V, resistance, ohm. Of a falling
         linkage: inductance of the coil and least inductance, H, place, m.
@@ -303,7 +303,7 @@ def judge_window(status: int, contacts: Any, nodes: Any, places: Any, wait: floa
     status : int
         Status of the run.
     contacts, nodes : float64 arrays
-        Record of the run, see `printhammer.kernel.single.record`.
+        Record of the run; see `printhammer.kernel.single.record`.
     places : float64 array, shape (5,)
         Rest position and front of the pack, m; scales of the run, m and m/s; smallest window, s.
     wait : float

@@ -71,7 +71,7 @@ def part_of_window(position: float, front: float) -> float:
 
 
 def write_half_widths(way: float, speed: float, position: float, front: float, out: Any) -> None:
-    """Write the half-widths of the strobe window, m and m/s, see `printhammer.run.regime.window_of`.
+    """Write the half-widths of the strobe window, m and m/s; see `printhammer.run.regime.window_of`.
 
     `way` and `speed` are the scales of a hammer that starts at its origin, m and m/s; `position` and `front`
     are those of backstop and pack, m, NaN without one.
@@ -172,7 +172,7 @@ def largest_force(x: float, current: float, push: float, s: Statics) -> float:
 def typical_scales(
     mass: float, current: float, push: float, period: float, state: tuple[float, float], s: Statics
 ) -> tuple[float, float]:
-    """Return a typical displacement, m, and speed, m/s, see `printhammer.run.problem.scales_of`.
+    """Return a typical displacement, m, and speed, m/s; see `printhammer.run.problem.scales_of`.
 
     `current` and `push` are the largest current, A, and force of the drive, N; `period` is that of the drive,
     s, NaN without one.
