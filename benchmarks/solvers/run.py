@@ -38,7 +38,7 @@ def run(
     threads : int, optional
         Largest number of threads of ensembles; by default 2, or 1 where there is one core only.
     peers : Peers, optional
-        Solvers of others, see `benchmarks.solvers.entry.load_peers`.
+        Third-party solvers; see `benchmarks.solvers.entry.load_peers`.
     say : callable, optional
         Called with a line before each step.
 

@@ -24,7 +24,7 @@ Other constants do so about as well, see the family. A reconstructed constant is
 
 
 def gauge() -> str:
-    """Return a sentence on how the two scales were fixed that the motion does not determine."""
+    """Return a sentence on the two scales that the motion does not determine, and how both were fixed."""
     pounds = from_si(PRINT_FORCE, "N", "lbf")
     return (
         "Mass and all forces scale together without a change of the motion, and so do the current and 1 / Bm:"
@@ -37,7 +37,7 @@ def gauge() -> str:
 
 
 def best_of(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return the best judged candidate, see `standing`; it becomes the shipped hammer."""
+    """Return the best judged candidate (see `standing`), which becomes the shipped hammer."""
     return max(rows, key=standing)
 
 

@@ -118,7 +118,7 @@ def cloud_grows(context: Context, _claim: Claim) -> Measured:
 
 @measures("successive_points_apart", *WHOLE)
 def successive_points_apart(context: Context, claim: Claim) -> Measured:
-    """Measure the distance of successive strobe points, relative to that of arbitrary pairs of points."""
+    """Measure the distance between successive strobe points, relative to that between arbitrary points."""
     ratios: dict[str, float | None] = {}
     for name, states in panels(context).items():
         points = scaled(states)

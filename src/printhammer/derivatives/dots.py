@@ -47,7 +47,7 @@ RUN_QUANTITIES: Final = {
 _ENERGY: Final = 3  # First row of the energies in a column
 _PACK_LOSS: Final = 5  # Row of the pack loss in a column
 _SAMPLES: Final = 65  # Samples of a contact for the bracket of its largest force; arbitrary
-# Relative difference of two times up to which they are the same maximum; rounding of a minimisation
+# Relative difference between two times up to which they are the same maximum; rounding of a minimisation
 _NEAR: Final = 1e-6
 
 

@@ -24,7 +24,7 @@ ROWS: Final = 4
 
 DECAY_TIMES: Final = 27.6310211159
 """Number of decay time constants after which a decaying current is set to zero: its value is then 1e-12 of
-the initial one."""
+the initial value."""
 
 DIODE: Final = 0.7
 """Forward voltage of a silicon diode, V; the usual textbook value."""
@@ -340,7 +340,7 @@ def fill_table(shape: int, fields: Any, table: Any) -> int:
 
 
 def pulse(shape: int, fields: Any, table: Any, about: Any) -> int:
-    """Write the segment table of a pulse, and numbers about the pulse; return the number of rows.
+    """Write the segment table of a pulse, and numbers that describe the pulse; return the row count.
 
     Parameters
     ----------

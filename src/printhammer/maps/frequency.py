@@ -250,7 +250,7 @@ def tail_of(hammer: Hammer, waveform: Waveform) -> float:
 
 
 def rms_difference(computed: xr.Dataset, measured: xr.Dataset) -> tuple[FloatArray, FloatArray]:
-    """Compute the RMS difference of two maps at each common rate, at the times of the coarser map.
+    """Compute the RMS difference between two maps at each common rate, at the times of the coarser map.
 
     Parameters
     ----------

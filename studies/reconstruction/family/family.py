@@ -288,7 +288,7 @@ def _described(member: FamilyMember | None) -> str:
 
 
 def json_text(family: Sequence[FamilyMember], gauged: Sequence[Mapping[str, float]]) -> str:
-    """Return the text of `family.json`, see `printhammer.report.reconstruction.results.Family`.
+    """Return the text of `family.json`; see `printhammer.report.reconstruction.results.Family`.
 
     `gauged` are the constants of the members normalized to the common gauge, key to value, SI.
     """

@@ -32,7 +32,7 @@ class Logged(Declared):
 
 
 def read_logs(paths: Iterable[str | Path]) -> list[Logged]:
-    """Read logs of judged candidates, see `reconstruction.judging.log`, in the order of the files.
+    """Read logs of judged candidates (`reconstruction.judging.log`), in the order of the files.
 
     A hammer judged several times, also in different files, is returned once with all its verdicts; of each
     claim the last verdict counts.

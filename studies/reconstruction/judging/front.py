@@ -36,7 +36,7 @@ class Front(Result):
 
     @property
     def title(self) -> str:
-        """One line that says what the result is."""
+        """Summary in one line."""
         return f"{len(self.panels)} judged hammers, {int(self.on_front.sum())} on the front"
 
     def plot(self, **options: Any) -> Figure:
@@ -47,7 +47,7 @@ class Front(Result):
 
 
 def front(rows: Sequence[dict[str, Any]], core_time: float = 0.0) -> Front:
-    """Return the Pareto front of judged candidates, see `judged.row_of`.
+    """Return the Pareto front of judged candidates; see `judged.row_of`.
 
     Candidates for which a claim has not been judged are left out; `core_time` is in s.
 

@@ -24,7 +24,7 @@ def key_of(constants: Mapping[str, float]) -> Key:
 
 
 def read_judged(path: Path, *, some: bool = False) -> list[dict[str, Any]]:
-    """Return the candidates of a log, see `judged.row_of`, in the order in which they first occur.
+    """Return the candidates of a log (`judged.row_of`), in the order in which they first occur.
 
     A candidate judged more than once is returned once with all its verdicts; of each claim the last verdict
     counts. An incomplete last line is ignored: the program was stopped while writing it. A missing file

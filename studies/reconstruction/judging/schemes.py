@@ -143,7 +143,7 @@ def schemes_json(
     pool: Executor | None = None,
     tell: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
-    """Build the contents of `schemes.json`, see `printhammer.report.reconstruction.results.Schemes`."""
+    """Build the contents of `schemes.json`; see `printhammer.report.reconstruction.results.Schemes`."""
     printed = list(printed_verdicts().values())
     family = {}
     for member in family_hammers():

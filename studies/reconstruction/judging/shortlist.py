@@ -63,7 +63,7 @@ def judge_candidates(
 
     `every` holds constants of hammer files, SI. Besides Fig. 11 the stated claims are judged unless `names`
     gives others. `tell` is called with the number done, the total and the row. The rows of these candidates
-    are returned, see `judged.row_of`.
+    are returned; see `judged.row_of`.
     """
     wanted = [dict(constants) for constants in every]
     known = {key_of(row["constants"]): row for row in read_judged(path)}

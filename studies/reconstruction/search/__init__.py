@@ -1,1 +1,1 @@
-"""The search for hammers that do what the paper tells."""
+"""Search for hammers that reproduce the observations of the paper."""

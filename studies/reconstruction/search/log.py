@@ -97,7 +97,7 @@ class Log:
         Raises
         ------
         InputError
-            They do not belong to the points that the search asks for.
+            The logged candidates do not belong to the points that the search evaluates.
         """
         there = self._rows[place : place + len(points)]
         for number, (row, point) in enumerate(zip(there, points, strict=False), place + 1):

@@ -52,7 +52,7 @@ STARTS: Final = 64
 
 
 class Plan(Declared):
-    """Everything that determines a search."""
+    """Settings that determine a search."""
 
     aim: Aim = part("which claims lead, one of `AIMS`")
     seed: int = part("of everything random")
@@ -219,5 +219,5 @@ class _Island:
 
     @property
     def done(self) -> bool:
-        """Whether it no longer improves."""
+        """Whether the run no longer improves."""
         return self._since > PATIENCE or self._strategy.should_stop()

@@ -1,4 +1,4 @@
-"""Candidates that tests share: some at random, some about a hammer that does well."""
+"""Candidates shared by tests: random points, and points near a good hammer."""
 
 from functools import cache
 from pathlib import Path
@@ -15,7 +15,7 @@ Points = list[Any]
 
 
 def values_in(hammer: str | Path) -> dict[str, float]:
-    """A hammer file as values of the variables."""
+    """Return the values of the search variables for a hammer file."""
     return values_of({key: constant.si for key, constant in ph.load(hammer).constants.items()})
 
 
@@ -25,7 +25,7 @@ def random_points(count: int, seed: int) -> Points:
 
 
 def near_points(count: int, seed: int, apart: float = 0.05, hammer: str | Path = CRUDE) -> Points:
-    """Points about a hammer that does well, in shares of the ranges."""
+    """Return random points near a good hammer, as fractions of the ranges."""
     rng = np.random.default_rng(seed)
     middle = point_of(values_in(hammer))
     return [np.clip(middle + rng.uniform(-apart, apart, len(middle)), 0.0, 1.0) for _ in range(count)]
@@ -35,12 +35,12 @@ def near_points(count: int, seed: int, apart: float = 0.05, hammer: str | Path =
 def some_candidates(
     count: int = 12, near: int = 6, seed: int = 11, apart: float = 0.05
 ) -> tuple[Candidate, ...]:
-    """Candidates of random points and of points about the hammer that does well."""
+    """Return candidates at random points and at points near a good hammer."""
     found = candidates(random_points(count, seed) + near_points(near, seed, apart))
     return tuple(candidate for candidate in found if candidate is not None)
 
 
 def constants_in(hammer: str | Path) -> dict[str, float]:
-    """The constants of a hammer file that the search sets, SI."""
+    """Return the constants of a hammer file that the search varies, SI."""
     known = ph.load(hammer).constants
     return {key: known[key].si for key in constants_at(values_in(hammer), 1.0, 1.0)}

@@ -20,7 +20,7 @@ from printhammer.cli.runner import Verb
 ROOT = Path(__file__).parents[3]
 PAGES = [ROOT / "docs" / "howto" / f"{name}.md" for name in ("reconstruction", "schemes")]
 NAMES = [verb.name for verb in VERBS]
-# What a verb cannot do without, so that it comes to see what is wrong beside it.
+# Required arguments of each verb, so that a test reaches the bad option.
 NEEDED = {
     "search": ("new.jsonl",),
     "judge": ("a.jsonl", "new.jsonl"),

@@ -39,7 +39,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def cheap(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Losses and verdicts at no cost."""
+    """Replace losses and verdicts by constants."""
 
     def scored(points: list[Any], _aim: str, _pool: Any, _shape: str) -> list[dict[str, Any]]:
         return [
@@ -152,7 +152,7 @@ def test_base_rates_are_counted(cli: Callable, here: Path, cheap: None) -> None:
 def test_verdicts_of_the_schemes_are_counted(
     cli: Callable, here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The count itself, which takes minutes, is in judging/test_schemes.py."""
+    """The slow count itself is tested in judging/test_schemes.py."""
     asked: dict[str, Any] = {}
 
     def counted(hammer: ph.Hammer, hammers: int, seed: int, **how: Any) -> dict[str, Any]:
@@ -197,7 +197,7 @@ def test_the_best_ships(cli: Callable, here: Path, cheap: None) -> None:
 
 @pytest.fixture
 def files(here: Path) -> Path:
-    """Some files to read wrongly: a short search, its judged candidates, notes."""
+    """Write files of several kinds: a short search, its judged candidates, notes."""
     row = {"point": [0.5], "total": 1.0, "constants": None}
     judged_rows(here / "search.jsonl", {**HEADING, "aim": "all"}, row)
     judged_rows(here / "stated.jsonl", HEADING, row)

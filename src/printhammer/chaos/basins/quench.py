@@ -95,7 +95,7 @@ class QuenchMap(Result):
         return f"quench map of {self.hammer.name}"
 
     def summary(self) -> Summary:
-        """Summarise the number of lost second dots, and forces and flight times of the printed ones."""
+        """Summarise the number of lost second dots, and the forces and flight times of the printed dots."""
         struck, lost = self.struck, int(self.lost.sum())
         first = f"{quantity(self.single_force, 'N')}, flight time {quantity(self.single_flight_time, 's')}"
         rows: list[FactRow] = [

@@ -54,7 +54,7 @@ STRAND: Final = 16
 """Number of successive parameter values in a strand; strands are computed in parallel."""
 
 SAME: Final = 1e-3
-"""Largest distance, in half-widths of the strobe window, of periodic orbits that count as the same."""
+"""Largest distance between periodic orbits that count as the same, in half-widths of the strobe window."""
 
 _SHIFTED: Final = 0.5
 """Largest difference of the means of two point sets on the same attractor, in standard deviations."""
@@ -162,7 +162,7 @@ def is_same_attractor(table: Trains, row: int, columns: Columns, place: int, cyc
 
 
 JUMP: Final = 0.2
-"""Distance of neighbouring orbits, in half-widths of the strobe window, above which the step is refined."""
+"""Distance between neighbouring orbits, in half-widths of the strobe window, that requires a finer step."""
 
 
 @dataclass

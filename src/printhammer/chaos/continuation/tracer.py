@@ -44,7 +44,7 @@ _SHORTER: Final = 1e-6
 _DIGITS: Final = ".9g"
 _MOST_SECTIONS: Final = 8  # Maximum number of segments of a branch at different sections; arbitrary
 _SAME_PHASE: Final = 1e-3
-"""Difference of two section phases, as a fraction of the period, below which they are the same."""
+"""Difference between two section phases, as a fraction of the period, below which both are the same."""
 _CLEAR: Final = 1e-3
 """Scaled distance from the end of a segment within which orbits are removed before a section change."""
 _LEAST_CHORD: Final = 1e-5

@@ -37,7 +37,7 @@ LENGTH: Final = 10.0
 POINTS: Final = 4000
 """Default maximum number of points of each manifold curve."""
 SPACING: Final = 0.02
-"""Default target distance of neighbouring points, in half-widths of the strobe window."""
+"""Default target distance between neighbouring points, in half-widths of the strobe window."""
 BEND: Final = 0.2
 """Angle between neighbouring segments, rad, above which a point is inserted."""
 
@@ -114,7 +114,7 @@ def manifolds(
     points : int, optional
         Maximum number of points of each curve.
     spacing : float, optional
-        Target distance of neighbouring points, in half-widths of the strobe window.
+        Target distance between neighbouring points, in half-widths of the strobe window.
     kinds : tuple of str, optional
         "stable", "unstable", or both.
 

@@ -96,12 +96,12 @@ def quality(
     damping: bool = _instead("Compare materials of backstop and pack at equal print force."),
     spread: list[str] | None = _more(
         "X|KEY=X",
-        "Relative spread of all constants (1%) or of one (magnet.Am=2%), with --yield; repeatable.",
+        "Relative spread of all constants (1%) or one constant (magnet.Am=2%), with --yield; repeatable.",
         many=True,
     ),
     judged_by: str | None = _more(
         "own|design",
-        "Reference dot, with --yield: single pulse of the same hammer (own) or of the nominal one (design).",
+        "Reference dot, with --yield: single pulse of the same hammer (own) or the nominal hammer (design).",
     ),
     seed: int | None = opt.whole("Seed for drawing the hammers of --yield (default: 0).", panel=_MORE),
     current: str | None = _more("CURRENT", "Limit on the current, with --damping (default: 2 A)."),

@@ -130,7 +130,7 @@ _SAMPLES: Final = 4001  # Samples of a decaying pulse; arbitrary
 _WAIT: Final = 1e-6  # Step of the search for the wait after a brake pulse, s
 
 JUMP: Final = 8e-6
-"""Difference of neighbouring advances, s, above which the entries belong to different solution branches."""
+"""Difference between neighbouring advances, s, above which the entries are on different solution branches."""
 
 
 class Settings(NamedTuple):

@@ -32,7 +32,7 @@ NEAR, LIES_ON = 0.1, 1e-6
 """Distances from an orbit, in half-widths, within which the orbit is sought, and within which a state lies on
 the orbit; as in `printhammer.chaos.orbits.settled`."""
 STILL_COIL = 1e-9
-"""Current, relative to a typical one, below which the coil counts as currentless."""
+"""Current, relative to a typical current, below which the coil counts as currentless."""
 
 TRIED, SHARE, RESIDUAL, SMOOTH = range(4)
 """Indices of `search`: number of map evaluations, damping factor, residual, differentiability flag."""

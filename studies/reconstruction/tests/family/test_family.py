@@ -45,7 +45,7 @@ def log(hammer: ph.Hammer, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def judged(hammer: ph.Hammer) -> dict[str, Any]:
-    """Instead of the claims, which take long: one hammer is none of the family."""
+    """Replacement for the slow claims, by which one hammer does not belong to the family."""
     rise = hammer.constants["waveform.rise"].si
     conclusions = {
         "safe_rate_Hz": 1e7 * rise,

@@ -12,7 +12,7 @@ FEW = np.array([1.0, 1.05, 1.09, 1.11, 1.3, -1.0, 0.0])
 
 
 def clearly_different(a: np.ndarray, b: np.ndarray) -> bool:
-    """The issue's own words: at least 10 % apart in at least three constants."""
+    """Whether two hammers are at least 10 % apart in at least three constants."""
     apart = 0
     for one, other in zip(a, b, strict=True):
         if one != other and abs(one - other) >= 0.1 * min(abs(one), abs(other)):

@@ -1,4 +1,4 @@
-"""Judged candidates, read as hammers for the family; what is no log is told in `test_judged`."""
+"""Judged candidates, read as hammers for the family; `test_judged` covers invalid logs."""
 
 import json
 from pathlib import Path

@@ -10,7 +10,7 @@ COUNT = 24
 
 
 def family(**other: list[float | None]) -> tuple[list[dict], list[dict[str, float]]]:
-    """A family in which the safe rate goes with the damping, and nothing else varies."""
+    """Family in which the safe rate follows the damping, and all else is constant."""
     random = np.random.default_rng(3)
     constants = [
         {"mass": float(random.uniform(1.0, 2.0)), "backstop.damping": 1.0 + number, "platen": 1.0}

@@ -19,7 +19,7 @@ PANELS = [f"{period * 1e3:.2f} ms" for period in printed_verdicts()]
 
 @pytest.fixture
 def judged(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, tuple[str, ...], bool]]:
-    """Verdicts at no cost, by chance of the mass; the list tells what was asked."""
+    """Replace the claims by a verdict that depends on the mass; return the list of recorded calls."""
     asked: list[tuple[float, tuple[str, ...], bool]] = []
 
     def row_of(constants: dict[str, float], names: list[str], *, panels: bool = True) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Candidates judged by the claims, and the log in which that is noted."""
+"""Candidates judged by the claims, and the log of judged candidates."""
 
 import json
 from pathlib import Path

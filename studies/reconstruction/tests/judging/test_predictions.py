@@ -1,4 +1,4 @@
-"""What hammers found on the stated claims alone say about the others."""
+"""Predictions of the other claims by hammers found on the stated claims alone."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""How verdicts of two ways of computing are compared."""
+"""Comparison of verdicts computed in two ways."""
 
 import math
 

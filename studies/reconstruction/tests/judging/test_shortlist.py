@@ -63,7 +63,7 @@ def test_constants_are_rounded_to_six_digits(value: float) -> None:
 
 @pytest.fixture
 def judged(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, tuple[str, ...]]]:
-    """Verdicts at no cost: all hold; the list tells what was judged."""
+    """Replace the claims by the verdict that all hold; return the list of recorded calls."""
     done: list[tuple[float, tuple[str, ...]]] = []
 
     def row_of(constants: dict[str, float], names: tuple[str, ...], *, panels: bool) -> dict[str, Any]:
@@ -103,7 +103,7 @@ def test_more_claims_are_judged_where_they_were_not(
     (more,) = judge_candidates(masses(1.0), path, names=[STATED[0], "settle_out", FIGURE_11])
     assert judged == [(1.0, (*STATED, FIGURE_11)), (1.0, ("settle_out",))]
     assert more["panels"] == 12
-    # What was known stays known.
+    # Earlier verdicts are kept.
     assert set(more["verdicts"]) == {*STATED, "settle_out", FIGURE_11}
     judge_candidates(masses(1.0), path, names=list(STATED))
     assert len(judged) == 2

@@ -47,7 +47,7 @@ def looked_at(chosen: tuple[Candidate, ...]) -> list[Score]:
 
 
 def close_call(name: str, value: dict[str, float]) -> bool:
-    """Whether a measured value is about at the end of its band."""
+    """Whether a measured value is close to the end of its band."""
     key, margin = NEAR.get(name, ("", 0.0))
     band = claims()[name].band.get(key)
     ends = band if isinstance(band, list) else (band or {}).values()
@@ -80,7 +80,7 @@ def test_only_stated_claims_lead_one_search_and_typical_ones_neither() -> None:
 
 
 def check(chosen: tuple[Candidate, ...], names: tuple[str, ...], scores: list[Score]) -> int:
-    """Compare losses with verdicts, close calls apart; return how many were compared."""
+    """Compare losses with verdicts, except in close calls; return the number of comparisons."""
     compared = 0
     for candidate, score in zip(chosen, scores, strict=True):
         context = Context(candidate.hammer)
@@ -283,7 +283,7 @@ def test_what_just_fails_counts_where_the_number_of_claims_leads() -> None:
 
 
 def test_region_and_clouds_agree_with_the_claims() -> None:
-    """The former hammer has neither, the best that the search knows has both."""
+    """Both claims fail for the former hammer and hold for the best hammer of the search."""
     best = json.loads(BEST.read_text("utf-8").splitlines()[0])
     points = [best["point"], *near_points(1, 5, 0.0, "hendriks-1983-1")]
     names = ("chaotic_region", "behind_the_backstop")

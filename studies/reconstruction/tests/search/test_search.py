@@ -1,4 +1,4 @@
-"""The search: everything follows from the seed, and a log that was begun is gone on with."""
+"""The search is determined by its seed, and resumes from an existing log."""
 
 import itertools
 import json
@@ -22,7 +22,7 @@ from printhammer.errors import InputError
 PLAN = Plan("all", seed=3, sample=16)
 SAMPLED = 16
 ROUND = 12
-"""Points of the sample and of each round after it; whole rounds are noted at once."""
+"""Numbers of points in the sample and in each later round; the log grows by whole rounds."""
 
 SHORT, LONG = SAMPLED + 2 * ROUND, SAMPLED + 4 * ROUND
 
@@ -36,7 +36,7 @@ def _small(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def bowl(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Something cheap to minimise in place of hammers; the list tells how many points were computed."""
+    """Replace the loss by a quadratic bowl; return the list of batch sizes."""
     computed: list[int] = []
 
     def scored(points: list[Any], aim: str, _pool: Any, _shape: str) -> list[dict[str, Any]]:

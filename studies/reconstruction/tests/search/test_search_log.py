@@ -1,4 +1,4 @@
-"""The log of a search, read."""
+"""Reading the log of a search."""
 
 import json
 from pathlib import Path
