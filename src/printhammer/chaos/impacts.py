@@ -306,7 +306,7 @@ class ImpactTrain(Result):
 
     @property
     def significant(self) -> float:
-        """The 95 % bound of the autocorrelation of n independent intervals, 1.96/sqrt(n)."""
+        """95 % bound of the autocorrelation of n independent intervals, 1.96/sqrt(n)."""
         return 1.96 / math.sqrt(len(self.intervals))
 
     @property

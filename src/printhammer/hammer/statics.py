@@ -130,7 +130,7 @@ def compressed(current: float, low: float, s: Statics) -> float:
 
 
 def spacing(x: float) -> float:
-    """Return the distance from a number to the next larger one in magnitude, as `math.ulp`."""
+    """Return the distance from a number to the next number of larger magnitude, as `math.ulp` does."""
     x = abs(x)
     if x < LEAST_NORMAL:
         return LEAST

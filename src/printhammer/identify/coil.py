@@ -183,7 +183,7 @@ def fit_coil(
 
 
 class CurrentLaw:
-    """Currents of all records, A, shape (m,).
+    """Law of a fit: currents of all records, A, shape (m,).
 
     p holds the named constants, the fitted probe errors, and the offset of each edge of a recorded voltage
     from the middle between its two rows, SI.

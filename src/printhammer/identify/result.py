@@ -375,7 +375,7 @@ class Fit(Result):
 
     @property
     def report(self) -> list[str]:
-        """The fit as a report, in lines of text."""
+        """Report of the fit, in lines of text."""
         lines = []
         for constant in self.constants.values():
             low, high = constant.interval

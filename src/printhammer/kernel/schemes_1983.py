@@ -248,7 +248,7 @@ def acceleration(time: float, x: float, v: float, peak: float, model: Any) -> fl
 def runge_kutta(
     time: float, x: float, v: float, h: float, peak: float, model: Any
 ) -> tuple[float, float, bool]:
-    """Take a step of the classical fourth-order Runge-Kutta method; return position, velocity and True."""
+    """Compute a step of the classical fourth-order Runge-Kutta method; return position, velocity and True."""
     half = 0.5 * h
     a1 = acceleration(time, x, v, peak, model)
     v2 = v + half * a1
@@ -267,7 +267,7 @@ def runge_kutta(
 def trapezoid(
     time: float, x: float, v: float, h: float, peak: float, model: Any
 ) -> tuple[float, float, bool]:
-    """Take a step of the trapezoidal rule; return position, velocity and whether the iteration converged."""
+    """Compute a step of the trapezoidal rule; return position, velocity and convergence."""
     # Substituting x1 = x + h/2 (v + v1) into the rule for v leaves one equation for v1.
     half = 0.5 * h
     a = acceleration(time, x, v, peak, model)
@@ -306,7 +306,7 @@ def trapezoid(
 def one_step(
     implicit: bool, time: float, x: float, v: float, h: float, peak: float, model: Any
 ) -> tuple[float, float, bool]:
-    """Take a step of the trapezoidal rule if `implicit`, otherwise of the Runge-Kutta method."""
+    """Compute a step of the trapezoidal rule if `implicit`, otherwise of the Runge-Kutta method."""
     if implicit:
         return trapezoid(time, x, v, h, peak, model)
     return runge_kutta(time, x, v, h, peak, model)

@@ -26,7 +26,7 @@ from printhammer.support.arrays import FloatArray
 
 Scheme = Literal["default", "trapezoid", "runge-kutta-4"]
 SCHEMES: Final = get_args(Scheme)
-"""Integrators: the default, with located contacts and high order; and the two of the paper."""
+"""Integrators: the default, with located contacts and high order, and the two schemes of the paper."""
 
 # Limits of the number of output points, and points per time scale
 _FEWEST, _MOST, _PER_SCALE = 1001, 400_001, 100

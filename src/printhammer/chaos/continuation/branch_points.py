@@ -56,7 +56,7 @@ _ROUNDING: Final = 1e-8
 _SHARE_OF_CHANGE: Final = 1e-10
 _SMALL_MARGIN: Final = 0.05
 _CLOSE_MARGIN: Final = 1e-7
-"""Contact change: final bracket, in steps; distances from the grazing where interpolation starts, ends."""
+"""Search for a contact change: final bracket, in steps; grazing margins that begin and end interpolation."""
 _NEAR: Final = 1e-4
 """Distance, as a fraction of a step, within which a fold and a crossing are the same point."""
 _AMPLITUDE: Final = 1e-2  # First scaled distance from a doubling at which its orbit is sought

@@ -87,9 +87,9 @@ _COMPLETED: Final = 6
 _MORE: Final = 512
 """Largest period, in firings, that is searched again if its index sum is not 1; number of further guesses."""
 _NEAR: Final = 64  # Number of guesses near each known orbit of a period whose index sum is not 1
-_ROUNDS: Final = 3  # Largest number of rounds of these guesses; arbitrary
+_ROUNDS: Final = 3  # Largest number of rounds of further guesses; arbitrary
 _SIZES: Final = (-6.0, -1.5)
-"""Decimal logarithms of the sizes of the displacements of these guesses, in half-widths of the strobe window.
+"""Range of decimal logarithms of the displacements of further guesses, in half-widths of the strobe window.
 
 Near chatter, orbits that differ by one bounce lie close together. From the ball of Tufillaro at 60 Hz."""
 _SAME: Final = 1e-6

@@ -73,7 +73,7 @@ class PositionSensor(Declared):
         return max(float(np.hypot(self.noise, self.step / np.sqrt(12.0))), _LEAST_ERROR)
 
     def count(self, time: float) -> int:
-        """Return the number of samples in a time span, s; at least one."""
+        """Return the number of samples in a time span, s; at least 1."""
         return max(1, round(time / self.interval))
 
     def numbers(self, since: FloatArray, until: FloatArray, most: int) -> IntArray:

@@ -39,7 +39,7 @@ def _choices(laws: Laws) -> dict[str, bool]:
 def specialise_lanes(laws: Laws, kinds: LaneKinds) -> Kernel:
     """Return the lane kernel for `laws` and for a drive with the kinds of pieces `kinds`.
 
-    The entry point of the kernel is `lanes`, see :mod:`printhammer.kernel.lanes.lanes`.
+    The entry point of the kernel is `lanes`; see :mod:`printhammer.kernel.lanes.lanes`.
     """
     with one_at_a_time:
         return _specialised(laws, kinds)

@@ -221,7 +221,7 @@ class Entry:
     name : str
         Name of the entry point, a key of `KINDS`.
     variant : mapping
-        Variant of the template, see :func:`printhammer.kernel.compile.lower.template`.
+        Variant of the template; see :func:`printhammer.kernel.compile.lower.template`.
     bindings : Bindings
         Law functions and choices of the hammer.
     choices : mapping

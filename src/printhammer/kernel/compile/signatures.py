@@ -1,4 +1,4 @@
-"""Argument types of the entry points, see :data:`printhammer.kernel.compile.calls.Signature`."""
+"""Argument types of the entry points; see :data:`printhammer.kernel.compile.calls.Signature`."""
 
 from __future__ import annotations
 
@@ -76,12 +76,12 @@ class Plain(NamedTuple):
 
     The function allocates nothing and raises nothing; it returns None, an integer, or a tuple of integers.
     Its module may leave names of laws, of choices and of functions of the kernel's templates undefined; these
-    are bound when the function is compiled, see :func:`printhammer.kernel.compile.templates.bind`.
+    are bound when the function is compiled; see :func:`printhammer.kernel.compile.templates.bind`.
     """
 
     function: Callable[..., Any]
     arguments: Any
-    """Type codes of the arguments, see :data:`printhammer.kernel.compile.calls.Signature`."""
+    """Type codes of the arguments; see :data:`printhammer.kernel.compile.calls.Signature`."""
     results: int = 0
     """Number of integers that the function returns."""
     laws: bool = False

@@ -73,7 +73,7 @@ class Kept(NamedTuple):
         :mod:`printhammer.kernel.model.dots`: a row for each firing, then extra contacts up to the
         capacity.
     strobes : float64 array, shape (strobe times, 4), with a coil circuit (strobe times, 7)
-        States at the strobe times, see :mod:`printhammer.kernel.single.stretch`.
+        States at the strobe times; see :mod:`printhammer.kernel.single.stretch`.
     x : float32 array, shape (M, T)
         Displacement [m] of each member at the times `grid`.
     """

@@ -3,7 +3,7 @@
 A row of a contact follows from its row in the record (:mod:`printhammer.kernel.single.record`), from the
 peaks that :func:`printhammer.kernel.single.resample.peaks` finds and from the energies of the steps that
 :func:`printhammer.kernel.methods.quadrature.quadratures` integrates. A row of a dot follows from the first
-pack contact of its firing, see :mod:`printhammer.kernel.model.dots`.
+pack contact of its firing; see :mod:`printhammer.kernel.model.dots`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ LOSS, FIRING, NUMBER, INITIAL = range(8, 12)
 """Columns of the energy dissipated [J], the index of the firing (-1 if none), the number of the contact among
 the pack contacts of its firing (-1 for a contact of no firing), and 1 if open at the start."""
 BEGIN, END = range(12, 14)
-"""Columns of the first step within the contact and the step after the last."""
+"""Columns of the first step within the contact and the step after the last step within."""
 CONTACT_WIDTH = 14
 """Number of columns of a contact."""
 

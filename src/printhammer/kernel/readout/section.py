@@ -11,7 +11,7 @@ SIGNIFICANT = 3.0
 """Number of standard errors by which the exponent of a strange motion exceeds zero."""
 
 UNPROVED, SUPERSTABLE, RESTS_ONCE, KINKED, STRANGE, UNCERTAIN = -1, -2, -3, -4, -5, -6
-"""Codes of the classes without a period, see :func:`class_of`."""
+"""Codes of the classes without a period; see :func:`class_of`."""
 
 AGREES, DISTINCT = 1e-8, 1e-3
 """Distances, in units of the scales, below which states agree completely and above which they differ by more
@@ -26,7 +26,7 @@ def write_states(strobes: Any, front: float, states: Any, branches: Any) -> None
     Parameters
     ----------
     strobes : float64 array, shape (n, 4), with a circuit (n, 7)
-        Strobes, see :mod:`printhammer.kernel.single.stretch`.
+        Strobes; see :mod:`printhammer.kernel.single.stretch`.
     front : float
         Front of the pack [m].
     states : float64 array, shape (n, 3), with a circuit (n, 4)

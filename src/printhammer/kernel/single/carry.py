@@ -73,9 +73,9 @@ class Setup(NamedTuple):
     Attributes
     ----------
     train : Train
-        Pulse train, see :class:`printhammer.kernel.model.layout.Train`.
+        Pulse train; see :class:`printhammer.kernel.model.layout.Train`.
     hammer : float64 array
-        Parameter array, see :mod:`printhammer.kernel.model.layout`.
+        Parameter array; see :mod:`printhammer.kernel.model.layout`.
     control : tuple of float
         Scales of displacement [m] and velocity [m/s], tolerances of the order 6 and order 7 error estimates.
     bounds : tuple of float

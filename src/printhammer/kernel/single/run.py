@@ -111,7 +111,7 @@ def run(posed: Any, t_end: float, nodes: Any, contacts: Any, state: Any) -> tupl
         last node before the pause; a contact that was open at the pause stays in row 0, with a negative
         node index.
     state : float64 array, shape (32,)
-        State of the run, see :mod:`printhammer.kernel.single.carry`.
+        State of the run; see :mod:`printhammer.kernel.single.carry`.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Hard backstop after equations (6) and (7): Hertz contact with viscoelastic loss.
+"""Hard backstop, equations (6) and (7): Hertz contact with viscoelastic loss.
 
     Fb + Fe = k delta^1.5 - l v delta^1.5,     delta = b - x > 0
 

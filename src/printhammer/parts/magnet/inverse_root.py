@@ -1,4 +1,4 @@
-"""Magnet after equation (3): permanent magnet and bucking coil as one fitted force.
+"""Magnet, equation (3): permanent magnet and bucking coil as one fitted force.
 
     Fm = F0 - (Am - Bm I)^2 / sqrt(x)
 

@@ -1,4 +1,4 @@
-"""Ribbon and paper pack after equation (5), with hysteresis.
+"""Ribbon and paper pack, equation (5), with hysteresis.
 
     loading    Fp = -S r^2.7
     unloading  Fp = -S rmax^-8.3 r^11          r = (x - xp)/d,  S = Ai Ep

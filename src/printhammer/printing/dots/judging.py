@@ -138,7 +138,7 @@ class Limits(Declared):
 
     @property
     def text(self) -> str:
-        """The limits in plain text, with times in microseconds."""
+        """Limits in plain text, with times in microseconds."""
         return (
             f"force within {100.0 * self.force:g} %, arrival within {1e6 * self.arrival:g} us,"
             f" {self.extra_contacts} extra contacts"
@@ -146,7 +146,7 @@ class Limits(Declared):
 
     @property
     def said(self) -> str:
-        """The limits in words, for summaries, with a suitable unit of time."""
+        """Limits in words, for summaries, with a suitable unit of time."""
         return (
             f"force within {100.0 * self.force:g} %, arrival within {quantity(self.arrival, 's')},"
             f" {self.extra_contacts} extra contacts"

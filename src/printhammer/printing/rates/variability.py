@@ -181,7 +181,7 @@ class Variability(Declared):
 
     @property
     def text(self) -> str:
-        """The standard deviations in words, for a report."""
+        """Standard deviations in words, for a report."""
         words = [
             f"{name} {1e6 * value:g} µm" if name == "travel" else f"{name} {100.0 * value:g} %"
             for name, value in asdict(self).items()

@@ -43,7 +43,7 @@ class Share(Declared):
 
     @property
     def interval(self) -> tuple[float, float]:
-        """95 % interval of the fraction, after E. B. Wilson, J. Amer. Statist. Assoc. 22 (1927) 209.
+        """Wilson 95 % interval of the fraction; E. B. Wilson, J. Amer. Statist. Assoc. 22 (1927) 209.
 
         It is the set of probabilities p with ``|rate - p| <= z sqrt(p (1 - p) / n)``; it stays within 0 and
         1, and has a width even if none or all hold.
