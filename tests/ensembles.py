@@ -60,14 +60,14 @@ class Members:
         )
 
     def run(self, which: Any = None, *, tolerance: float = 2e-11, **options: Any) -> EnsembleResult:
-        """Everything about these members, or some, unless told otherwise."""
+        """Return all results of the members `which` (default: all), unless `options` select results."""
         chosen = range(len(self.hammers)) if which is None else which
         given = {"dots": True, "strobes": [self.strobes[i] for i in chosen], "times": TIMES, **options}
         return self.ensemble(which, tolerance=tolerance).run(**given)
 
 
 def rows(result: EnsembleResult, i: int) -> dict[str, npt.NDArray[Any]]:
-    """All results of one member, without what the longest member of the ensemble adds to them."""
+    """Return all results of one member, without the padding to the longest member."""
     found = {name: np.atleast_1d(getattr(result, name)[i]) for name in ("status", "reached", "steps")}
     for name, table, mark in (("dots", result.dots, "fired_at"), ("strobes", result.strobes, "t")):
         if table is not None:

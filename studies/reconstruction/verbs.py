@@ -19,9 +19,7 @@ from printhammer.errors import InputError
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
 
-HELP: Final = (
-    "Search for hammers that do what the paper tells, judge them, and make tables of what was found."
-)
+HELP: Final = "Search for hammers that reproduce the paper, judge the candidates, and tabulate the results."
 EXAMPLE: Final = "python -m studies.reconstruction search all.jsonl --minutes 1"
 _SEARCHED: Final = "python -m studies.reconstruction search all.jsonl --from family --minutes 0.1 &&"
 _TWO: Final = f"{_SEARCHED} python -m studies.reconstruction judge all.jsonl judged.jsonl --best 2"

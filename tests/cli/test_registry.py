@@ -17,7 +17,7 @@ from printhammer.cli.options import Files, read_plain, read_whole
 from printhammer.cli.runner import Verb
 
 NAMES = [verb.name for verb in VERBS]
-# What a verb cannot do without, so that it comes to see what is wrong beside it.
+# Required arguments of each verb, so that a test reaches the bad option.
 NEEDED = {
     "curve": ("--second", "backstop.damping"),
     "figure": ("3",),

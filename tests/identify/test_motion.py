@@ -1,4 +1,4 @@
-"""Fits of single shots: what comes back, what a user is told, and what is refused."""
+"""Fits of single shots: recovered constants, remarks, and rejected input."""
 
 import itertools
 import re
@@ -111,7 +111,7 @@ def test_outliers_are_left_out(tmp_path: Path) -> None:
 
 
 def test_the_bandwidth_counts(tmp_path: Path) -> None:
-    """A sensor's delay that is not told shifts the constants, and the records reject that."""
+    """An undeclared sensor delay shifts the constants, and the fit is rejected."""
     path = shots.write(tmp_path / "shot.csv", HAMMER, bandwidth=30e3, said=False)
     told, untold = fit_motion([path], FAR, bandwidth=30e3), fit_motion([path], FAR)
     assert abs(told["mass"].value - MASS) < 4.0 * told["mass"].standard_error

@@ -94,7 +94,7 @@ def test_a_strange_attractor_is_found_by_its_exponent(hammer: "ph.Hammer") -> No
 
 
 def test_what_does_not_settle_is_undecided(hammer: "ph.Hammer", monkeypatch: pytest.MonkeyPatch) -> None:
-    # Without a train that is followed for long nothing strange can be told.
+    # Without trains that are followed for long, no strange attractor is identified.
     monkeypatch.setattr(attractors, "ATTEMPTS", 0)
     found = ph.basins(hammer, period=1.05e-3, x=(30e-6, 80e-6, 3), v=(-0.4, 0.4, 2), firings=40, rounds=2)
     assert found.attractors == ()

@@ -40,7 +40,7 @@ def test_cells_of_equal_pulses_are_single_runs(hammer: "ph.Hammer", found: Quenc
         if dot.struck:
             assert found.force[row, 1] == pytest.approx(dot.peak_force, rel=1e-6)
             assert found.flight_time[row, 1] == pytest.approx(dot.flight_time, rel=1e-7)
-        # Read from samples where no dot tells the depth.
+        # Without a dot, the peak is interpolated from samples.
         way = hammer.front - hammer.position
         assert found.peak[row, 1] == pytest.approx(peak[1], abs=1e-5 * way)
     assert found.lost[:, 1].any()

@@ -1,4 +1,4 @@
-"""Modules of an entry point: found, made again, told apart; and the kernel that is linked from them."""
+"""Modules of an entry point: loaded, rebuilt and distinguished; and the kernel linked from them."""
 
 import lzma
 import subprocess

@@ -123,7 +123,7 @@ def test_numbers_in_the_log_are_those_of_the_claims() -> None:
     margin = found["release_margin"]["net_over_magnet_force"]
     assert measured["margin"] == pytest.approx(margin, rel=1e-9)
     settled = found["settle_out"]["largest_excursion_over_stroke"]
-    # The motion is looked at every microsecond.
+    # The motion is sampled every microsecond.
     assert measured["highest"] == pytest.approx(settled, rel=1e-3, abs=1e-3)
     speed = found["two_pulses_700us"]["velocity_at_half_current_m_per_s"]
     assert measured["rise_speed"] == pytest.approx(speed, abs=1e-6)
@@ -230,7 +230,7 @@ def test_panels_of_short_trains_are_mostly_those_of_the_claim() -> None:
     right, seen, off = 0, 0, []
     for candidate, score in zip(chosen, scores, strict=True):
         found = [name for name, _printed in plain_panels(candidate.hammer).values()]
-        # Where the hard panels do badly the others are not looked at.
+        # If the hard panels have large losses, the other panels are not computed.
         looked_at = [
             (mine, name) for mine, name in zip(score.measured["verdicts"], found, strict=True) if mine
         ]
@@ -246,7 +246,7 @@ def test_panels_of_short_trains_are_mostly_those_of_the_claim() -> None:
     # Where a strange train goes depends on the tolerance, and the search looks at fewer firings than the
     # claim: within two standard errors of a share among so many.
     assert np.median(off) < 2.0 * math.sqrt(0.25 / FIRINGS)
-    # A short train tells period from chaos in most panels; the claim alone decides.
+    # A short train distinguishes period from chaos in most panels; the claim alone decides.
     assert right > 0.75 * seen
     assert seen > 12
 
