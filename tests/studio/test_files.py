@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from tests.studio.reading import STATE, node
 
@@ -17,10 +17,12 @@ from printhammer.drive.waveforms.shapes import SHAPES, Sampled
 from printhammer.studio import Shelf
 from printhammer.studio.controls import fields_of
 from printhammer.support.tables.readings import read_table
+from printhammer.units import parse
 
 NAME = "hendriks-1983-1"
 CURVES = {"displacement": "m", "current": "A", "force": "N", "voltage": "V"}
 ASKED = """
+  quantity: (text, si) => quantityOf(text, [si], "it")[0],
   write: (state) => driveText(state, shelf),
   drive: (text) => driveOf(tomlOf(text, "a.toml", shelf.limits), shelf, "a.toml"),
   table: (text, told) => {
@@ -113,6 +115,12 @@ def test_a_sinusoidal_force_is_written_and_read_again(ask: Any) -> None:
         ("format = 2\n[train]\nrate = '1 kHz'", "expected 1"),
         ("format = 1\n[train]\nrate = 1000", "has no unit"),
         ("format = 1\n[train]\nrate = '1 mm'", "expected a quantity in Hz"),
+        ("format = 1\n[train]\nrate = '1,500 Hz'", "a decimal point"),
+        ("format = 1\n[train]\nrate = '2*3 Hz'", "expected one number"),
+        (f"format = 1\n[train]\nrate = '1*{'(' * 20_000}'", "expected one number"),
+        # These would take minutes to read.
+        (f"format = 1\n[train]\nrate = '{'1' * 300_000}'", "expected one number"),
+        (f"format = 1\n[sine]\namplitude = '1 N'\nfrequency = '1 Hz'\nphase = '{'1' * 300_000}'", "an angle"),
         ("format = 1\n[train]\nrate = '1 kHz'\npulses = 1000", "pulses is expected"),
         ("format = 1\n[train]\nrate = '1 kHz'\ncolour = 1", "train.colour is not known"),
         ("format = 1\n[times]\nat = ['0 s', '1 ms', '2.5 ms']", "expected multiples"),
@@ -123,6 +131,53 @@ def test_a_sinusoidal_force_is_written_and_read_again(ask: Any) -> None:
 )
 def test_a_drive_that_a_page_cannot_set_is_refused(ask: Any, text: str, reason: str) -> None:
     assert reason in ask("drive", text)["refused"]
+
+
+parts = st.sampled_from(
+    [
+        *"0123,.-+*/^()e_",
+        " ",
+        "1 ",
+        "25",
+        "1e3",
+        " N",
+        "N",
+        "mN",
+        " m",
+        "/m",
+        "m",
+        "s",
+        "us",
+        "^2",
+        "^0.5",
+        "·",
+    ]
+)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=300)
+@given(
+    parts=st.lists(parts, min_size=1, max_size=7), si=st.sampled_from(["N", "m", "N/m", "1", "s", "N s/m"])
+)
+@example(parts=["1,500 N"], si="N")
+@example(parts=["2*3 N"], si="N")
+@example(parts=["2^3 N"], si="N")
+@example(parts=["11/s s m"], si="m")
+@example(parts=["3 N/mm s"], si="N s/m")
+@example(parts=["3 N·ms/m"], si="N s/m")
+@example(parts=["2 1/m N"], si="N/m")
+def test_a_quantity_that_is_read_is_read_as_python_reads_it(ask: Any, parts: list[str], si: str) -> None:
+    text = "".join(parts)
+    answer = ask("quantity", text, si)
+    if "found" in answer:
+        assert answer["found"] == pytest.approx(parse(text, si), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "text", ["3 N/mm s", "3.0N*s/mm", " +3e0 N ·s/mm ", "3 1/mm N s", "3 N^(1/2) s N^0.5/mm"]
+)
+def test_units_are_written_as_in_python(ask: Any, text: str) -> None:
+    assert ask("quantity", text, "N s/m")["found"] == pytest.approx(parse(text, "N s/m"))
 
 
 @pytest.mark.parametrize("written", WRITTEN.values(), ids=list(WRITTEN))

@@ -1,6 +1,7 @@
 """The page as a file: the state with which it opens, the folder that keeps it, its parts, the widget."""
 
 import json
+import os
 import random
 import re
 import shutil
@@ -29,6 +30,9 @@ def state_file(folder: Path, **state: Any) -> str:
 def test_a_page_begins_with_a_file_or_the_text_of_an_address(tmp_path: Path) -> None:
     assert launch.read_start("rate=900&pulses=3") == ("rate=900&pulses=3", None)
     assert launch.read_start("file:///a/page.html#rate=900") == ("rate=900", None)
+    # A name of a file has at most 255 bytes, a link with pins has more.
+    long = f"rate=900&line={'H' * 5000}"
+    assert launch.read_start(long) == (long, None)
     assert launch.read_start(state_file(tmp_path, rate=777.0, hammer="tung-shaw-1988")) == (
         {"rate": 777.0, "hammer": "tung-shaw-1988"},
         None,
@@ -99,10 +103,16 @@ def test_pages_are_kept_under_their_content_and_the_oldest_go(
     first = launch.keep_page("a")
     assert launch.keep_page("a") == first
     assert first.read_text("utf-8") == "a"
-    others = {launch.keep_page(f"page {k}") for k in range(20)}
-    left = set(first.parent.iterdir())
-    assert len(others) == 20
-    assert len(left) == 8
+    pages = [launch.keep_page(f"page {k}") for k in range(7)]
+    for age, page in enumerate([first, *pages]):
+        os.utime(page, (1e9 - age, 1e9 - age))
+    # A page that another program removes while the ages are read has no age.
+    gone = first.parent / "studio-gone.html"
+    gone.symlink_to("removed")
+    assert launch.keep_page("page 6") == pages[-1]
+    latest = launch.keep_page("page 7")
+    # The oldest is left out, not one that has just been opened again.
+    assert set(first.parent.iterdir()) == {first, *pages, latest, gone} - {pages[-2]}
 
 
 @pytest.mark.parametrize("last", ["engine/page.js", "engine/worker.js"])

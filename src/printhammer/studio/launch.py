@@ -39,9 +39,10 @@ def read_start(written: str) -> tuple[dict[str, Any] | str, Hammer | None]:
     InputError
         The file is not a state file, or its hammer is invalid.
     """
-    path = Path(written)
-    if "=" in written and not path.is_file():
+    # The text of an address may be longer than any path, for which `Path.is_file` raises an error.
+    if "=" in written and not os.path.isfile(written):
         return written.rpartition("#")[2], None
+    path = Path(written)
     text = read_text(path, "the state")
     if len(text) > LARGEST_MESSAGE:
         raise InputError(
@@ -113,12 +114,13 @@ def keep_page(html: str) -> Path:
     """
     folder = make_folder(_cache())
     path = folder / f"studio-{hashlib.sha256(html.encode()).hexdigest()[:16]}.html"
-    if path.exists():
-        path.touch()
-    else:
-        write_file(path, html)
-    pages = sorted(folder.glob("studio-*.html"), key=lambda page: page.stat().st_mtime, reverse=True)
-    for old in pages[_KEPT:]:
+    write_file(path, html)
+    ages = {}
+    for page in folder.glob("studio-*.html"):
+        # Another program may remove the page meanwhile.
+        with suppress(OSError):
+            ages[page] = page.stat().st_mtime
+    for old in sorted(ages, key=lambda page: ages[page], reverse=True)[_KEPT:]:
         with suppress(OSError):
             old.unlink()
     return path

@@ -9,6 +9,12 @@ const SINE = ["amplitude", "frequency", "phase"];
 const OTHER = ["burst", "sequence"]; // kinds of a drive that a state does not hold
 const CLOSE = 1e-9; // of a slot, within which a firing lies on it
 const DECAYS = ["diode", "zener", "rail"];
+// One number and one unit, as in printhammer/units.py: without the arithmetic that may be typed in the page.
+const AMOUNT = String.raw`[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?`;
+const FACTOR = String.raw`(?:[A-Za-z\u00b5\u03bc%\u00b0]+|1)(?:\s*\^\s*(?:[-+]?\d{1,2}(?:\.\d{1,4})?|\(\s*[-+]?\d{1,2}(?:\/[1-9]\d?)?\s*\)))?`;
+const QUANTITY = new RegExp(String.raw`^\s*(${AMOUNT})(?![\d.])\s*(${FACTOR}(?:(?:\s*[*/]\s*|\s+)${FACTOR})*)?\s*$`);
+const ANGLE = new RegExp(String.raw`^\s*(${AMOUNT})\s*(rad|deg|\u00b0)\s*$`);
+const LONGEST_QUANTITY = 200; // characters of a quantity
 
 const float = (number) => {
   const text = String(number + 0);
@@ -58,14 +64,14 @@ export function quantityOf(content, units, where) {
   const plain = units[0] === "1" && ["number", "bigint"].includes(typeof content);
   if (plain) text = String(content);
   if (typeof text !== "string") throw new Refusal(`${where} has no unit: expected a text such as '1 ${units[0]}'`);
-  if (!/^\s*[-+]?(\d|\.\d)/.test(text)) throw new Refusal(`${where} = '${text.slice(0, 40)}': expected a number with a unit, such as '1 ${units[0]}'`);
-  // A number with its unit, without the arithmetic that may be typed in the page.
-  if (/[-+]?[\d.]+([eE][-+]?\d+)?\s*[-+]/.test(text)) throw new Refusal(`${where} = '${text.slice(0, 40)}': expected one number with a unit`);
+  const [, number, unit = ""] = (text.length <= LONGEST_QUANTITY && QUANTITY.exec(text.replace(/[\u00b7\u22c5]/g, "*"))) || [];
+  if (number === undefined) throw new Refusal(`${where} = '${text.slice(0, 40)}': expected one number with a decimal point and a unit, such as '1 ${units[0]}'`);
+  // A slash divides by the next factor only.
+  const written = `${number}${unit.startsWith("1") ? "*" : " "}${unit.replace(/(?<![*/^(\s])\s+(?![*/^)\s])/g, "*")}`;
   let why = "";
   for (const si of units) {
-    const read = readQuantity(text, si, { factor: 1, name: si });
-    const bare = /^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*$/.test(text);
-    if (read.problem === undefined && (si === "1" || !bare)) return [read.value, si];
+    const read = readQuantity(written, si, { factor: 1, name: si });
+    if (read.problem === undefined && (si === "1" || /[^\d\s*/^().]/.test(unit))) return [read.value, si];
     why = read.problem ?? "it has no unit";
   }
   throw new Refusal(`${where} = '${text.slice(0, 40)}': ${why}, expected a quantity in ${units.join(" or ")}`);
@@ -85,7 +91,7 @@ const onlyOf = (table, keys, where) => {
 /** An angle of a file, rad. */
 function angleOf(content) {
   const text = isTable(content) ? `${content.value} ${content.unit}` : String(content);
-  const found = /^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(rad|deg|°)\s*$/.exec(text);
+  const found = ANGLE.exec(text.slice(0, LONGEST_QUANTITY));
   if (!found) throw new Refusal(`sine.phase = '${text.slice(0, 40)}': expected an angle in rad or deg`);
   return Number(found[1]) * (found[2] === "rad" ? 1 : Math.PI / 180);
 }
