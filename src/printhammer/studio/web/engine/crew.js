@@ -21,14 +21,16 @@ export function crewOf(script, shelf) {
       order.done(data.frames === null ? null : data);
       next();
     };
-    worker.onerror = (event) => {
-      const { order } = own;
-      own.order = null;
-      order?.done({ reason: `this could not be computed, ${event.message}` });
-      next();
-    };
+    worker.onerror = (event) => fail(own, event.message);
     return own;
   };
+  /** End the order of a worker that cannot compute it. */
+  function fail(own, error) {
+    const { order } = own;
+    own.order = null;
+    order?.done({ reason: `this could not be computed, ${error}` });
+    next();
+  }
   // Curves have a worker of their own: a map never delays them.
   const teams = { curves: { workers: [start()], orders: [] }, map: { workers: Array.from({ length: count }, start), orders: [] } };
 
@@ -36,12 +38,16 @@ export function crewOf(script, shelf) {
     own.order = order;
     const { name, quantity } = order;
     const { kernel } = order.message;
-    if (!own.known.has(kernel)) {
-      const module = await shelf.module(name, quantity);
-      own.worker.postMessage({ kernel, module, hammer: shelf.driven(name, quantity) });
-      own.known.add(kernel);
+    try {
+      if (!own.known.has(kernel)) {
+        const module = await shelf.module(name, quantity);
+        own.worker.postMessage({ kernel, module, hammer: shelf.driven(name, quantity) });
+        own.known.add(kernel);
+      }
+      own.worker.postMessage(order.message);
+    } catch (error) {
+      fail(own, error);
     }
-    own.worker.postMessage(order.message);
   }
   function next() {
     for (const { workers, orders } of Object.values(teams)) {

@@ -1,4 +1,4 @@
-// A worker: it has the kernels of the hammers it was sent, and answers one order after the other.
+// A worker: it has the modules of the hammers it was sent, and answers one order after the other.
 import { Kernel } from "./call.js";
 import { line } from "./line.js";
 import { codes, piece } from "./many.js";
@@ -6,8 +6,19 @@ import { curves } from "./pictures.js";
 import { Refusal } from "./read.js";
 import { section } from "./strobe.js";
 
-const kernels = new Map();
+const KEPT = 4; // kernels, each of which has a memory: a browser grants some hundred to all workers together
+const devices = new Map(); // hammers with their modules
+const kernels = new Map(); // by the index of the module, which hammers of the same laws share; the one used last comes last
 let limits = {};
+
+/** The kernel of a module; of several, those used last are kept. */
+function kernelOf(module, index) {
+  const kernel = kernels.get(index) ?? new Kernel(module);
+  kernels.delete(index);
+  kernels.set(index, kernel);
+  if (kernels.size > KEPT) kernels.delete(kernels.keys().next().value);
+  return kernel;
+}
 
 const WORKS = {
   curves: (kernel, hammer, { state }) => curves(kernel, hammer, state, limits),
@@ -40,13 +51,14 @@ async function inSteps(steps, number) {
 onmessage = async ({ data }) => {
   if (data.limits) { limits = data.limits; return; }
   if (data.module) {
-    kernels.set(data.kernel, { kernel: new Kernel(data.module), hammer: data.hammer });
+    devices.set(data.kernel, data);
     return;
   }
   if (data.drop) { dropped = data.drop; return; }
   const { number } = data;
-  const { kernel, hammer } = kernels.get(data.kernel);
   try {
+    const { module, hammer } = devices.get(data.kernel);
+    const kernel = kernelOf(module, hammer.modules[hammer.quantity]);
     const work = WORKS[data.work](kernel, hammer, data);
     const frames = Array.isArray(work) ? work : await inSteps(work, number);
     post({ number, frames }, frames ?? []);
