@@ -178,3 +178,18 @@ def test_two_controls_that_move_a_constant_leave_it_in_its_range(modules: Path) 
         assert 2.0 <= found.get("platen", 4.0) <= 5.0
         assert 1.0 <= found["pack.front"] <= 2.5
         assert 1.0 <= found.get("pack.thickness", 2.0) <= 3.0
+
+
+LINK = """
+const { fromText, toText, START } = await import("./state.js");
+const [state, start] = %s;
+console.log(JSON.stringify(fromText(toText({ ...START, ...state }, start))));
+"""
+
+
+def test_a_link_states_every_entry_that_the_hammer_would_set(modules: Path) -> None:
+    """Entries equal to the start of a page, of a hammer that opens with others."""
+    start = {"rate": 20.0, "pulses": 3, "low": 10.0, "line": ""}
+    command = ["node", "--input-type=module", "--eval", LINK % json.dumps([{"rate": 1200}, start])]
+    answer = subprocess.run(command, cwd=modules, capture_output=True, text=True, check=True)
+    assert json.loads(answer.stdout) == {"rate": 1200, "pulses": 9, "low": 500, "line": "HAMMER"}

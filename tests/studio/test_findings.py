@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterator
 from typing import Any
+from urllib.parse import quote
 
 import pytest
 from tests.studio.browser import Page
@@ -140,6 +141,45 @@ def test_pins_of_a_hostile_link_harm_nothing(address: str, opened_browser: Any, 
     assert page.run("window.studio.studio.ghosts.length") == 0
     assert page.complaints == []
     page.call("Page.close")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("state", "reason"),
+    [
+        ({}, ""),
+        ({"hammer": "mine"}, "expected one of"),
+        ({"constants": None, "pattern": 3}, "constants is expected"),
+    ],
+)
+def test_a_pin_of_a_link_is_opened_as_far_as_it_is_a_state(
+    address: str, opened_browser: Any, state: dict[str, Any], reason: str
+) -> None:
+    """A pin without a hammer, of a hammer that the page lacks, and with entries that are none."""
+    page = opened_browser()
+    page.open(
+        f"{address}#rate=900&pins={quote(json.dumps([{'name': 'a', 'state': {'rate': 700, **state}}]))}"
+    )
+    page.wait("!!document.querySelector('.chip button')")
+    page.wait("window.studio.studio.frames.motion && !window.studio.studio.busy")
+    page.run("setTimeout(() => document.querySelector('.chip button').click(), 0); 1")
+    page.wait("window.studio.studio.frames.motion.fired[1] === 1 / 700")
+    assert reason in page.run("document.querySelector('.status').textContent")
+    assert page.run(f"{STATE}.hammer") == page.run("window.studio.studio.offered[0]")
+    assert page.run(f"{STATE}.pins.length") == 1
+    page.run("window.studio.studio.store.set({ rate: 1300 })")
+    page.wait("window.studio.studio.frames.motion.fired[1] === 1 / 1300")
+    assert page.complaints == []
+    page.call("Page.close")
+
+
+@pytest.mark.slow
+def test_curves_are_marked_while_a_hammer_is_set_that_the_page_lacks(opened: Page) -> None:
+    marked = "document.querySelector('.view-motion').classList.contains('outdated')"
+    opened.run("window.studio.studio.store.set({ hammer: 'mine' })")
+    opened.wait(marked)
+    opened.run("document.querySelector('.undo').click()")
+    opened.wait(f"!{marked}")
 
 
 @pytest.mark.slow

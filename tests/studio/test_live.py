@@ -153,6 +153,38 @@ def test_a_hostile_link_does_no_harm(address: str, opened_browser: Any, link: st
 
 
 @pytest.mark.slow
+def test_what_a_link_sets_is_kept_where_the_hammer_opens_with_another_value(
+    address: str, opened_browser: Any
+) -> None:
+    page = opened_browser()
+    page.open(f"{address}#hammer=bouncing-ball&rate=1200&low=500")
+    page.wait("window.studio?.studio?.frames.motion")
+    state = page.run("window.studio.studio.store.state")
+    assert (state["rate"], state["low"], state["high"]) == (1200, 500, 100)
+    assert state["waveform"] == page.run("window.studio.studio.described.start.waveform")
+    assert page.complaints == []
+    page.call("Page.close")
+
+
+@pytest.mark.slow
+def test_a_link_that_cannot_be_read_is_refused_with_its_reason(address: str, opened_browser: Any) -> None:
+    page = opened_browser()
+    page.open(address)
+    page.wait("window.studio?.studio?.frames.motion && !window.studio.studio.busy")
+    page.run(
+        "const { studio: s } = window.studio; const { ask } = s;"
+        " const no = { kind: 'refusal', reason: 'no such link' };"
+        " s.ask = (kind, content) => (kind === 'open' ? Promise.resolve(no) : ask(kind, content)); 1"
+    )
+    page.run("location.hash = 'rate=800'; 1")
+    page.wait("document.querySelector('.status').textContent === 'no such link'")
+    page.run("window.studio.open('x'.repeat(800001)); 1")
+    page.wait("document.querySelector('.status').textContent.includes('800001 characters')")
+    assert page.complaints == []
+    page.call("Page.close")
+
+
+@pytest.mark.slow
 def test_a_notebook_shows_the_page_and_follows_its_state(address: str, opened_browser: Any) -> None:
     page = opened_browser()
     page.open("about:blank")

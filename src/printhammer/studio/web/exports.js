@@ -1,6 +1,5 @@
 // What leaves the studio: files to keep, texts to copy.
 import { SvgPen } from "./pen.js";
-import { toText } from "./state.js";
 import { colours, FONT } from "./theme.js";
 
 export function save(name, content, type) {
@@ -57,6 +56,6 @@ export async function pngOf(view, width, height, origin) {
 /** Save the page with what is set in it. */
 export async function savePage(studio) {
   const { html } = await studio.ask("page", {});
-  const start = JSON.stringify({ text: toText(studio.store.state) }).replaceAll("<", "\\u003c");
+  const start = JSON.stringify({ text: studio.link() }).replaceAll("<", "\\u003c");
   save("studio-page.html", html.replace(/(<script[^>]* id="start">)[^<]*/, (_all, head) => head + start), "text/html");
 }

@@ -126,14 +126,24 @@ export function mount(element, send, address = { read: () => "", write: () => {}
   studio.units = (system) => { setSystem(system); follow(); redrawAll(); };
   studio.theme = () => { readColours(element.querySelector(".studio")); redrawAll(); follow(); };
 
-  /** Describe the hammer of a state anew, then take the state: as a step of the history, or as it is there already. */
-  async function load(state, step = true, fresh = false) {
+  /**
+   * Describe the hammer of a state anew, then take the state: as a step of the history, or as it is there already.
+   * What the hammer sets on opening takes the place of entries other than `told`.
+   */
+  async function load(state, { step = true, told = [] } = {}) {
     const frame = await studio.ask("hammer", { name: state.text ? "" : state.hammer, text: state.text });
-    if (frame.kind === "refusal") { studio.say(frame.reason, true); return; }
+    if (frame.kind === "refusal") {
+      studio.say(frame.reason, true);
+      if (step) return;
+      // The state is there already, the curves are those of another one; the next state is sent even where it is the one before.
+      marks.none(`not computed: ${frame.reason}`, studio.serial);
+      before = null;
+      return;
+    }
     Object.assign(studio, { described: frame.hammer, offered: frame.offered, limits: frame.limits, shapes: frame.shapes, drivers: frame.drivers, decays: frame.decays, unitTable: frame.units, version: frame.version });
     setUnits(frame.units);
-    // A hammer without a pulse opens with one that shows it; what a link sets stays.
-    const start = state.waveform ? {} : Object.fromEntries(Object.entries(frame.hammer.start).filter(([key]) => fresh || state[key] === START[key]));
+    // A hammer without a pulse opens with one that shows it.
+    const start = state.waveform ? {} : Object.fromEntries(Object.entries(frame.hammer.start).filter(([key]) => state[key] === null || !told.includes(key)));
     if (state.text) dropped.set(state.text, frame.hammer.name);
     studio.parts.hammers.replaceChildren(
       ...frame.offered.map((name) => make("option", { value: name }, name)),
@@ -156,19 +166,29 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     const text = name.startsWith(DROPPED) ? [...dropped.keys()][Number(name.slice(DROPPED.length))] : "";
     const { state } = studio.store;
     const before = Object.fromEntries(Object.keys(studio.described?.start ?? {}).map((key) => [key, START[key]]));
-    return load({ ...state, ...before, hammer: text ? "" : name, text, constants: {}, waveform: null }, true, true);
+    return load({ ...state, ...before, hammer: text ? "" : name, text, constants: {}, waveform: null });
   };
   /** Take a state from outside as far as it can be taken, and tell what cannot. */
   async function take({ state, notes }) {
-    await load({ ...START, ...state });
+    await load({ ...START, ...state }, { told: Object.keys(state) });
     if (notes.length) studio.say(notes.join("; "), true);
     studio.notes = notes.join("; ");
   }
+  /** The state as text of a link. */
+  studio.link = () => toText(studio.store.state, studio.described?.start);
   studio.open = async (text) => {
-    if (begun && text === toText(studio.store.state)) return;
-    if (text.length > LONGEST) { studio.say(`the link has ${text.length} characters, expected at most ${LONGEST}`, true); text = ""; }
-    const frame = await studio.ask("open", { state: fromText(text) });
-    await take({ ...frame, state: { ...frame.state, pins: pinsOf(text) } });
+    if (begun && text === studio.link()) return;
+    const notes = text.length > LONGEST ? [`the link has ${text.length} characters, expected at most ${LONGEST}`] : [];
+    const read = notes.length ? "" : text;
+    const frame = await studio.ask("open", { state: fromText(read) });
+    if (frame.kind === "refusal") { await take({ state: {}, notes: [...notes, frame.reason] }); return; }
+    await take({ state: { ...frame.state, pins: pinsOf(read) }, notes: [...notes, ...frame.notes] });
+  };
+  /** Take the state of a pin up again, in the views that are shown; a pin of a link may hold anything. */
+  studio.resume = async (state) => {
+    const frame = await studio.ask("open", { state });
+    if (frame.kind === "refusal") studio.say(frame.reason, true);
+    else await take({ state: { ...frame.state, views: studio.store.state.views }, notes: frame.notes });
   };
   studio.preset = (patch) => studio.store.set(patch);
 
@@ -187,8 +207,11 @@ export function mount(element, send, address = { read: () => "", write: () => {}
       frame = await ask(columns);
     }
     if (frame.kind === "refusal") studio.say(frame.reason, true);
-    else if (frame.what === "state") take(frame);
-    else if (frame.what === "hammer") load({ ...studio.store.state, hammer: "", text: frame.text, constants: {}, waveform: null });
+    else if (frame.what === "state") await take(frame);
+    else if (frame.what === "hammer") {
+      const state = { ...studio.store.state, hammer: "", text: frame.text, constants: {}, waveform: null };
+      await load(state, { told: Object.keys(state).filter((key) => state[key] !== START[key]) });
+    }
     else if (frame.what === "drive") { studio.store.set(frame.patch); studio.say(`the drive is that of ${frame.name}`); }
     else if (frame.what === "curves") lay(frame);
   };
@@ -222,8 +245,8 @@ export function mount(element, send, address = { read: () => "", write: () => {}
   });
 
   studio.store.listeners.add((state) => {
-    const wanted = state.text || state.hammer;
-    if (wanted !== studio.loaded) { load(state, false); return; }
+    const wanted = state.text || state.hammer || studio.offered[0];
+    if (wanted !== studio.loaded) { load(state, { step: false }); return; }
     // Pins and the trace are the page's own.
     const same = Boolean(before) && Object.keys(state).every((key) => key === "pins" || key === "trace" || state[key] === before[key]);
     before = state;
@@ -236,7 +259,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     for (const view of shownViews()) view.update("state");
     studio.layout.show(state.views);
     clearTimeout(writing);
-    writing = setTimeout(() => address.write(toText(studio.store.state)), 150);
+    writing = setTimeout(() => address.write(studio.link()), 150);
   });
 
   studio.parts = layout(studio, MAKERS);

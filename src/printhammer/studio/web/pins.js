@@ -79,7 +79,7 @@ export function pinRow(studio) {
       const change = (patch) => studio.store.amend({ pins: patch ? pins.map((each) => (each === pin ? { ...pin, ...patch } : each)) : pins.filter((each) => each !== pin) });
       name.addEventListener("change", () => { if (name.value.trim()) change({ name: name.value.trim() }); else name.value = pin.name; });
       return make("span", { class: `chip pin-${k + 1}` }, make("i", { "aria-hidden": "true" }), name,
-        make("button", { type: "button", title: `take ${pin.name} up again`, "aria-label": `take ${pin.name} up again`, onclick: () => studio.store.set({ ...pin.state, views: studio.store.state.views }) }, "open"),
+        make("button", { type: "button", title: `take ${pin.name} up again`, "aria-label": `take ${pin.name} up again`, onclick: () => studio.resume(pin.state) }, "open"),
         make("button", { type: "button", title: `take the pin ${pin.name} away`, "aria-label": `take the pin ${pin.name} away`, onclick: () => change(null) }, "×"));
     }));
     const choices = [NOW, ...pins.map((_pin, k) => String(k))];

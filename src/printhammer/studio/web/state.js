@@ -68,10 +68,10 @@ export class Store {
   tell() { for (const listener of this.listeners) listener(this.state); }
 }
 
-/** Return a state as text for an address: what differs from the start. */
-export function toText(state) {
+/** Text of a state for an address: what differs from `START`, and every entry that the hammer would set on opening, `start`. */
+export function toText(state, start = {}) {
   const found = new URLSearchParams();
-  for (const name of [...TEXTS, ...NUMBERS]) if (state[name] !== START[name]) found.set(name, state[name]);
+  for (const name of [...TEXTS, ...NUMBERS]) if (state[name] !== START[name] || name in start) found.set(name, state[name]);
   for (const [key, value] of Object.entries(state.constants)) found.set(key, value);
   if (state.waveform) found.set("waveform", JSON.stringify(state.waveform));
   if (state.pins?.length) found.set("pins", JSON.stringify(state.pins.map(({ name, state: pinned }) => ({ name, state: Object.fromEntries(Object.entries(pinned).filter(([key, value]) => JSON.stringify(value) !== JSON.stringify(START[key]))) }))));
