@@ -31,7 +31,7 @@ from printhammer.control.feedback.controller import Controller
 from printhammer.control.feedback.plant import driver_of
 from printhammer.control.learning.law import PRINTED, LearningLaw, order_loops
 from printhammer.control.learning.learn import calibrate
-from printhammer.control.learning.lines import LINE, printed
+from printhammer.control.learning.lines import printed
 from printhammer.control.learning.preparation import law_for
 from printhammer.control.learning.production import OFFSET
 from printhammer.control.learning.sensor import ImpactSensor
@@ -67,7 +67,6 @@ SHOWN = 2
 FAMILY = ("02", "06")
 """Numbers of two hammers of the family."""
 AFTER = (50, 200, 1000)
-"""Numbers of dots after which units are counted; the line in the other open loop, printed once, is not."""
 FEEDBACK = 10
 """Largest number of units on which feedback prints beside other drives, a shorter cycle."""
 ROOMS = (
@@ -110,13 +109,12 @@ def learned(
     press = law.production.press([with_pulse(unit, law.entries.task.pulse) for unit in units])
     loops = printed(order_loops(press, law.entries), law.entries.task)
     plain = np.max([good.mean(axis=1) for good in loops], axis=0)
-    other = len(LINE) * (len(law.entries.loops) - 1)
     stages, lost = {}, np.zeros(len(units), bool)
     for stage in calibrate(law, units, sensor)[1]:
         good = stage.good.mean(axis=1)
         if stage.dots:
             lost = lost | (good < plain - 1e-12)
-        stages[max(stage.dots - other, 0)] = good, lost
+        stages[stage.dots] = good, lost
     return stages
 
 

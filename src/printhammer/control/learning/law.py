@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from printhammer.control.learning.belief import Belief
-from printhammer.control.learning.lines import LINE, LineDrive, Rung, Surrogate
+from printhammer.control.learning.lines import LINE, Rung, Surrogate
 from printhammer.control.learning.production import Production
 from printhammer.control.table.drive import (
     COLUMNS,
@@ -70,6 +70,13 @@ _LEAST_BRAKE: Final = 0.05  # Smallest width of a brake pulse, as a fraction of 
 ADVANCE, WIDTH, DELAY, BRAKE = range(4)
 
 
+class OpenLoop(NamedTuple):
+    """Open-loop drive, the same pulse at every slot: its table settings, shape (4, entries), and waveform."""
+
+    settings: FloatArray
+    pulse: Waveform
+
+
 @dataclass(frozen=True)
 class Adjustable:
     """Table entries that are learned: advance and width of print pulses, and width of brake pulses.
@@ -82,7 +89,7 @@ class Adjustable:
     task: Task
     rate: float
     base: FloatArray
-    own: LineDrive | None = None
+    own: OpenLoop | None = None
     """Open loop with the hammer's own pulse; None if the task uses that pulse or the pulse has no width."""
 
     @cached_property
@@ -101,9 +108,9 @@ class Adjustable:
         return settings
 
     @property
-    def loops(self) -> list[LineDrive]:
+    def loops(self) -> list[OpenLoop]:
         """Open-loop drives to compare a table with: the task's pulse and, if any, the hammer's own pulse."""
-        plain = LineDrive(self.open_loop, self.task.pulse)
+        plain = OpenLoop(self.open_loop, self.task.pulse)
         return [plain] if self.own is None else [plain, self.own]
 
     def limited(self, before: FloatArray, change: FloatArray) -> FloatArray:
@@ -165,9 +172,6 @@ _SLOW: Final = 0.85  # The iteration stops if the objective exceeds this fractio
 _LEAST_LAW: Final = 1e-2  # Lower bound of the fraction a of the model error that is corrected
 _OTHERS: Final = 4  # Number of posterior samples on which the convergence condition is checked
 _ALIKE: Final = 24  # Number of posterior samples on which table and open loops are compared
-# Largest fraction of posterior samples that print fewer dots in the open loop that is chosen for a unit; from
-# 8 units with offsets up to 50 us: the mean alone chooses the worse loop of 3 of them, a fraction of 0.5 of 1
-_UNSURE: Final = 0.25
 _GAIN: Final = 0.02  # Smallest mean gain of a table, as a fraction of the dots, with which it is used
 TRIED: Final = slots_of(cycle_with_lead_in(6, 0))
 """Slots of the line that evaluates corrections by simulation: the de Bruijn cycle of order 6."""
@@ -196,7 +200,7 @@ class Verdict(NamedTuple):
     """Outcome of comparing a compensation table with open-loop drive on hammers drawn from the posterior."""
 
     gains: bool  # Whether the table is better than both open-loop drives
-    loop: LineDrive  # Open-loop drive to use if the table is not better
+    loop: OpenLoop  # Open-loop drive to use if the table is not better
     multiplier: float  # Largest absolute multiplier of rows printed with the table; NaN if no row is periodic
     expected: float  # Mean fraction of dots within limits, with the drive that is used
     certainty: float  # Fraction of the samples that print every dot within limits with the drive that is used
@@ -230,11 +234,11 @@ class LearningLaw:
     doubt: float
     seed: int
     rungs: tuple[Rung, ...]
-    # Surrogates of the readings of the first stage, ladder and lines, times before forces
+    # Surrogates of the readings of the ladder and of a line in open loop, times before forces
     shown: tuple[Surrogate, ...]
     rows: FloatArray  # Constants of simulated hammers, (members, size): starting points of searches
     seen: FloatArray  # Readings of the simulated hammers, (members, readings)
-    first: LineDrive  # Open-loop drive with the larger mean fraction of good dots over the production
+    first: OpenLoop  # Open-loop drive with the larger mean fraction of good dots over the production
 
     def update(self, belief: Belief, corrections: FloatArray, unexplained: FloatArray) -> Printing[Update]:
         """Compute the corrections after a stage; yield the test lines that simulated hammers have to print.
@@ -369,9 +373,10 @@ class LearningLaw:
         growth = press.multipliers(settings)
         steady = bool(np.quantile(np.nan_to_num(growth), 1.0 - self.doubt) <= 1.0)
         gains = steady and self._leads(table.mean(axis=1), shares)
+        # The open-loop drive that is better over the production, unless the other leads on the posterior.
         loops = self.entries.loops
-        usual = next(k for k, loop in enumerate(loops) if loop.pulse is self.first.pulse)
-        chosen = better_loop(shares, usual)
+        chosen = next(k for k, loop in enumerate(loops) if loop.pulse is self.first.pulse)
+        chosen = next((k for k in range(len(loops)) if self._leads(shares[k], shares[[chosen]])), chosen)
         good = table if gains else others[chosen]
         every = float(good.all(axis=1).mean())
         return Verdict(gains, loops[chosen], float(np.fmax.reduce(growth)), float(good.mean()), every)
@@ -380,24 +385,6 @@ class LearningLaw:
         """Whether a drive gains `_GAIN` on average, and loses on at most a fraction `doubt` of hammers."""
         harmless = np.quantile(share - others.max(axis=0), self.doubt) >= 0.0
         return bool(harmless and share.mean() - others.mean(axis=1).max() >= _GAIN)
-
-
-def better_loop(shares: FloatArray, usual: int) -> int:
-    """Choose the open loop for a unit, by the posterior of its readings in all open loops.
-
-    The open loop that is better over the production is left only for one with a larger mean fraction of good
-    dots, in which at most the fraction `_UNSURE` of the posterior samples print fewer dots.
-
-    Parameters
-    ----------
-    shares
-        Fraction of good dots in each open loop, for each posterior sample, shape (loops, samples).
-    usual
-        Index of the open loop that is better over the production.
-    """
-    gains = shares - shares[usual]
-    sure = (gains.mean(axis=1) > 0.0) & ((gains < 0.0).mean(axis=1) <= _UNSURE)
-    return int(np.argmax(np.where(sure, gains.mean(axis=1), -np.inf))) if sure.any() else usual
 
 
 def order_loops(press: Press, entries: Adjustable) -> Printing[list[BoolArray]]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from printhammer.control.learning.law import JUDGED, PRINTED, RUNS, LearningLaw
 from printhammer.control.learning.learner import Learner
-from printhammer.control.learning.lines import LINE, Press, printed
+from printhammer.control.learning.lines import DOTS, LINE, Press, printed
 from printhammer.control.learning.preparation import DOUBT, FORGETTING, MEMBERS, law_for
 from printhammer.control.learning.sensor import ImpactSensor
 from printhammer.control.pulses import LARGEST_CURRENT
@@ -72,7 +72,7 @@ def calibrate(
     flights, forces = press.ladder(law.rungs)
     learners = [Learner(law) for _ in units]
     single = task.single.nominal
-    taken, count, history = 0, 0, []
+    run, history = 0, []
 
     def record(line: Judgement) -> None:
         settings, pulses = ([getattr(each, name) for each in learners] for name in ("printed", "pulse"))
@@ -81,28 +81,20 @@ def calibrate(
             (each.learned, each.misfit, *(getattr(each.verdict, name) for name in _SAID)) for each in learners
         ]
         learned, *others = (np.array(values) for values in zip(*said, strict=True))
-        history.append(Progress(count, cycle, line, learned, *others))
+        history.append(Progress(run * (DOTS + len(LINE)), cycle, line, learned, *others))
 
     for number, runs in enumerate(RUNS):
-        lines = [
-            press.line([each.settings for each in own], LINE, [each.pulse for each in own])
-            for own in zip(*(learner.lines for learner in learners), strict=True)
-        ]
-        shown = [(flights, forces)]
-        shown += [(dots.flight_time, dots.peak_force / single.force) for dots, _judgement in lines]
-        judgement = lines[0][1]
+        dots, judgement = press.line([learner.settings for learner in learners])
         if not number:
             record(judgement)
         for _ in range(runs):
             for unit, learner in enumerate(learners):
-                learner.see(
-                    *(
-                        sensor.read(times[unit], peaks[unit], unit, taken + k)
-                        for k, (times, peaks) in enumerate(shown)
-                    )
+                rungs = sensor.read(flights[unit], forces[unit], unit, 2 * run)
+                line = sensor.read(
+                    dots.flight_time[unit], dots.peak_force[unit] / single.force, unit, 2 * run + 1
                 )
-            taken += len(shown)
-            count += sum(times.shape[1] for times, _peaks in shown)
+                learner.see(rungs, line)
+            run += 1
         printed(together([learner.learn() for learner in learners]), task)
         record(judgement)
         report()
@@ -295,11 +287,10 @@ def learn(
     by maximum a posteriori estimation with a Laplace approximation. The prior standard deviation of the
     offset is the `offset` of the sensor, or 25 us if the sensor has none; that of the gain is 1 %. Iterative
     learning control then corrects advance, width and brakes of a table that was tuned for the nominal hammer
-    and the variability of the production. The first run prints a line in every open loop. The table is used
-    only if the posterior explains the readings, and if no posterior sample prints fewer dots of the test
-    cycle and of rows of 200 slots with the table than in open loop, or a row in which errors grow from dot to
-    dot. Otherwise the better of two open-loop drives is used: the pulse of the driver, or the hammer's own
-    pulse.
+    and the variability of the production. The first line is printed in open loop. The table is used only if
+    the posterior explains the readings, and if no posterior sample prints fewer dots of the test cycle and of
+    rows of 200 slots with the table than in open loop, or a row in which errors grow from dot to dot.
+    Otherwise the better of two open-loop drives is used: the pulse of the driver, or the hammer's own pulse.
 
     Parameters
     ----------

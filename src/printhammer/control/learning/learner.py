@@ -9,7 +9,7 @@ import numpy as np
 
 from printhammer.control.learning.belief import Belief, Evidence, believe
 from printhammer.control.learning.law import BAD, RUNS, LearningLaw, Verdict
-from printhammer.control.learning.lines import DOTS, LINE, LineDrive
+from printhammer.control.learning.lines import LINE
 from printhammer.control.learning.sensor import Readings
 from printhammer.support.arrays import FloatArray
 from printhammer.support.threads import translated
@@ -65,8 +65,8 @@ class Learner:
         self.verdict = _unknown(law)
         self._started = 0
         self._ladders: list[FloatArray] = []
-        self._lines: list[list[FloatArray]] = []
-        self._first: list[Mean] = []
+        self._line: list[FloatArray] = []
+        self._first: Mean | None = None
 
     @property
     def finished(self) -> bool:
@@ -75,14 +75,9 @@ class Learner:
 
     @property
     def settings(self) -> FloatArray:
-        """Settings of the learned table, shape (4, entries)."""
-        return self.law.entries.settings(self.corrections)
-
-    @property
-    def lines(self) -> list[LineDrive]:
-        """Drives of the test lines of the next run: every open loop in the first stage, then the table."""
+        """Settings of the next test line, shape (4, entries)."""
         entries = self.law.entries
-        return [LineDrive(self.settings, entries.task.pulse)] if self.stage else entries.loops
+        return entries.settings(self.corrections) if self.stage else entries.open_loop
 
     @property
     def learned(self) -> bool:
@@ -104,10 +99,10 @@ class Learner:
         """RMS of the residuals of the readings, in standard deviations; NaN before there are readings."""
         return float("nan") if self.belief is None else self.belief.modes[0].misfit
 
-    def see(self, ladder: Readings, *lines: Readings) -> None:
-        """Store the sensor readings of a run, for the dots of the test pulses and of each of `lines`."""
+    def see(self, ladder: Readings, line: Readings) -> None:
+        """Store the sensor readings of a run, for the dots of the test pulses and of the test line."""
         self._ladders.append(self._normalise(ladder))
-        self._lines.append([self._normalise(line) for line in lines])
+        self._line.append(self._normalise(line))
 
     def _normalise(self, readings: Readings) -> FloatArray:
         """Normalise readings by the limits, shape (measured, dots)."""
@@ -122,17 +117,15 @@ class Learner:
         """Estimate the constants and update the table after a stage; yield the lines to simulate."""
         law = self.law
         noise = law.production.noise[:, None]
-        lines = [mean(each, noise) for each in zip(*self._lines, strict=True)]
-        drives = self.lines
-        if self.stage:
-            lines, drives = [*self._first, *lines], [*law.entries.loops, *drives]
-        else:
-            self._first = lines
-        self.belief = yield from self._believe([mean(self._ladders, noise), *lines], drives)
+        line = mean(self._line, noise)
+        if self._first is None:
+            self._first = line
+        lines = [self._first] if not self.stage else [self._first, line]
+        settings = [law.entries.open_loop, self.settings][: len(lines)]
+        self.belief = yield from self._believe([mean(self._ladders, noise), *lines], settings)
         unexplained = np.zeros((2, len(LINE)))
         if self.stage:
             shown = self.belief.modes[0].predicted.reshape(law.production.measured, -1)[:, -len(LINE) :]
-            line = lines[-1]
             unexplained[: len(shown)] = _model_error(
                 line.value - shown, noise / np.sqrt(np.maximum(line.seen, 1.0))
             )
@@ -152,23 +145,22 @@ class Learner:
             # A posterior that does not explain the readings is no basis for a decision.
             self.verdict = _unknown(law)
         self.contractions.append(update.contraction)
-        self._lines = []
+        self._line = []
         self.stage += 1
 
-    def _believe(self, means: Sequence[Mean], drives: Sequence[LineDrive]) -> Printing[Belief]:
+    def _believe(self, means: Sequence[Mean], settings: Sequence[FloatArray]) -> Printing[Belief]:
         law = self.law
         measured = law.production.measured
         value = np.concatenate([each.value for each in means], axis=1)
         count = np.concatenate([each.seen for each in means], axis=1)
         noise = np.hypot(law.production.noise[:, None] / np.sqrt(np.maximum(count, 1.0)), _FLOOR)
         rough = np.array([each.rest for each in law.shown]).reshape(measured, -1)
-        # A later line has the surrogate residuals of the first line in open loop.
-        first = rough[:, DOTS : DOTS + len(LINE)]
-        rough = np.concatenate([rough, first], axis=1)[:, : value.shape[1]]
+        # A later line has the surrogate residual of the line in open loop.
+        rough = np.concatenate([rough, rough[:, -len(LINE) :]], axis=1)[:, : value.shape[1]]
         evidence = Evidence(value.ravel(), noise.ravel(), rough.ravel())
 
         def predict(asked: list[FloatArray]) -> Printing[list[FloatArray]]:
-            shown = yield from law.production.readings(np.concatenate(asked), law.rungs, drives)
+            shown = yield from law.production.readings(np.concatenate(asked), law.rungs, settings)
             return np.split(shown, np.cumsum([len(rows) for rows in asked])[:-1])
 
         # Searches start at the simulated hammers whose readings are nearest, at the coarsest level.

@@ -203,16 +203,6 @@ LINE: Final = slots_of(cycle_with_lead_in(5, 0))
 """Slots of the test line: the de Bruijn cycle of order 5, in which every history of two gaps occurs."""
 
 
-class LineDrive(NamedTuple):
-    """Drive of a line: table settings, shape (4, entries), and the waveform that the settings refer to.
-
-    The settings of an open loop are the same at every slot.
-    """
-
-    settings: FloatArray
-    pulse: Waveform
-
-
 class Order(NamedTuple):
     """Print job: hammers, a drive for each hammer, and the end time of the simulation, s."""
 

@@ -7,8 +7,8 @@ from typing import Any, Final, SupportsIndex
 
 import numpy as np
 
-from printhammer.control.learning.law import ADVANCE, WIDTH, Adjustable, LearningLaw, order_loops
-from printhammer.control.learning.lines import LINE, LineDrive, Rung, Surrogate, candidates, choose, printed
+from printhammer.control.learning.law import ADVANCE, WIDTH, Adjustable, LearningLaw, OpenLoop, order_loops
+from printhammer.control.learning.lines import Rung, Surrogate, candidates, choose, printed
 from printhammer.control.learning.production import Production
 from printhammer.control.learning.sensor import ImpactSensor
 from printhammer.control.pulses import LARGEST_CURRENT
@@ -99,9 +99,8 @@ def _law(
     press = production.press([hammer for _row, hammer in drawn])
     own = np.array([row for row, _hammer in drawn])
     limits = np.array([task.limits.arrival, task.limits.force])[:, None, None]
-    first = [press.line([loop.settings] * members, LINE, [loop.pulse] * members)[0] for loop in entries.loops]
-    single = task.single.nominal.force
-    lines = np.concatenate([[dots.flight_time, dots.peak_force / single] for dots in first], axis=2) / limits
+    line = press.line([entries.open_loop] * members)[0]
+    lines = np.stack([line.flight_time, line.peak_force / task.single.nominal.force]) / limits
     offered = candidates(task)
     ladders = printed(together([press.order_ladder([rung]) for rung in offered]), task)
     rungs = tuple(
@@ -120,12 +119,11 @@ def _law(
     seen = np.concatenate(list(both), axis=1)
     shown = tuple(Surrogate.of(own, each) for each in seen.T)
     few = production.press([hammer for _row, hammer in drawn[:_FEW]])
-    shares = [good.mean() for good in printed(order_loops(few, entries), task)]
-    loop = entries.loops[int(np.argmax(shares))]
-    return LearningLaw(entries, production, forgetting, doubt, seed, rungs, shown, rows, seen, loop)
+    first = entries.loops[int(np.argmax([good.mean() for good in printed(order_loops(few, entries), task)]))]
+    return LearningLaw(entries, production, forgetting, doubt, seed, rungs, shown, rows, seen, first)
 
 
-def _own_loop(hammer: Hammer, task: Task, base: FloatArray) -> LineDrive | None:
+def _own_loop(hammer: Hammer, task: Task, base: FloatArray) -> OpenLoop | None:
     """Build the open loop of the hammer's own pulse, shifted to the arrival time of the driver's pulse."""
     pulse: Any = hammer.waveform
     if not isinstance(getattr(pulse, "width", None), float):
@@ -134,4 +132,4 @@ def _own_loop(hammer: Hammer, task: Task, base: FloatArray) -> LineDrive | None:
     settings[WIDTH] = pulse.width
     alone = nominal(hammer, tolerance=DISPLAY_TOLERANCE).flight_time
     settings[ADVANCE] = alone - task.single.nominal.flight_time
-    return LineDrive(settings, pulse)
+    return OpenLoop(settings, pulse)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.control.learning.lines import LINE, LineDrive, Press, Rung
+from printhammer.control.learning.lines import LINE, Press, Rung
 from printhammer.control.learning.sensor import ImpactSensor
 from printhammer.control.table.task import Task
 from printhammer.hammer.hammer import Hammer
@@ -86,7 +86,7 @@ class Production:
         return Press(self.task, self.rate, hammers)
 
     def readings(
-        self, rows: FloatArray, rungs: Sequence[Rung], lines: Sequence[LineDrive]
+        self, rows: FloatArray, rungs: Sequence[Rung], lines: Sequence[FloatArray]
     ) -> Printing[FloatArray]:
         """Predict the readings of test pulses and test lines for parameter rows, shape (M, size).
 
@@ -101,11 +101,7 @@ class Production:
             single = self.task.single.nominal
             parts = [press.order_ladder(rungs)] if rungs else []
             parts += [
-                _readings_of(
-                    press.order_line([line.settings] * len(there), LINE, [line.pulse] * len(there)),
-                    single.force,
-                )
-                for line in lines
+                _readings_of(press.order_line([settings] * len(there)), single.force) for settings in lines
             ]
             told = yield from together(parts)
             shown[there] = np.concatenate([np.stack(part, axis=1) for part in told], axis=2)
