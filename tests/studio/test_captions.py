@@ -7,8 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.studio.reading import without_modules
 
+from printhammer.hammer.hammer import load
+from printhammer.studio import Shelf
 from printhammer.studio.bundle import page_files
+from printhammer.studio.live import content_of
 
 
 @pytest.fixture(scope="module")
@@ -193,3 +197,34 @@ def test_a_link_states_every_entry_that_the_hammer_would_set(modules: Path) -> N
     command = ["node", "--input-type=module", "--eval", LINK % json.dumps([{"rate": 1200}, start])]
     answer = subprocess.run(command, cwd=modules, capture_output=True, text=True, check=True)
     assert json.loads(answer.stdout) == {"rate": 1200, "pulses": 9, "low": 500, "line": "HAMMER"}
+
+
+SHAPES = """
+const { isOffered } = await import("./pulses.js");
+const [hammers, { shapes, drivers }] = %s;
+const offered = hammers.map(({ described, modules }) => {
+  const store = { state: { constants: {} } };
+  const coil = described.constants.some(({ section }) => section === "magnet");
+  const studio = { described, shapes, drivers, store, quantity: () => (coil ? "current" : "force") };
+  const { waveform } = described.waveform ? described : described.start;
+  return Object.keys(shapes).filter((shape) => isOffered(studio, shape, waveform));
+});
+console.log(JSON.stringify(offered));
+"""
+
+
+def test_only_pulses_are_offered_whose_kernel_the_page_has(
+    modules: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    without_modules(monkeypatch)
+    names = ("hendriks-1983", "hendriks-1983-1", "braille-embosser", "tung-shaw-1988")
+    content = content_of(Shelf(*map(load, names), only=True))
+    given = [list(content["hammers"].values()), content["vocabulary"]]
+    path = modules / "shapes.js"
+    path.write_text(SHAPES % json.dumps(given), "utf-8")
+    answer = subprocess.run(["node", path], capture_output=True, text=True, check=True)
+    drivers, every = set(content["vocabulary"]["drivers"]), set(content["vocabulary"]["shapes"])
+    first, second, braille, oscillator = map(set, json.loads(answer.stdout))
+    assert first == second == every
+    assert braille == drivers | {"sampled"}
+    assert oscillator == every - drivers

@@ -17,6 +17,7 @@ from tests.studio.reading import without_modules
 from printhammer.hammer.hammer import load
 from printhammer.studio import Shelf, launch, live_page, widget
 from printhammer.studio.bundle import deltas, merged, page_files, sources, style
+from printhammer.studio.live import content_of
 
 TEXT = CRUDE.read_text("utf-8")
 
@@ -86,6 +87,28 @@ def test_hammers_of_ones_own_come_first() -> None:
     assert [shelf.is_shipped(name) for name in shelf.names[:3]] == [False, False, True]
     assert Shelf(own, only=True).names == ["mine"]
     assert len(Shelf(only=True).names) == len(shelf.names) - 1
+
+
+def test_two_hammers_of_ones_own_have_two_names() -> None:
+    own = load(CRUDE)
+    assert Shelf(own, load(CRUDE), only=True).names == [own.name]
+    with refused("name", own.name):
+        Shelf(own, own.replace({"mass": 2e-3}))
+
+
+def test_hammers_of_the_same_laws_share_modules_and_each_names_its_quantities(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    without_modules(monkeypatch)
+    names = ("hendriks-1983", "hendriks-1983-1", "braille-embosser", "dot-peen", "tung-shaw-1988")
+    content = content_of(Shelf(*map(load, names), only=True))
+    found = {name: entry["modules"] for name, entry in content["hammers"].items()}
+    first, second, third, fourth, last = (found[name] for name in names)
+    assert (set(first), set(third), set(last)) == ({"current", "voltage"}, {"voltage"}, {"force"})
+    assert (first, third) == (second, fourth)
+    assert len(content["modules"]) == 4
+    described = [content["hammers"][name]["described"]["quantities"] for name in names]
+    assert [set(each) for each in described] == [set(found[name]) for name in names]
 
 
 def test_the_state_of_a_page_cannot_end_its_script(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from printhammer.hammer.hammer import Hammer
+    from printhammer.kernel.model.laws import Laws
     from printhammer.studio.shelf import Shelf
 
 _PAGE: Final = """<!doctype html>
@@ -73,7 +74,8 @@ begin(content, bytes.subarray(end));
 """
 
 _SENTENCES: Final = {
-    "kinds": "this page has no kernel for such a drive of this hammer; a page made for the hammer alone has",
+    "kinds": "this page has no kernel for such a drive of this hammer: expected one whose first hammer it is,"
+    " made with the extra `page`",
 }
 """Messages of the page about computations that only Python performs, by name."""
 
@@ -116,8 +118,11 @@ def live_page(shelf: Shelf, start: Mapping[str, Any] | str = "") -> str:
 
 def content_of(shelf: Shelf) -> Any:
     """Compose the content of the page as plain data for JSON."""
-    modules: dict[str, str] = {}
+    modules: dict[Laws, str] = {}
     described = {name: _hammer(shelf, name, modules) for name in shelf.names}
+    for name, entry in described.items():
+        entry["modules"] = _places(shelf.hammer(name), entry["described"], modules)
+        entry["described"]["quantities"] = list(entry["modules"])
     shared = vocabulary()
     del shared["units"]
     content = {
@@ -194,8 +199,8 @@ def _line() -> dict[str, Any]:
     }
 
 
-def _hammer(shelf: Shelf, name: str, modules: dict[str, str]) -> dict[str, Any]:
-    """Compose the page entry of a hammer, and add its WebAssembly module to `modules`."""
+def _hammer(shelf: Shelf, name: str, modules: dict[Laws, str]) -> dict[str, Any]:
+    """Compose the page entry of a hammer, and add its WebAssembly modules to `modules`."""
     hammer = shelf.hammer(name)
     described = describe(hammer)
     entry: dict[str, Any] = {
@@ -204,36 +209,45 @@ def _hammer(shelf: Shelf, name: str, modules: dict[str, str]) -> dict[str, Any]:
         "text": hammer.to_toml(),
         "shipped": shelf.is_shipped(name),
     }
-    entry["modules"] = _modules(hammer, described, name == shelf.names[0], modules)
+    _add_modules(hammer, described, name == shelf.names[0], modules)
     return entry | _numbers(hammer)
 
 
-def _modules(
-    hammer: Hammer, described: dict[str, Any], first: bool, modules: dict[str, str]
-) -> dict[str, int]:
-    """Return the indices of the modules of a hammer by the quantity that drives the hammer.
+def _add_modules(hammer: Hammer, described: dict[str, Any], first: bool, modules: dict[Laws, str]) -> None:
+    """Add the modules of a hammer by laws.
 
     All hammers have that of their pulse, or of the pulse with which they open; the first hammer also those of
     a current and of a voltage.
     """
     pulse = described["waveform"] or described["start"]["waveform"]
-    wanted = [pulse["quantity"]]
-    if first and described["rail"] is not None:
-        wanted += ["current", "voltage"]
-    found: dict[str, int] = {}
-    for quantity in dict.fromkeys(wanted):
-        module = page_module(laws_of(hammer, quantity))
-        if module.name not in modules:
-            try:
-                content = module.content()
-            except InputError:
-                # Without the linker, what another quantity needs is left out.
-                if not found:
-                    raise
-                continue
-            modules[module.name] = b64encode(gzip.compress(content, 1)).decode()
-        found[quantity] = list(modules).index(module.name)
-    return found
+    further = ["current", "voltage"] if first and described["rail"] is not None else []
+    for quantity in [pulse["quantity"], *further]:
+        laws = laws_of(hammer, quantity)
+        if laws in modules:
+            continue
+        try:
+            content = page_module(laws).content()
+        except InputError:
+            # Without the linker, what another quantity needs is left out.
+            if quantity == pulse["quantity"]:
+                raise
+            continue
+        modules[laws] = b64encode(gzip.compress(content, 1)).decode()
+
+
+def _places(hammer: Hammer, described: dict[str, Any], modules: dict[Laws, str]) -> dict[str, int]:
+    """Return the indices of the modules of a hammer by the quantity that drives the hammer.
+
+    Hammers of the same laws share modules.
+    """
+    possible = {
+        "current": hammer.magnet is not None,
+        "force": True,
+        "voltage": described["rail"] is not None,
+    }
+    indices = {laws: index for index, laws in enumerate(modules)}
+    found = {name: indices.get(laws_of(hammer, name)) for name, may in possible.items() if may}
+    return {name: index for name, index in found.items() if index is not None}
 
 
 def _numbers(hammer: Hammer) -> dict[str, Any]:

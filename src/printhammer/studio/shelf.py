@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
+from printhammer.errors import InputError
+
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
 
@@ -21,12 +23,25 @@ class Shelf:
         Hammers that come first; each may replace a shipped hammer of the same name.
     only : bool, optional
         Whether the shipped hammers are left out; a shelf without hammers of its own has them all.
+
+    Raises
+    ------
+    InputError
+        Two different hammers of one's own have the same name.
     """
 
     def __init__(self, *own: Hammer, only: bool = False) -> None:
         from printhammer.hammer.hammer import shipped
 
-        self.own = {hammer.name: hammer for hammer in own}
+        self.own: dict[str, Hammer] = {}
+        for hammer in own:
+            if self.own.setdefault(hammer.name, hammer).fingerprint != hammer.fingerprint:
+                raise InputError(
+                    f"two different hammers are named '{hammer.name}'",
+                    key="name",
+                    value=hammer.name,
+                    expected="a name for each hammer of a page",
+                )
         others = () if only and own else sorted(shipped(), key=lambda name: (name != DEFAULT, name))
         self.names: Final = list(dict.fromkeys([*self.own, *others]))
         """Names of all hammers."""

@@ -54,6 +54,13 @@ export function startOf(studio, shape, before) {
   return wanted;
 }
 
+/** Whether the page computes a pulse of another shape in the place of one: a driver needs a coil, and each quantity a kernel. */
+export function isOffered(studio, shape, before) {
+  const { rail, quantities } = studio.described;
+  if (shape === "sampled") return true;
+  return Boolean(rail || !studio.drivers.includes(shape)) && quantities.includes(startOf(studio, shape, before ?? {}).quantity);
+}
+
 /** Return the choices of a driver, each with what it changes: the path of its decay, how a chopper chops. */
 export function choicesOf(studio, wave) {
   if (!isDriver(studio, wave)) return [];

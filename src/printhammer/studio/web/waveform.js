@@ -2,7 +2,7 @@
 import { axes, curve, line } from "./axes.js";
 import { element } from "./dom.js";
 import { surface } from "./pen.js";
-import { choicesOf, decayVoltage, hasRow, isDriver, longest, reachOf, startOf } from "./pulses.js";
+import { choicesOf, decayVoltage, hasRow, isDriver, isOffered, longest, reachOf, startOf } from "./pulses.js";
 import { choiceRow } from "./rows.js";
 import { colours } from "./theme.js";
 import { unitOf } from "./units.js";
@@ -96,6 +96,7 @@ export function waveformEditor(group, studio, sliderRow) {
     const wave = current();
     const kinds = wave?.shape === "sampled" ? [...shapes, "sampled"] : shapes;
     if (choice.options.length !== kinds.length) choice.replaceChildren(...grouped(kinds));
+    for (const option of choice.options) option.disabled = !isOffered(studio, option.value, wave);
     choice.value = wave?.shape ?? "";
     const choices = wave ? choicesOf(studio, wave) : [];
     const kind = [wave?.shape, wave?.quantity, ...choices.map((each) => each.get(wave))].join();
@@ -129,9 +130,10 @@ export function waveformEditor(group, studio, sliderRow) {
 
   /** Options of the shapes: what is given as a curve, and the drivers, which need a magnet whose flux linkage is known. */
   function grouped(kinds) {
-    const option = (kind) => element("option", { value: kind, disabled: studio.drivers.includes(kind) && !studio.described.rail }, kind);
+    const option = (kind) => element("option", { value: kind }, kind);
     const of = (driver) => kinds.filter((kind) => studio.drivers.includes(kind) === driver).map(option);
-    const why = studio.described.rail ? "driver of the coil, by voltage" : "driver: needs a coil whose flux linkage is known";
+    const { rail, quantities } = studio.described;
+    const why = !rail ? "driver: needs a coil whose flux linkage is known" : quantities.includes("voltage") ? "driver of the coil, by voltage" : "driver: needs a page whose first hammer this is";
     return [element("optgroup", { label: "a curve of current, force or voltage" }, ...of(false)), element("optgroup", { label: why }, ...of(true))];
   }
   return { follow, draw: area.draw };
