@@ -124,7 +124,7 @@ def test_a_law_that_is_rejected(cli: Callable, tmp_path: Path) -> None:
         ("magnet {magnet} --out picture.txt", ("picture.txt", ".svg")),
         ("magnet {magnet} --covariance {magnet}", ("magnet.csv", "that is not an input file")),
         ("backstop", ("expected a table of rebounds, or the geometry",)),
-        ("backstop --radius '2 mm'", ("Young's modulus: 0 given",)),
+        ("backstop --radius '2 mm'", ("expected 2, of armature and backstop",)),
         ("backstop {backstop} --poisson x", ("--poisson", "'x'")),
         ("motion {spring} --hammer hendriks-1983", ("spring.csv",)),
         ("motion shot.csv", ("the hammer", "--hammer")),
