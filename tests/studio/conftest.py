@@ -1,6 +1,7 @@
 """Tests in a browser: run where a Chromium is found; where none is, they are left out and that is said."""
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -8,6 +9,7 @@ from tests.studio.browser import Page, browser, chromium
 
 from printhammer.hammer.hammer import load
 from printhammer.studio import Shelf, live_page
+from printhammer.studio.bundle import page_files
 
 NEEDS = "opened_browser"
 HAMMERS = ("hendriks-1983-1", "hendriks-1983", "bouncing-ball", "duffing-holmes")
@@ -53,3 +55,14 @@ def page(address: str, opened_browser: Any) -> Iterator[Page]:
     yield opened
     assert [place for place in opened.requests if not place.startswith(("blob:", "file:", "data:"))] == []
     opened.call("Page.close")
+
+
+@pytest.fixture(scope="session")
+def modules(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the modules of the page, for Node."""
+    root = tmp_path_factory.mktemp("web")
+    (root / "package.json").write_text('{"type": "module"}', "utf-8")
+    for name, content in page_files().items():
+        (root / name).parent.mkdir(exist_ok=True)
+        (root / name).write_bytes(content)
+    return root

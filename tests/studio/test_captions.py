@@ -11,19 +11,7 @@ from tests.studio.reading import without_modules
 
 from printhammer.hammer.hammer import load
 from printhammer.studio import Shelf
-from printhammer.studio.bundle import page_files
 from printhammer.studio.live import content_of
-
-
-@pytest.fixture(scope="module")
-def modules(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    root = tmp_path_factory.mktemp("web")
-    (root / "package.json").write_text('{"type": "module"}', "utf-8")
-    for name, content in page_files().items():
-        (root / name).parent.mkdir(exist_ok=True)
-        (root / name).write_bytes(content)
-    return root
-
 
 SAY = """
 const { captionOf } = await import("./captions.js");

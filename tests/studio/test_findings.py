@@ -77,6 +77,16 @@ def test_the_rate_where_a_dot_is_lost_is_found(opened: Page) -> None:
 
 
 @pytest.mark.slow
+def test_a_dot_is_looked_for_where_runs_end_early(opened: Page) -> None:
+    """A pulse of 90 A drives the armature out of the range of the magnet before the second dot."""
+    wave = {"shape": "half-sine", "amplitude": 90.0, "width": 3e-4, "quantity": "current"}
+    opened.run(f"window.studio.studio.store.set({{ waveform: {json.dumps(wave)} }})")
+    opened.wait("!window.studio.studio.busy && window.studio.studio.frames.dots.dots.length < 2")
+    opened.run("document.querySelector('.find-lost').click()")
+    opened.wait("document.querySelector('.status').textContent.includes('comes to the second dot')")
+
+
+@pytest.mark.slow
 def test_the_next_strange_rate_is_found(opened: Page) -> None:
     opened.run("window.studio.studio.store.set({ rate: 1000, low: 900, high: 1200 })")
     opened.run("document.querySelector('.find-strange').click()")

@@ -146,3 +146,20 @@ def test_a_state_that_follows_another_is_marked_while_it_takes_long(page: Page) 
     page.run("window.held[0](); 1")
     page.wait("!document.querySelector('.view-motion.outdated')")
     assert page.run(f"{STUDIO}.frames.motion.fired[1]") == pytest.approx(1 / 950)
+
+
+def test_files_dropped_together_are_asked_about_one_after_the_other(page: Page) -> None:
+    """Two tables without units: each has a dialog of its own."""
+    title = "document.querySelector('dialog[open] h2')?.textContent ?? ''"
+    page.run(
+        "(() => { const files = new DataTransfer();"
+        " const text = 'time,displacement\\n0,50\\n10,51\\n20,52\\n';"
+        " for (const name of ['one.csv', 'two.csv']) files.items.add(new File([text], name));"
+        " const event = new DragEvent('drop', { dataTransfer: files, bubbles: true, cancelable: true });"
+        " document.querySelector('.studio').dispatchEvent(event); })()"
+    )
+    for name in ("one.csv", "two.csv"):
+        page.wait(f"({title}).includes('{name}')")
+        page.run("document.querySelector('dialog[open] button[value=use]').click()")
+        page.wait(f"window.studio.studio.store.state.trace?.name === '{name}'")
+    assert page.complaints == []

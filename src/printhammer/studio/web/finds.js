@@ -50,22 +50,23 @@ export function findRow(studio) {
     const fired = state.pattern ? [...state.pattern].filter((mark) => mark === "1").length : Math.max(state.pulses, number + 1);
     if (fired < number) return { text: `the pattern fires ${fired} times, there is no ${ordinal(number)} dot` };
     const pulses = state.pattern ? state.pulses : Math.min(fired, studio.limits.pulses);
+    // Nothing is known where a run is refused, or ends before its firing.
     const gone = async (rate) => {
-      const frame = await asked("dots", { rate, pulses });
-      return frame.kind === "refusal" ? null : !frame.dots[number - 1].struck;
+      const dot = (await asked("dots", { rate, pulses })).dots?.[number - 1];
+      return dot ? !dot.struck : null;
     };
     const [low, high] = rates();
     // The map tells where to look, and the runs whether it is so: a touch may be too short for it.
     const seen = studio.frames.map?.detail === "full" ? (studio.views.map.lost?.().list ?? []).filter(([, , k]) => k === number - 1).map(([row]) => row) : [];
     const rows = studio.frames.map?.data.codes?.shape[0] ?? 2;
     const places = [...Array.from({ length: GRID + 1 }, (_each, k) => low + (k / GRID) * (high - low)), ...seen.map((row) => low + (row / (rows - 1)) * (high - low))].sort((a, b) => a - b);
-    let kept = null;
+    let [kept, unknown] = [null, 0];
     for (const rate of places) {
       if (ended()) return null;
       const is = await gone(rate);
-      if (is === null) continue;
+      if (is === null) { unknown += 1; continue; }
       if (!is) { kept = rate; continue; }
-      if (kept === null) return { rate: rounded(rate, 1), pulses, text: `the ${ordinal(number)} dot is lost already at ${shown(rate, "Hz", 6)}, the lowest rate of the map` };
+      if (kept === null) return { rate: rounded(rate, 1), pulses, text: `the ${ordinal(number)} dot is lost already at ${shown(rate, "Hz", 6)}, the lowest rate ${unknown ? "whose run comes so far" : "of the map"}` };
       let [struck, is_lost] = [kept, rate];
       while (is_lost - struck > CLOSE * is_lost && !ended()) {
         const middle = 0.5 * (struck + is_lost);
@@ -74,7 +75,9 @@ export function findRow(studio) {
       }
       return { rate: rounded(is_lost, 1), pulses, text: `the ${ordinal(number)} dot is lost from ${shown(is_lost, "Hz", 6)} on, a firing every ${shown(1 / is_lost, "s", 5)}` };
     }
-    return { text: `the ${ordinal(number)} dot is struck from ${shown(low, "Hz")} to ${shown(high, "Hz")}, wherever it was looked for` };
+    const range = `from ${shown(low, "Hz")} to ${shown(high, "Hz")}`;
+    if (kept === null) return { text: `no run ${range} comes to the ${ordinal(number)} dot` };
+    return { text: `the ${ordinal(number)} dot is struck ${range}, wherever ${unknown ? "a run comes so far" : "it was looked for"}` };
   }
 
   /** The next rate upward, and from the low end again, whose endless train has an exponent above zero. */

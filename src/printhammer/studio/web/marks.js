@@ -3,7 +3,6 @@ const LATE = 250; // ms that a view may be behind before that is worth a mark
 
 const CURVES = ["motion", "sketch", "forces", "phase", "loops"];
 const OWN = ["map", "line", "strobe"];
-const ROLES = { curves: [...CURVES, "energy"], map: ["map"], detail: ["line", "strobe"], asked: [] };
 const OF_FRAMES = { dots: ["energy"], map: ["map"], line: ["line"], strobe: ["strobe"] };
 
 /** Marks for views, each an element that `panel` finds by its name. */
@@ -33,7 +32,7 @@ export function marksFor(panel) {
       delete panel(view).dataset.why;
     }
   }
-  const all = () => [...ROLES.curves, ...OWN];
+  const ALL = [...CURVES, "energy", ...OWN];
   let refused = 0;
   let latest = 0; // the number of the newest state that was sent
 
@@ -41,19 +40,12 @@ export function marksFor(panel) {
     /** A state is on its way. */
     sent: (serial) => {
       latest = serial;
-      mark(all(), "being computed for what is set now");
+      mark(ALL, "being computed for what is set now");
     },
     /** Nothing is computed, and why; what still comes of states up to a number is outdated too. */
     none(why, serial = 0) {
       refused = serial;
-      mark(all(), why, true);
-    },
-    /** Work of a role takes long: what it waits for. */
-    progress(role, why) {
-      for (const view of ROLES[role].filter((name) => reasons.has(name))) {
-        show(view);
-        panel(view).dataset.why = `${reasons.get(view)}; ${why}`;
-      }
+      mark(ALL, why, true);
     },
     /** A frame has come. */
     arrived(frame) {

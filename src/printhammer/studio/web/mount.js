@@ -192,7 +192,13 @@ export function mount(element, send, address = { read: () => "", write: () => {}
   };
   studio.preset = (patch) => studio.store.set(patch);
 
-  studio.drop = async (file) => {
+  let dropping = Promise.resolve();
+  /** Read a file that was dropped, after those before it: a dialog asks about one at a time. */
+  studio.drop = (file) => {
+    dropping = dropping.catch(() => {}).then(() => readDropped(file));
+    return dropping;
+  };
+  async function readDropped(file) {
     const most = /\.(toml|json)$/i.test(file.name) ? studio.limits.file : LARGEST_TABLE;
     if (file.size > most) {
       studio.say(`${file.name} has ${file.size} bytes, expected at most ${most}`, true);
@@ -214,7 +220,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     }
     else if (frame.what === "drive") { studio.store.set(frame.patch); studio.say(`the drive is that of ${frame.name}`); }
     else if (frame.what === "curves") lay(frame);
-  };
+  }
   /** Show measured curves: a displacement over the motion, a current, force or voltage as the pulse that is fired. */
   function lay({ name, data }) {
     const quantity = ["current", "force", "voltage"].find((kind) => kind in data);
@@ -312,7 +318,6 @@ function honesty(hammer) {
   return Object.entries(counts).map(([status, count]) => `${count} ${status}`).join(", ");
 }
 
-/** Return a text with every so many of its lines, so that it is not too long; the first hundred stay. */
 /** Text of a file in UTF-8 or UTF-16, else in Latin-1 as Windows extends it. */
 function decoded(buffer) {
   const [first, second] = new Uint8Array(buffer);
@@ -324,6 +329,7 @@ function decoded(buffer) {
   }
 }
 
+/** Return a text with every so many of its lines, so that it is not too long; the first hundred stay. */
 function thinned(text, most) {
   if (text.length <= most) return text;
   const lines = text.split("\n");

@@ -12,16 +12,13 @@ const WORKS = { strobe: "section", line: "line" };
 const QUESTIONS = ["curves", "dots", "exponent", "verdict"];
 const BEFORE = "this still belongs to what was set before";
 const NOT_YET = "being computed";
-const PROGRESS = 1000; // ms after which long work is told of
-const DOING = { line: "printing the line", strobe: "following the endless train" };
 const JUDGED = [1001, 2000]; // firings by which an endless train is classified
 const SCREENED = 200; // firings for the exponent at one rate of a search
 const NOTHING = { map: { detail: "none" }, strobe: { verdict: null } };
 
 /** Start the engine; `receive` takes its frames. Returns what takes the text of a message. */
-export function engineOf(shelf, script, receive, page) {
+export function engineOf(shelf, script, receive, page, crew = crewOf(script, shelf)) {
   shelf.adopt = adopter(shelf);
-  const crew = crewOf(script, shelf);
   let latest = null; // the newest state, with its number
   let drawn = 0; // the number of the newest state whose map is drawn
   const [shown, whole] = [{}, {}]; // the keys of what views show, and of what is complete
@@ -61,47 +58,42 @@ export function engineOf(shelf, script, receive, page) {
     });
   }
 
+  /** Give frames of a view for a state, until it shows a newer one. */
+  const shower = (serial, state, view) => (frame) => {
+    if (serial < (seen[view] ?? 0)) return;
+    seen[view] = serial;
+    shown[view] = keyOf(state, KEYS[view]);
+    whole[view] = null; // what was complete is no longer shown
+    receive({ ...frame, serial });
+  };
+  const complete = (serial, view) => { if (seen[view] === serial) whole[view] = shown[view]; };
+  const empty = (view, reason) => ({ kind: view, reason, ...NOTHING[view], data: {} });
+
   /** Order a view that is behind; show it whenever there is more of it, until the state is replaced. */
   async function follow(serial, state, view, more = {}) {
-    const begun = performance.now();
-    let told = begun;
-    const show = (frame) => {
-      if (serial < (seen[view] ?? 0)) return;
-      seen[view] = serial;
-      shown[view] = keyOf(state, KEYS[view]);
-      whole[view] = null; // what was complete is no longer shown
-      receive({ ...frame, serial });
-    };
-    const progress = (what) => receive({ kind: "progress", serial, role: "detail", what, seconds: (performance.now() - begun) / 1000, data: {} });
-    const onward = ({ frame }) => {
-      if (frame) show(frame);
-      if (latest !== serial || performance.now() < told + PROGRESS) return;
-      told = performance.now();
-      progress(DOING[view]);
-    };
+    const show = shower(serial, state, view);
+    const onward = ({ frame }) => { if (frame) show(frame); };
     const answer = await new Promise((done) => { crew.send("map", WORKS[view], state, more, () => latest === serial, done, onward); });
-    if (told > begun) progress("");
     if (!answer) return;
-    if (answer.reason) show({ kind: view, reason: answer.reason, ...NOTHING[view], data: {} });
-    else for (const frame of answer.frames) show(frame);
-    if (!answer.reason && seen[view] === serial) whole[view] = shown[view];
+    if (answer.reason) { show(empty(view, answer.reason)); return; }
+    for (const frame of answer.frames) show(frame);
+    complete(serial, view);
   }
 
   /** Draw the map of a state: coarse at once, then whole, unless the state is replaced meanwhile. */
   async function draw(serial, state) {
-    const key = keyOf(state, KEYS.map);
-    const empty = (reason) => receive({ kind: "map", serial, reason, ...NOTHING.map, data: {} });
-    if (state.low >= state.high) { empty(`map: rates from ${state.low} Hz to ${state.high} Hz: expected ascending ones`); return; }
+    const show = shower(serial, state, "map");
+    if (state.low >= state.high) { show(empty("map", `map: rates from ${state.low} Hz to ${state.high} Hz: expected ascending ones`)); return; }
     drawn = serial;
     // A coarse map is delivered even while a slider moves; of several that wait, the newest.
     const sizes = [[shelf.limits.PREVIEW[shelf.quantity(state) === "voltage"], false, () => drawn === serial], [shelf.limits.FULL, true, () => latest === serial]];
     for (const [size, full, wanted] of sizes) {
       const parts = await pictureOf(crew, state, size, full, wanted);
       if (!parts) return;
-      if (parts.reason) { empty(parts.reason); return; }
-      receive({ detail: full ? "full" : "preview", ...await codesOf(crew, parts, state), serial });
-      shown.map = key;
-      whole.map = full ? key : null;
+      if (parts.reason) { show(empty("map", parts.reason)); return; }
+      const frame = await codesOf(crew, parts, state);
+      show({ detail: full ? "full" : "preview", ...frame });
+      if (full && !frame.reason) complete(serial, "map");
     }
   }
 
