@@ -1,6 +1,7 @@
 """Files dropped on a page: drive files and measured tables, read in Node as Python reads them, or refused."""
 
 import math
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from printhammer.drive.file import read_drive
 from printhammer.drive.waveforms.shapes import SHAPES, Sampled
 from printhammer.studio import Shelf
 from printhammer.studio.controls import fields_of
+from printhammer.studio.launch import FORMAT, KIND
 from printhammer.support.tables.readings import read_table
 from printhammer.units import parse
 
@@ -25,6 +27,16 @@ ASKED = """
   quantity: (text, si) => quantityOf(text, [si], "it")[0],
   write: (state) => driveText(state, shelf),
   drive: (text) => driveOf(tomlOf(text, "a.toml", shelf.limits), shelf, "a.toml"),
+  state: (content, more) => {
+    const text = JSON.stringify(content) + " ".repeat(more);
+    return dropped({ name: "a.json", text }, shelf).what;
+  },
+  long: (lines, bad) => {
+    const rows = Array.from({ length: lines }, (_each, k) => (k < bad ? `${k}.5,1e-6` : `x${k},y`));
+    const text = thinned(["time [us],displacement [m]", ...rows].join("\\n"), 400000);
+    return [...dropped({ name: "a.csv", text, columns: null }, shelf).data.t];
+  },
+  wide: (cell, n, between) => recordOf(Array(n).fill(cell).join(between), "a.csv", null, shelf.limits),
   table: (text, told) => {
     const { data, ...rest } = recordOf(text, "a.csv", told, shelf.limits);
     return { ...rest, data: Object.fromEntries(Object.entries(data).map(([key, list]) => [key, [...list]])) };
@@ -216,6 +228,30 @@ def test_columns_are_asked_for_where_the_heading_does_not_say_what_they_hold(ask
 )
 def test_a_table_that_is_none_is_refused_in_a_sentence(ask: Any, text: str, reason: str) -> None:
     assert reason in ask("table", text, None)["refused"]
+
+
+def test_a_long_table_is_thinned_and_keeps_the_numbers_of_its_lines(ask: Any) -> None:
+    times = ask("long", 250_000, 250_000)["found"]
+    assert len(times) == 2000
+    assert times[0] == pytest.approx(0.5e-6)
+    assert times[-1] == pytest.approx(0.25, rel=1e-3)
+    found = re.search(r"line (\d+): 'x(\d+),y'", ask("long", 250_000, 150_000)["refused"])
+    assert found is not None
+    # Below the heading, and counted from 1.
+    assert int(found[1]) == int(found[2]) + 2 > 150_000
+
+
+def test_tables_of_very_many_columns_or_rows_are_answered(ask: Any) -> None:
+    assert "columns: expected at most 16" in ask("wide", "1", 150_000, ",")["refused"]
+    assert ask("wide", "1", 190_000, "\n")["found"]["what"] == "columns"
+    assert "expected columns" in ask("table", f"{'1' * 300_000}x", None)["refused"]
+
+
+def test_a_state_file_may_be_longer_than_other_files(ask: Any) -> None:
+    """As long as one whose hammer has the largest size."""
+    state = {"kind": KIND, "format": FORMAT, "state": {}}
+    assert ask("state", state, 500_000)["found"] == "state"
+    assert "expected at most 1000000" in ask("state", state, 1_000_000)["refused"]
 
 
 cells = st.sampled_from(

@@ -117,6 +117,12 @@ def test_hammers_and_constants_are_taken_by_name_and_within_their_range(ask: Any
     assert found["notes"][-1] == "and 494 more like these"
 
 
+def test_of_very_many_constants_only_some_are_examined(ask: Any) -> None:
+    notes = ask("taken", {"constants": {f"unknown {k}": 1.0 for k in range(100_000)}})["found"]["notes"]
+    assert "100000 constants" in notes[0]
+    assert notes[-1].startswith("and 59 more")
+
+
 @pytest.mark.parametrize(
     "text",
     ["", "{", "[]", "[" * 100_000, '{"kind": "other"}', '{"kind": "printhammer studio state", "format": 9}'],

@@ -4,6 +4,7 @@ import { energyView, lineView } from "./bars.js";
 import { buildControls } from "./controls.js";
 import { forcesView, motionView } from "./curves.js";
 import { element as make } from "./dom.js";
+import { thinned } from "./engine/records.js";
 import { bindKeys } from "./keys.js";
 import { mapView } from "./map.js";
 import { marksFor } from "./marks.js";
@@ -327,13 +328,4 @@ function decoded(buffer) {
   } catch {
     return new TextDecoder("windows-1252").decode(buffer);
   }
-}
-
-/** Return a text with every so many of its lines, so that it is not too long; the first hundred stay. */
-function thinned(text, most) {
-  if (text.length <= most) return text;
-  const lines = text.split("\n");
-  const step = Math.ceil(text.length / (0.8 * most));
-  // Empty lines keep the numbers of the others.
-  return lines.map((line, k) => (k < 100 || k % step === 0 ? line : "")).join("\n");
 }

@@ -152,7 +152,9 @@ export function taken(content, shelf) {
   if (isTable(content.constants)) {
     state.constants = {};
     const { described } = shelf.hammers[named];
-    for (const [key, value] of Object.entries(content.constants)) {
+    const entries = Object.entries(content.constants);
+    if (entries.length > MOST_CONSTANTS) notes.push(`${entries.length} constants: expected at most ${MOST_CONSTANTS}; the others are not used`);
+    for (const [key, value] of entries.slice(0, MOST_CONSTANTS)) {
       try {
         readers.constants({ [key]: value });
         checkConstant(described, key, value);
@@ -169,7 +171,6 @@ export function taken(content, shelf) {
 
 /** Read a state file that the studio has exported. */
 export function readFile(content, name, shelf) {
-  if (content.length > shelf.limits.LARGEST_MESSAGE) throw new Refusal(`${name}: ${content.length} characters: expected at most ${shelf.limits.LARGEST_MESSAGE}`);
   let file = null;
   try { file = JSON.parse(content); } catch { /* refused below */ }
   if (!isTable(file) || file.kind !== shelf.stateFile.kind) throw new Refusal(`${name}: expected a state file of the studio, as its export saves it`);

@@ -12,12 +12,13 @@ const WORDS = { second: "s", seconds: "s", sec: "s", volt: "V", volts: "V", ampe
 const SEPARATORS = "\t;|, ";
 const SEEN = 2000; // lines by which the separator is found
 const MOST_COLUMNS = 16;
+const FIRST = 100; // lines that are always read
 const LARGEST = 1e9; // of a measured value, SI
 const BEFORE = 0.1; // of the peak, that a drive may have before time 0
 const GAPS = ["", "nan", "-nan", "na", "n/a", "#n/a", "null", "none"];
 const OVER = ["inf", "-inf", "+inf", "infinity", "-infinity"];
 const COMMENT = /^\s*(#|\/\/|[%;]\s*[\p{L}][^;]*$)/u;
-const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+|\d*,\d+|\d{1,3}([.,'\u2019\u00a0\u202f]\d{3})+([.,]\d*)?)([eE][+-]?\d+)?$/;
+const NUMBER = /^[+-]?(\d+(?:\.\d*)?|\.\d+|\d*,\d+|\d{1,3}([.,'\u2019\u00a0\u202f]\d{3})+([.,]\d*)?)([eE][+-]?\d+)?$/;
 const GROUPED = { ".": /^[+-]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?$/, ",": /^[+-]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?$/ };
 
 const isNumber = (cell) => NUMBER.test(cell);
@@ -77,9 +78,11 @@ function separatorOf(lines) {
   return chosen || [..."\t;|"].find((sign) => 2 * seen.filter((line) => line.includes(sign)).length > seen.length) || ",";
 }
 
+const widest = (rows) => rows.reduce((most, { cells }) => Math.max(most, cells.length), 0);
+
 /** Refuse a column such as 999, 1.000, 1.001, whose points may be those of thousands. */
 function grouping(rows, unclear) {
-  for (let k = 0; k < Math.max(...rows.map(({ cells }) => cells.length)); k += 1) {
+  for (let k = 0; k < widest(rows); k += 1) {
     const column = rows.filter(({ cells }) => k < cells.length).map(({ line, cells }) => ({ line, cell: cells[k] }));
     const points = column.filter(({ cell }) => cell.includes("."));
     const whole = column.some(({ cell }) => /^\d+$/.test(cell) && cell !== "0");
@@ -116,11 +119,14 @@ function layoutOf(text, where) {
   const begin = rows.findIndex(({ cells }) => cells.some(isNumber) && cells.every(isReading));
   if (begin < 0) throw new Refusal(`${where}: expected columns of numbers below a heading such as 'time [us],current [A]'`);
   const [above, data] = [rows.slice(0, begin), rows.slice(begin)];
-  const width = Math.max(...data.map(({ cells }) => cells.length));
+  const width = widest(data);
   const isUnits = (cells) => cells.some((cell) => isUnit(cell.replace(/^[([{]|[)\]}]$/g, ""))) && cells.every((cell) => !cell || isUnit(cell.replace(/^[([{]|[)\]}]$/g, "")));
   const last = above.at(-1)?.cells ?? [];
+  const narrow = (count) => { if (count > MOST_COLUMNS) throw new Refusal(`${where}: ${count} columns: expected at most ${MOST_COLUMNS}`); };
+  narrow(Math.max(width, last.length));
   const unitRow = above.length > 1 && isUnits(last) ? last.map((cell) => cell.replace(/^[([{]|[)\]}]$/g, "")) : null;
   const names = (unitRow ? above.at(-2).cells : last);
+  narrow(names.length);
   const longer = data.find(({ cells }) => above.length && cells.length > names.length);
   if (longer) throw new Refusal(`${where}: line ${longer.line} has ${longer.cells.length} cells: expected ${names.length}`);
   for (const { line, cells } of data) {
@@ -160,11 +166,23 @@ function valuesOf({ where, rows }, place, what, unit) {
   });
 }
 
+/** Return a table with every so many of its lines, so that it has at most so many characters; the first hundred stay. */
+export function thinned(text, most) {
+  if (text.length <= most) return text;
+  const lines = text.split("\n");
+  const head = lines.slice(0, FIRST).reduce((sum, line) => sum + line.length + 1, 0);
+  const step = Math.ceil((text.length - head) / (0.8 * Math.max(most - head, 1)));
+  // Empty lines keep the numbers of the others.
+  return lines.map((line, k) => (k < FIRST || k % step === 0 ? line : "")).join("\n");
+}
+
+/** The number of characters of a table, without those of empty lines. */
+export const sizeOf = (text) => text.replace(/\n+/g, "\n").length;
+
 /** Read a table: its curves over a common time, or its columns where the page has to ask what they hold. */
 export function recordOf(text, where, told, limits) {
   const table = layoutOf(text, where);
   const { headings, rows } = table;
-  if (headings.length > MOST_COLUMNS) throw new Refusal(`${where}: ${headings.length} columns: expected at most ${MOST_COLUMNS}`);
   let found = quantitiesOf(table);
   let units = headings.map(({ unit }) => unit);
   if (told) {
