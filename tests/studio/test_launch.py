@@ -153,6 +153,17 @@ def test_every_script_of_the_page_is_used() -> None:
     assert used == {name for name in page_files() if name.endswith(".js")} - {"vendor/uPlot.iife.min.js"}
 
 
+def test_every_exported_name_has_a_user() -> None:
+    """In another script of the page, or in a test."""
+    scripts = {name: content.decode() for name, content in page_files().items() if name.endswith(".js")}
+    tests = " ".join(path.read_text("utf-8") for path in Path(__file__).parent.glob("*.py"))
+    words = {name: set(re.findall(r"\w+", content)) for name, content in {**scripts, "": tests}.items()}
+    for name, content in scripts.items():
+        others = set().union(*(found for other, found in words.items() if other != name))
+        exported = re.findall(r"^export (?:async )?(?:function\*?|const|class) (\w+)", content, re.MULTILINE)
+        assert set(exported) <= others, name
+
+
 def test_copies_are_undone_by_the_page() -> None:
     draw = random.Random(1)
     pieces = [bytes(range(k, 200 + k)) for k in range(5)] + [b"ab" * 300, b"", b"x"]

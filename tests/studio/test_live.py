@@ -176,7 +176,7 @@ def test_a_link_that_cannot_be_read_is_refused_with_its_reason(address: str, ope
         " const no = { kind: 'refusal', reason: 'no such link' };"
         " s.ask = (kind, content) => (kind === 'open' ? Promise.resolve(no) : ask(kind, content)); 1"
     )
-    page.run("location.hash = 'rate=800'; 1")
+    page.run("window.studio.open('rate=800').then(() => 1)")
     page.wait("document.querySelector('.status').textContent === 'no such link'")
     page.run("window.studio.open('x'.repeat(800001)); 1")
     page.wait("document.querySelector('.status').textContent.includes('800001 characters')")

@@ -33,7 +33,7 @@ export function hardest(frame, rigid = false) {
 const SOON = 0.25; // of the flight time of the first dot: a touch sooner after a firing was under way before
 
 /** Return the range of the flight times of dots, and how many touches come too soon to be their own firing's. */
-export function flightsOf(dots) {
+function flightsOf(dots) {
   const all = dots.filter((dot) => dot.struck).map((dot) => dot.flight_time);
   const own = all.filter((time) => time >= SOON * all[0]);
   return { low: Math.min(...own), high: Math.max(...own), soon: all.length - own.length };
@@ -47,7 +47,7 @@ export function flightText(dots) {
 }
 
 /** Return what packs keep of the work of their dots: its share, or nothing where some were pushed once more. */
-export function keptText(dots) {
+function keptText(dots) {
   const struck = dots.filter((dot) => dot.struck && dot.loading_work > 0);
   const again = struck.filter((dot) => dot.net_loss > dot.loading_work).length;
   if (again) return `, up to the first peak; ${again === struck.length ? "each" : NUMBERS[again] ?? again} of them ${again === 1 || again === struck.length ? "is" : "are"} pushed again before leaving, and the pack keeps more`;
@@ -56,7 +56,7 @@ export function keptText(dots) {
 }
 
 /** Tell where the rates of a map lose a dot: nothing of a coarse one, which has not looked. */
-export function lostText(map, first) {
+function lostText(map, first) {
   if (!map.data.struck || map.front === null) return "";
   const rates = `${map.data.codes.shape[0]} rates of the map`;
   return first ? `Of the ${rates}, ${shown(first.rate, "Hz", 4)} is the lowest with a lost dot: the ${ordinal(first.dot)}. ` : `At none of the ${rates} a dot is lost. `;
@@ -112,7 +112,7 @@ const TEXTS = {
   strobe: ({ strobe }) => {
     if (!strobe || strobe.reason) return strobe?.reason ?? "";
     const { verdict } = strobe;
-    if (!verdict) return strobe.status === "ok" ? `The state at each firing of an endless train${strobe.unjudged ? "" : "; the verdict on it follows"}.` : `An endless train cannot be followed at this rate: ${strobe.status}.`;
+    if (!verdict) return strobe.status === "ok" ? "The state at each firing of an endless train; the verdict on it follows." : `An endless train cannot be followed at this rate: ${strobe.status}.`;
     const period = /^period-(\d+)$/.exec(verdict.verdict)?.[1];
     if (period) return period === "1" ? "One point in the end: the train repeats itself with every firing." : `${large(NUMBERS[period] ?? period)} points in the end: the train repeats itself after as many firings.`;
     if (verdict.verdict === "strange") return `The train never repeats itself: what is small grows by a factor of ${digits(Math.exp(verdict.exponent_per_firing), 3)} with each firing.`;

@@ -23,7 +23,7 @@ const borderOf = ({ low, high, front }) => (front === null ? GAP : Math.round(Ma
 /**
  * Return the dots that are lost in a map: for each its row and column, and of the lowest rate the number of the first.
  */
-export function lostDots(frame) {
+function lostDots(frame) {
   const [rows, columns] = frame.data.codes.shape;
   const { codes } = frame.data;
   const { struck } = frame.data;

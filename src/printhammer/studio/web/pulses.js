@@ -6,10 +6,9 @@ const TWICE = 2; // the rail in the voltage that drives the peak current for eve
 const short = (value) => Number(value.toPrecision(4));
 
 export const isDriver = (studio, wave) => studio.drivers.includes(wave?.shape);
-export const isVoltage = (wave) => wave?.quantity === "voltage";
 
 /** Return the resistance of the coil as it is set, or is taken where the file states none, ohm. */
-export function resistanceOf(studio) {
+function resistanceOf(studio) {
   const { described, store } = studio;
   const own = [...described.constants, ...described.open].find((constant) => constant.key === "coil.resistance");
   return store.state.constants["coil.resistance"] ?? own?.value ?? 10;

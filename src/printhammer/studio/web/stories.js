@@ -16,7 +16,7 @@ const strongest = ({ data }, name) => data.t[data[name].reduce((best, force, k) 
  * Entries: `state`; `view`, the large one; `window`, the times that are shown, s; `remarks` on a run, each a time and a text;
  * `other`, a second run, whose curve is shown behind the first.
  */
-export const STORIES = [
+const STORIES = [
   {
     name: "One dot", view: "forces", state: { rate: 1000, pulses: 1 }, window: [0, 1.5e-3],
     remarks: (motion) => [[peakOf(motion), "prints"], [strongest(motion, "F backstop"), "the hardest blow"]],

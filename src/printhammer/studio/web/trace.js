@@ -5,7 +5,7 @@ import { sliderRow } from "./rows.js";
 import { shown } from "./units.js";
 
 /** Return the RMS distance of a motion from a trace with its offsets, m, and the number of points within the run. */
-export function residualOf(motion, { t, values, dt, dx }) {
+function residualOf(motion, { t, values, dt, dx }) {
   const [first, last] = [motion.data.t[0], motion.data.t.at(-1)];
   let [sum, count] = [0, 0];
   t.forEach((time, k) => {

@@ -6,7 +6,6 @@ const LONG = 1e-2; // s, from which a time is no longer told in µs
 /** Take units, by SI unit: [metric, inch-pound], each a name and a factor. */
 export function setUnits(units) { known = units; }
 export function setSystem(number) { system = number; }
-export const getSystem = () => system;
 
 export function unitOf(si) { return known[si]?.[system] ?? { name: si === "1" ? "" : si, factor: 1 }; }
 

@@ -29,7 +29,7 @@ function broken(text, columns) {
 }
 
 /** Return the runs of a text: print line, wire and slots of every wire that prints. */
-export function runsOf(text, { glyphs, columns, name }) {
+function runsOf(text, { glyphs, columns, name }) {
   const lines = broken(text, columns);
   const lacking = [...new Set(lines.join(""))].filter((mark) => !(mark in glyphs));
   if (lacking.length) throw new Refusal(`text: the font ${name} has no ${lacking.slice(0, 8).map((mark) => `'${mark}'`).join(", ")}: expected characters that it has`);

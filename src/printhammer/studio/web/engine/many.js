@@ -2,7 +2,6 @@
 import { isSine, pose, pulseOf } from "./problem.js";
 
 const ROW = 6; // columns of a row of dots
-const CONTACTS = 0; // column of the contacts of a firing
 const STATE = 8; // columns of a state at which a run begins
 const STRETCH = [2048, 256]; // rows of nodes and of contacts of one stretch of a run
 const CARRY = 32; // size of the state of a run
