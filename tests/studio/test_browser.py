@@ -8,6 +8,7 @@ import pytest
 from tests.studio.browser import Page
 
 import printhammer as ph
+from printhammer.studio import bounds
 
 CTRL, SHIFT = 2, 8
 AXE = Path(__file__).parent / "vendor" / "axe.min.js"
@@ -25,6 +26,8 @@ def settled(page: Page, condition: str) -> None:
     """Wait until a state is set and its curves are drawn."""
     page.wait(f"(() => {{ const state = {STATE}; return {condition}; }})()")
     page.wait("!window.studio.studio.busy && !window.studio.studio.stale")
+    # What has been computed is painted in the next animation frame.
+    page.run("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))")
 
 
 def inked(page: Page, view: str) -> int:
@@ -182,7 +185,8 @@ def test_a_page_is_saved_with_what_is_set_and_a_state_comes_back_as_a_file(
     shown.run("window.studio.studio.store.set({ rate: 1000 }); 1")
     shown.wait("window.studio.studio.frames.motion.fired[1] === 1e-3")
     shown.run(HELPERS)
-    drop(shown, "state.json", state_file)
+    # Longer than the limit of hammer files, shorter than that of states.
+    drop(shown, "state.json", state_file + " " * bounds.LARGEST_FILE)
     settled(shown, "state.rate === 925")
     drop(shown, "bad.json", "{")
     shown.wait("document.querySelector('.status').textContent.includes('bad.json: expected a state file')")

@@ -238,6 +238,7 @@ def vocabulary(hammer: Hammer | None = None) -> dict[str, Any]:
         "pulses": bounds.MOST_PULSES,
         "rates": bounds.RATES,
         "file": bounds.LARGEST_FILE,
+        "state": bounds.LARGEST_MESSAGE,
         "line": bounds.LONGEST_TEXT,
     }
     drivers = [shape.shape for shape in DRIVERS]

@@ -200,12 +200,14 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     return dropping;
   };
   async function readDropped(file) {
-    const most = /\.(toml|json)$/i.test(file.name) ? studio.limits.file : LARGEST_TABLE;
+    const isTable = !/\.(toml|json)$/i.test(file.name);
+    const most = isTable ? LARGEST_TABLE : file.name.toLowerCase().endsWith(".json") ? studio.limits.state : studio.limits.file;
     if (file.size > most) {
       studio.say(`${file.name} has ${file.size} bytes, expected at most ${most}`, true);
       return;
     }
-    const text = thinned(decoded(await file.arrayBuffer()), studio.limits.file);
+    const decodedText = decoded(await file.arrayBuffer());
+    const text = isTable ? thinned(decodedText, studio.limits.file) : decodedText;
     const ask = (columns) => studio.ask("drop", { name: file.name, text, columns });
     let frame = await ask(null);
     if (frame.what === "columns") {
