@@ -74,7 +74,7 @@ const TEXTS = {
   sketch: ({ motion }, studio) => {
     const { backstop, front } = motion.places;
     const mover = moverOf(studio.described);
-    if (mover !== "armature") return `The ${mover}${backstop === null ? "" : ` and the ${stopOf(studio.described)}`}, to scale along the way.`;
+    if (mover !== "armature") return `The ${mover}${backstop === null ? "" : ` and the ${stopOf(studio.described)}`}, to scale along the direction of motion.`;
     const places = [...motion.data["strobe x"]].slice(1);
     if (backstop === null || front === null || !places.length) return "The face of the armature, to scale along its stroke.";
     const away = places.filter((x) => x - backstop > 0.02 * (front - backstop)).length;

@@ -274,7 +274,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
   studio.parts = layout(studio, MAKERS);
   studio.layout = studio.parts.layout;
   const marks = marksFor((name) => element.querySelector(`.view-${name}`));
-  studio.hint("The equation and the source of a constant are told here, where its control is pointed at or focused.");
+  studio.hint("Point at a control, or focus it, to read the equation and the source of its constant here.");
   studio.address = address.address;
   bindKeys(studio);
   readColours(element.querySelector(".studio"));
