@@ -118,8 +118,9 @@ class Kernel:
 
 def is_interpreted() -> bool:
     """Whether the kernel runs as plain Python, i.e. whether numba's JIT compilation is disabled."""
-    if "numba" in sys.modules:
-        return bool(sys.modules["numba"].config.DISABLE_JIT)
+    # None stands for a module that must not be imported.
+    if (numba := sys.modules.get("numba")) is not None:
+        return bool(numba.config.DISABLE_JIT)
     return os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 
 
