@@ -14,6 +14,7 @@ CTRL, SHIFT = 2, 8
 AXE = Path(__file__).parent / "vendor" / "axe.min.js"
 STATE = "window.studio.studio.store.state"
 HELPERS = (Path(__file__).parent / "helpers.js").read_text("utf-8")
+PAINTED = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))"
 FRAMES = {"line": "line", "strobe": "strobe", "map": "map"}
 VIEWS = ("motion", "sketch", "map", "forces", "phase", "strobe", "loops", "energy", "line")
 
@@ -27,7 +28,7 @@ def settled(page: Page, condition: str) -> None:
     page.wait(f"(() => {{ const state = {STATE}; return {condition}; }})()")
     page.wait("!window.studio.studio.busy && !window.studio.studio.stale")
     # What has been computed is painted in the next animation frame.
-    page.run("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))")
+    page.run(PAINTED)
 
 
 def inked(page: Page, view: str) -> int:
@@ -212,6 +213,11 @@ def test_a_rail_in_the_place_of_the_current_and_back(page: Page) -> None:
     assert took("rail") == pytest.approx(own, rel=0.2)
     page.run("for (const part of document.querySelectorAll('details')) part.open = true")
     assert page.run("document.querySelector('[data-key=\"coil.temperature\"]').checkVisibility()")
+    # A window that changes its size between two answers draws the axis of the former drive once more.
+    page.run(f"{motion}.data.u = undefined")
+    page.size(1300, 800)
+    page.run(PAINTED)
+    assert page.complaints == []
     assert took("chopper") < own
     assert page.run("document.querySelector('[data-key=\"waveform.off_time\"]')") is None
     page.run("helpers.choose('#control-chopped', 'fixed time')")

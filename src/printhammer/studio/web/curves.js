@@ -71,9 +71,11 @@ function driveRanges(frame) {
 }
 
 const RIGHT = ["drive", "volts"]; // scales of the axes on the right
-/** Whether a number on a right axis is one that is met. */
+/** Whether a number on a right axis is one that is met; none is where the axis is that of a former drive. */
 function within(frame, scale, value) {
-  const [low, high] = extent(scale === "volts" ? frame.data.u : frame.data.drive, 0, 0);
+  const values = scale === "volts" ? frame.data.u : frame.data.drive;
+  if (!values) return false;
+  const [low, high] = extent(values, 0, 0);
   return value >= 1.01 * low - 1e-9 && value <= 1.01 * high;
 }
 
