@@ -264,6 +264,30 @@ def test_words_give_the_rate_and_the_deviations_of_all_patterns(monkeypatch: pyt
         np.testing.assert_allclose(getattr(brief, side), getattr(whole, side), rtol=1e-6, atol=1e-9)
 
 
+@pytest.mark.parametrize("multiplier", [-1.19, 1.19, np.nan])
+def test_rows_in_which_errors_grow_are_run_to_their_end(
+    monkeypatch: pytest.MonkeyPatch, multiplier: float
+) -> None:
+    """Dots of such a row may agree to 1e-6 at the 24th and be lost at the 100th."""
+    run_whole: list[float] = []
+
+    class EnoughError(Exception):
+        """Ends the search at the first rate whose patterns are run themselves."""
+
+    def whole(cases: Sequence[Case], *_: object, **__: object) -> None:
+        run_whole.append(cases[0].rate)
+        raise EnoughError
+
+    monkeypatch.setattr("printhammer.printing.rates.safe_rate.attempt_patterns", whole)
+    monkeypatch.setattr(
+        "printhammer.printing.dots.trial.multipliers",
+        lambda _hammers, rates, *_: np.where(np.asarray(rates) > 30.05, multiplier, 0.5),
+    )
+    with pytest.raises(EnoughError):
+        safe_rate(ph.load("relay-5v"), first=30.0)
+    assert run_whole == [pytest.approx(30.1)]
+
+
 @given(st.sets(st.integers(0, 40), min_size=1), st.integers(1, 4))
 def test_every_dot_of_a_pattern_has_its_history_in_a_word(chosen: set[int], gap: int) -> None:
     slots = sorted(chosen)

@@ -14,6 +14,7 @@ from typing import Any, Final, NamedTuple, Unpack
 
 import numpy as np
 
+from printhammer.derivatives.rows import DOTS, row_multipliers
 from printhammer.drive.batch import firings_of, joined
 from printhammer.drive.trains import Drive
 from printhammer.drive.waveforms.shapes import Waveform
@@ -194,7 +195,8 @@ def attempt_words(
 
     Each word is followed by one more dot, which has to equal the first dot of the word, from rest: only then
     is the word separate from what follows. Of a row only the first dots are simulated, and the last of these
-    have to be equal: the row has then reached its periodic orbit.
+    have to be equal: the row has then reached its periodic orbit. It stays there if no error grows from dot
+    to dot, so that the multiplier of the row must be at most 1 in absolute value.
 
     Parameters
     ----------
@@ -223,7 +225,29 @@ def attempt_words(
             passed = passed & _are_equal(by_case[:, k, [0, len(word)]])
             if len(word) == _ROW:
                 passed = passed & _are_equal(by_case[:, k, _ROW - _SAME : _ROW])
+    hammers, rates = [case.hammer for case in cases], [case.rate for case in cases]
+    for step in {word[1] for word in words if len(word) == _ROW}:
+        passed &= np.abs(multipliers(hammers, rates, strategy, options["effort"].quiet, step)) <= 1.0
     return trial, len(cases) if passed.all() else int(np.argmin(passed))
+
+
+def multipliers(
+    hammers: Sequence[Hammer],
+    rates: Sequence[float],
+    strategy: Strategy,
+    effort: Effort,
+    step: int = 1,
+) -> FloatArray:
+    """Compute the multipliers of rows with a dot in every `step`-th slot, shape (hammers,).
+
+    Each row belongs to a hammer and a rate, Hz; see `printhammer.derivatives.rows.row_multipliers`. The
+    multipliers are NaN for a closed loop, which corrects errors itself.
+    """
+    if hasattr(strategy, "along"):
+        return np.full(len(hammers), np.nan)
+    slots = tuple(range(0, step * DOTS, step))
+    drives = [strategy(hammer, [slots], rate)[0] for hammer, rate in zip(hammers, rates, strict=True)]
+    return row_multipliers(hammers, drives, effort)
 
 
 def _shortened(word: tuple[int, ...]) -> tuple[int, ...]:

@@ -20,7 +20,6 @@ from typing import Any, Final, Literal, Unpack
 import numpy as np
 import numpy.typing as npt
 
-from printhammer.derivatives.rows import DOTS, row_multipliers
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
@@ -45,6 +44,7 @@ from printhammer.printing.dots.trial import (
     attempt_long,
     attempt_patterns,
     attempt_words,
+    multipliers,
 )
 from printhammer.results import Declared, Result, column, coordinate, part, scalar
 from printhammer.results.summary import (
@@ -363,25 +363,6 @@ def from_rest(*, every: bool) -> list[tuple[int, ...]]:
     """
     patterns = [slots_of(row) for row in eight_slot_patterns()]
     return [slots for slots in patterns if every or slots[0] == 0]
-
-
-def multipliers(
-    hammers: Sequence[Hammer],
-    rates: Sequence[float],
-    strategy: Strategy,
-    effort: Effort,
-    step: int = 1,
-) -> FloatArray:
-    """Compute the multipliers of rows with a dot in every `step`-th slot, shape (hammers,).
-
-    Each row belongs to a hammer and a rate, Hz; see `printhammer.derivatives.rows.row_multipliers`. The
-    multipliers are NaN for a closed loop, which corrects errors itself.
-    """
-    if hasattr(strategy, "along"):
-        return np.full(len(hammers), np.nan)
-    slots = tuple(range(0, step * DOTS, step))
-    drives = [strategy(hammer, [slots], rate)[0] for hammer, rate in zip(hammers, rates, strict=True)]
-    return row_multipliers(hammers, drives, effort)
 
 
 def _row(runs: Sequence[tuple[Trial, int]], *, long: bool) -> dict[str, Any]:
