@@ -14,9 +14,10 @@ from printhammer.drive.trains import Drive
 from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import nominal, single_pulses
 from printhammer.printing.dots.strategy import FIRST_SLOT, open_loop
-from printhammer.printing.dots.trial import Case, attempt, words_of
+from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.safe_rate import from_rest, rate_grid, safe_rate
 from printhammer.printing.rates.variability import Perturbation, perturbed
+from printhammer.printing.rates.words import words_of
 
 COARSE = {"first": 250.0, "step": 125.0, "last": 2000.0}
 
@@ -280,7 +281,7 @@ def test_rows_in_which_errors_grow_are_run_to_their_end(
 
     monkeypatch.setattr("printhammer.printing.rates.safe_rate.attempt_patterns", whole)
     monkeypatch.setattr(
-        "printhammer.printing.dots.trial.multipliers",
+        "printhammer.printing.rates.words.multipliers",
         lambda _hammers, rates, *_: np.where(np.asarray(rates) > 30.05, multiplier, 0.5),
     )
     with pytest.raises(EnoughError):

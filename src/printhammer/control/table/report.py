@@ -14,9 +14,10 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import Nominal, nominal
 from printhammer.printing.dots.strategy import KINDS, Strategy, long_patterns, open_loop, slots_of
-from printhammer.printing.dots.trial import Case, attempt, multipliers
+from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.safe_rate import from_rest
 from printhammer.printing.rates.variability import Perturbation, perturbed
+from printhammer.printing.rates.words import multipliers
 from printhammer.results import Result, column, coordinate, part, scalar
 from printhammer.results.summary import (
     Cells,

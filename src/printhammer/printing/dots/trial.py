@@ -1,20 +1,12 @@
-"""Trial printing: simulate patterns under a strategy as one ensemble, and compare the dots with limits.
-
-A slow device with a rigid backstop is exactly at rest some slots after a dot. A pattern is then a sequence of
-*words*, the dots between such gaps, that do not affect each other. The words of all test patterns are few:
-for dots that affect only the next slot they are rows of one to eight dots, and a row of 200.
-"""
+"""Trial printing: simulate patterns under a strategy as one ensemble, and compare the dots with limits."""
 
 from __future__ import annotations
 
-import itertools
-import math
-from collections.abc import Iterable, Sequence
-from typing import Any, Final, NamedTuple, Unpack
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 
-from printhammer.derivatives.rows import DOTS, row_multipliers
 from printhammer.drive.batch import firings_of, joined
 from printhammer.drive.trains import Drive
 from printhammer.drive.waveforms.shapes import Waveform
@@ -34,14 +26,6 @@ from printhammer.run.ensemble import DotTable, Ensemble, ExtraDots
 from printhammer.run.waits import waits_of
 from printhammer.run.window import longest_of
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
-
-_MOST_SLOTS: Final = 3  # Largest number of slots to rest for which patterns are split; arbitrary
-
-_ROW: Final = 24  # Number of dots to which rows are shortened if their last dots are equal; arbitrary
-_SAME: Final = 4  # Number of dots at the end of a shortened row that have to be equal; arbitrary
-
-# Relative difference below which two dots are equal; arbitrary, above the errors of integration
-_EQUAL: Final = 1e-6
 
 
 class Case(NamedTuple):
@@ -169,92 +153,3 @@ def attempt_patterns(
         for place, k in enumerate(good):
             runs[k].append((lasting, place))
     return runs
-
-
-def words_of(patterns: Iterable[Sequence[int]], gap: int) -> list[tuple[int, ...]]:
-    """Split patterns into words of dots less than `gap` slots apart; list the distinct words, from slot 0.
-
-    Patterns are split where consecutive dots are `gap` slots or more apart.
-    """
-    words = set()
-    for slots in patterns:
-        ends = [k + 1 for k, (a, b) in enumerate(itertools.pairwise(slots)) if b - a >= gap]
-        for begin, end in itertools.pairwise([0, *ends, len(slots)]):
-            words.add(tuple(slot - slots[begin] for slot in slots[begin:end]))
-    return sorted(words)
-
-
-def attempt_words(
-    cases: Sequence[Case],
-    patterns: Iterable[Sequence[int]],
-    undisturbed: float,
-    strategy: Strategy,
-    **options: Any,
-) -> tuple[Trial, int] | None:
-    """Simulate the words (groups of close dots) of patterns in all cases (hammer and rate), by rate.
-
-    Each word is followed by one more dot, which has to equal the first dot of the word, from rest: only then
-    is the word separate from what follows. Of a row only the first dots are simulated, and the last of these
-    have to be equal: the row has then reached its periodic orbit. It stays there if no error grows from dot
-    to dot, so that the multiplier of the row must be at most 1 in absolute value.
-
-    Parameters
-    ----------
-    cases, patterns, strategy, options
-        As for `attempt`.
-    undisturbed : float
-        Rate up to which each pulse finds the device at rest, Hz.
-
-    Returns
-    -------
-    tuple or None
-        The trial, and the number of leading cases in which every dot of the patterns is within limits.
-        None where the patterns are not split, since dots affect each other over too many slots.
-    """
-    if not undisturbed > 0.0:
-        return None
-    gap = max(math.ceil(max(case.rate for case in cases) / undisturbed), 1)
-    if gap > _MOST_SLOTS:
-        return None
-    words = sorted({_shortened(word) for word in words_of(patterns, gap)})
-    trial = attempt(cases, [(*word, word[-1] + gap) for word in words], strategy, **options)
-    passed = trial.passed
-    for values in (trial.dots.flight_time, trial.dots.peak_force):
-        by_case = values.reshape(len(cases), len(words), -1)
-        for k, word in enumerate(words):
-            passed = passed & _are_equal(by_case[:, k, [0, len(word)]])
-            if len(word) == _ROW:
-                passed = passed & _are_equal(by_case[:, k, _ROW - _SAME : _ROW])
-    hammers, rates = [case.hammer for case in cases], [case.rate for case in cases]
-    for step in {word[1] for word in words if len(word) == _ROW}:
-        passed &= np.abs(multipliers(hammers, rates, strategy, options["effort"].quiet, step)) <= 1.0
-    return trial, len(cases) if passed.all() else int(np.argmin(passed))
-
-
-def multipliers(
-    hammers: Sequence[Hammer],
-    rates: Sequence[float],
-    strategy: Strategy,
-    effort: Effort,
-    step: int = 1,
-) -> FloatArray:
-    """Compute the multipliers of rows with a dot in every `step`-th slot, shape (hammers,).
-
-    Each row belongs to a hammer and a rate, Hz; see `printhammer.derivatives.rows.row_multipliers`. The
-    multipliers are NaN for a closed loop, which corrects errors itself.
-    """
-    if hasattr(strategy, "along"):
-        return np.full(len(hammers), np.nan)
-    slots = tuple(range(0, step * DOTS, step))
-    drives = [strategy(hammer, [slots], rate)[0] for hammer, rate in zip(hammers, rates, strict=True)]
-    return row_multipliers(hammers, drives, effort)
-
-
-def _shortened(word: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the first `_ROW` dots of a longer row of equally spaced dots; other words are unchanged."""
-    return word[:_ROW] if len(word) > _ROW and len(set(np.diff(word).tolist())) == 1 else word
-
-
-def _are_equal(values: FloatArray) -> BoolArray:
-    """Whether all values of a row equal its first value within `_EQUAL`; False for a row with NaN."""
-    return np.asarray(np.isclose(values, values[:, :1], rtol=_EQUAL, atol=0.0).all(axis=1))

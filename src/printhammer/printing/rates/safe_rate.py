@@ -37,15 +37,8 @@ from printhammer.printing.dots.strategy import (
     open_loop,
     slots_of,
 )
-from printhammer.printing.dots.trial import (
-    Case,
-    Trial,
-    attempt,
-    attempt_long,
-    attempt_patterns,
-    attempt_words,
-    multipliers,
-)
+from printhammer.printing.dots.trial import Case, Trial, attempt, attempt_long, attempt_patterns
+from printhammer.printing.rates.words import attempt_words, multipliers
 from printhammer.results import Declared, Result, column, coordinate, part, scalar
 from printhammer.results.summary import (
     Facts,
