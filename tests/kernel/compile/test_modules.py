@@ -16,7 +16,7 @@ import printhammer as ph
 from printhammer.kernel.compile import cache, link, modules
 from printhammer.kernel.compile.bindings import bindings_of
 from printhammer.kernel.compile.modules import Entry, Module
-from printhammer.kernel.compile.specialise import specialise
+from printhammer.kernel.compile.specialise import is_interpreted, specialise
 from printhammer.kernel.model.laws import LAW_FUNCTIONS, Laws
 from printhammer.run.problem import Problem, laws_of
 
@@ -230,3 +230,11 @@ def test_random_combinations_give_what_is_compiled_with_their_laws(
     assert found.linked.steps == found.whole.steps > 50
     # Other functions are inlined, and other products contracted: rounding errors may differ.
     assert found.equal or found.error < 1e-11
+
+
+def test_kernels_are_compiled_where_numba_is_blocked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """None in `sys.modules` blocks the import; the variable alone then decides."""
+    monkeypatch.setitem(sys.modules, "numba", None)
+    for value, expected in (("0", False), ("1", True)):
+        monkeypatch.setenv("NUMBA_DISABLE_JIT", value)
+        assert is_interpreted() is expected
