@@ -191,6 +191,18 @@ def test_the_drive_acts_as_it_says(overlap: str) -> None:
     assert ended.v[-1] == pytest.approx(exact.v[-1], rel=3e-3)
 
 
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_step_ends_at_each_of_many_close_firings(scheme: str) -> None:
+    """Three steps for each firing, though short ones alone would divide the run into fewer."""
+    drive = PulseTrain(WAVEFORM.scaled(0.0), at=2.5 * CONTACT_STEP * np.arange(1, 401))
+    start = (STOP.position - 5e-6, 0.0)
+    ended = run(WHOLE, drive, start, 1e-3, scheme=scheme, reading="firings")
+    assert ended.status == "ok"
+    assert (ended.x < STOP.position).all()
+    assert np.isin(drive.times[:-1], ended.t).all()
+    assert ended.t.size == 3 * drive.times.size + 1
+
+
 def test_leaving_the_range_of_a_law_is_a_status() -> None:
     hammer = made_of(magnet=MAGNET)
     for scheme, status in (("trapezoid", "newton failed"), ("runge-kutta-4", "diverged")):

@@ -167,7 +167,9 @@ def integrate(
     firings, begins, segments, replace, is_force = drive
     contact = CONTACT_STEP * scale
     wanted = np.zeros(0) if moments is None else np.array(moments, dtype=np.float64)
-    rows = np.empty((math.ceil(t_end / contact) + 8 if moments is None else wanted.size, 4))
+    # Each firing can divide one step into two.
+    most = math.ceil(t_end / contact) + len(firings) + 8
+    rows = np.empty((most if moments is None else wanted.size, 4))
     steps = np.array([FREE_STEP * scale, contact, LATE_STEP * scale])
     packed = tuple(
         np.ascontiguousarray(constants[role], dtype=np.float64)
