@@ -2,16 +2,20 @@
 
 import dataclasses
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import printhammer as ph
+from printhammer.chaos.orbits import newton as library
 from printhammer.chaos.orbits import settled
+from printhammer.chaos.orbits.newton import CLOSED, Images
 from printhammer.chaos.orbits.settled import _by_states, shown
+from printhammer.chaos.strobe.map import IN_PACK, STILL_COIL
 from printhammer.chaos.strobe.train import pack_branches
 from printhammer.chaos.strobe.verdict import (
     AGREEMENT,
@@ -25,7 +29,7 @@ from printhammer.derivatives.states import Exponent, standard_error
 from printhammer.drive.batch import PulseTrains, Ragged
 from printhammer.drive.waveforms.shapes import Rectangle
 from printhammer.kernel.model.modes import BACKSTOP_SURFACE, LOADING, PACK_SURFACE, UNLOADING
-from printhammer.kernel.readout import codes, contacts, curves, energy, line, section
+from printhammer.kernel.readout import codes, contacts, curves, energy, line, newton, section
 from printhammer.printing.dots.judging import PRESETS
 from printhammer.printing.dots.strategy import FIRST_SLOT, slot_times
 from printhammer.printing.page.page import head_of, print_page
@@ -205,6 +209,91 @@ def test_a_class_is_that_of_the_verdict(
 def test_the_limits_of_settled_states_are_those_of_the_library() -> None:
     own = (section.AGREES, section.DISTINCT, section.SHRINKS, section.NOISE, section.SIGNIFICANT)
     assert own == (settled.AGREES, settled.DISTINCT, settled._SHRINKS, settled._NOISE, SIGNIFICANT)
+    search = (newton.GOAL, newton.ENOUGH, newton.ITERATIONS)
+    assert search == (settled._GOAL, settled._ENOUGH, settled._ITERATIONS)
+    assert (newton.LONGEST_STEP, newton.LEAST_SHARE) == (library._LONGEST_STEP, library._LEAST_SHARE)
+    assert (newton.NEAR, newton.LIES_ON) == (settled.NEAR, settled.LIES_ON)
+    assert newton.STILL_COIL == STILL_COIL
+
+
+@dataclasses.dataclass
+class Henon:
+    """Map of Hénon, unusable beyond `unusable`, without a derivative beyond `kink`."""
+
+    a: float
+    b: float
+    unusable: float
+    kink: float
+
+    def after(self, state: Any) -> Any:
+        return np.array([1.0 - self.a * state[0] ** 2 + state[1], self.b * state[0]])
+
+    def image(self, state: Any) -> tuple[Any, Any, bool, bool]:
+        """Image, derivative, differentiability, and whether the image is usable."""
+        jacobian = np.array([[-2.0 * self.a * state[0], 1.0], [self.b, 0.0]])
+        return self.after(state), jacobian, state[0] <= self.kink, state[0] <= self.unusable
+
+    def __call__(self, states: Any, _firings: Any) -> Images:
+        images = Images.empty(len(states))
+        for k, (after, jacobian, smooth, usable) in enumerate(map(self.image, states)):
+            if usable:
+                images.states[k], images.jacobians[k], images.smooth[k] = after, jacobian, smooth
+            images.reasons[k] = CLOSED if usable else IN_PACK
+        return images
+
+
+def settled_of(henon: Henon, states: Any, scales: Any, period: int) -> tuple[int, float]:
+    """Period and multiplier, found as by the page."""
+    if clear := section.settled_period(states, scales, period, True):
+        return clear, math.nan
+    for count in (count for count in range(1, period + 1) if period % count == 0):
+        orbit, trial, search = np.zeros((count, newton.ORBIT)), np.zeros((count, 2)), np.zeros(4)
+        if not newton.write_guess(states, scales, period, count, orbit, trial):
+            continue
+        images, outcome = np.zeros((count, newton.IMAGE)), newton.TRY
+        while outcome == newton.TRY:
+            for k in range(count):
+                # What is not usable is finite all the same; the images after it are not computed.
+                after, jacobian, smooth, usable = henon.image(trial[k])
+                images[k] = *after, *jacobian.ravel(), float(smooth)
+                if not usable:
+                    break
+            outcome = newton.improve(images, usable, scales, orbit, trial, search)
+        out = np.zeros(1)
+        judged = newton.has_settled(states, scales, orbit, search, outcome, out)
+        if judged == newton.NO_DERIVATIVE:
+            return section.settled_period(states, scales, period, False), math.nan
+        if judged == newton.APPROACHES:
+            return count, float(out[0])
+    return 0, math.nan
+
+
+@settings(max_examples=400)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([1e-3, 1e-2, 1e-1, 1.0]), st.booleans(), st.booleans())
+def test_newtons_method_decides_the_period_as_in_the_library(
+    seed: int, near: float, limited: bool, kinked: bool
+) -> None:
+    """States near a period doubling of the map of Hénon, which approach an orbit slowly."""
+    rng = np.random.default_rng(seed)
+    b = rng.uniform(-0.3, 0.3)
+    doubling = 0.75 * (1.0 - b) ** 2
+    limits = [rng.uniform(0.0, 1.0) if is_set else math.inf for is_set in (limited, kinked)]
+    henon = Henon(doubling * (1.0 + near * rng.uniform(-0.8, 0.6)), b, *limits)
+    states = [np.array([0.1, 0.0])]
+    wait, count = int(rng.choice([0, 10, 40, 150, 600])), int(rng.integers(8, 80))
+    for _ in range(wait + count):
+        states.append(henon.after(states[-1]))
+    x, v = np.transpose(states[-count:])
+    # A third component of the state counts for the agreement of states alone.
+    points, scales = np.column_stack([x, v, 0.3 * x]), np.array([1.3, 0.4, 0.1])
+    period = 1 + int(np.argmax(repeats(points, np.zeros(count, np.int64), scales) < 0.5))
+    regime: Any = SimpleNamespace(is_planar=True)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(settled, "ExactMaps", lambda _regime, _effort: henon)
+        expected = settled.settled(regime, points, period, scales)
+    found, multiplier = settled_of(henon, points, scales, period)
+    assert found == (expected.period or 0)
+    assert multiplier == pytest.approx(expected.multiplier, abs=1e-9, nan_ok=True)
 
 
 def kept_of(hammer: ph.Hammer, trains: PulseTrains, ends: Any) -> Any:

@@ -42,6 +42,9 @@ NEAR: Final = 0.1
 _SHRINKS: Final = 1e-5
 _NOISE: Final = 1e-9
 """Smallest decreases of a distance that count as shrinking: relative, and absolute in half-widths."""
+_GOAL: Final = 1e-13
+_ENOUGH: Final = 1e-9
+"""Residual at which Newton's method stops, and residual that is accepted if it stops decreasing."""
 _ITERATIONS: Final = 20  # Iteration limit of Newton's method; arbitrary
 
 NO_ORBIT: Final = "Newton's method finds no stable orbit of {} there that the states approach"
@@ -96,7 +99,7 @@ def settled(regime: Regime, points: FloatArray, period: int, scales: FloatArray)
         # If the states alternate about the orbit, their mean is closer to the orbit than any single state.
         guess = states[-period:].reshape(-1, count, 2).mean(axis=0)
         closing = close_orbits(
-            maps, guess[np.newaxis], np.ones((1, count), np.int64), plane, goal=1e-13, enough=1e-9,
+            maps, guess[np.newaxis], np.ones((1, count), np.int64), plane, goal=_GOAL, enough=_ENOUGH,
             iterations=_ITERATIONS,
         )[0]  # fmt: skip
         if not np.isfinite(closing.jacobians).all() or not closing.smooth:

@@ -86,7 +86,7 @@ _TOUCHES: Final = 4
 _COMPLETED: Final = 6
 _MORE: Final = 512
 """Largest period, in firings, that is searched again if its index sum is not 1; number of further guesses."""
-_NEAR: Final = 64  # Number of guesses near each known orbit of a period whose index sum is not 1
+_NEAR: Final = 64  # Number of guesses near each known orbit of a period whose index sum is not 1; arbitrary
 _ROUNDS: Final = 3  # Largest number of rounds of further guesses; arbitrary
 _SIZES: Final = (-6.0, -1.5)
 """Range of decimal logarithms of the displacements of further guesses, in half-widths of the strobe window.

@@ -27,12 +27,14 @@ GOAL, ENOUGH, ITERATIONS = 1e-13, 1e-9, 20
 """Residual at which the iteration stops, residual that is accepted if it stops decreasing, and iteration
 limit; as in `printhammer.chaos.orbits.settled`."""
 LONGEST_STEP, LEAST_SHARE = 1.0, 2.0**-7
-"""Longest Newton step, in half-widths of the window, and smallest damping factor."""
+"""Longest Newton step, in half-widths of the window, and smallest damping factor; as in
+`printhammer.chaos.orbits.newton`."""
 NEAR, LIES_ON = 0.1, 1e-6
 """Distances from an orbit, in half-widths, within which the orbit is sought, and within which a state lies on
 the orbit; as in `printhammer.chaos.orbits.settled`."""
 STILL_COIL = 1e-9
-"""Current, relative to a typical current, below which the coil counts as currentless."""
+"""Current, relative to a typical current, below which the coil counts as currentless; as in
+`printhammer.chaos.strobe.map`."""
 
 TRIED, SHARE, RESIDUAL, SMOOTH = range(4)
 """Indices of `search`: number of map evaluations, damping factor, residual, differentiability flag."""
@@ -123,7 +125,8 @@ def improve(images: Any, usable: bool, scales: Any, orbit: Any, trial: Any, sear
     images : float64 array, shape (m, 7)
         Images of the trial states; see `IMAGE`.
     usable : bool
-        Whether all images are known.
+        Whether (x, v) is the complete state in all images; if not in those of the guess, the orbit has no
+        derivative.
     scales : float64 array
         Half-widths of the window.
     orbit : float64 array, shape (m, 10)
@@ -149,6 +152,8 @@ def improve(images: Any, usable: bool, scales: Any, orbit: Any, trial: Any, sear
     search[TRIED] += 1.0
     if first or residual < search[RESIDUAL] * (1.0 - 0.1 * share):
         accept(images, scales, orbit, search)
+        if not usable:
+            search[SMOOTH] = 0.0
         search[RESIDUAL] = residual
         search[SHARE] = 1.0 if first else min(2.0 * share, 1.0)
         if not math.isfinite(residual) or not is_aimed(images, scales, orbit):
@@ -171,7 +176,7 @@ def improve(images: Any, usable: bool, scales: Any, orbit: Any, trial: Any, sear
 
 
 def accept(images: Any, scales: Any, orbit: Any, search: Any) -> None:
-    """Store trial states and their derivatives."""
+    """Store trial states and their derivatives; arrays as for `improve`."""
     search[SMOOTH] = 1.0
     for i in range(images.shape[0]):
         for row in range(2):
@@ -186,7 +191,8 @@ def accept(images: Any, scales: Any, orbit: Any, search: Any) -> None:
 def is_aimed(images: Any, scales: Any, orbit: Any) -> bool:
     """Write the Newton step of each state, clipped to `LONGEST_STEP`; return False if singular.
 
-    The step of state i + 1 is J_i d_i + e_i with the defect e_i; around the orbit, d_0 = M d_0 + c.
+    The step of state i + 1 is J_i d_i + e_i with the defect e_i; around the orbit, d_0 = M d_0 + c. Arrays
+    as for `improve`.
     """
     m = images.shape[0]
     a, b, c, d = 1.0, 0.0, 0.0, 1.0
@@ -219,7 +225,10 @@ def is_aimed(images: Any, scales: Any, orbit: Any) -> bool:
 
 
 def largest_multiplier(orbit: Any) -> float:
-    """Return the largest absolute value of a Floquet multiplier, from trace and determinant."""
+    """Return the largest absolute value of a Floquet multiplier, from trace and determinant.
+
+    `orbit`, shape (m, 10), is described by `ORBIT`.
+    """
     a, b, c, d = 1.0, 0.0, 0.0, 1.0
     determinant = 1.0
     for i in range(orbit.shape[0]):
@@ -236,7 +245,20 @@ def largest_multiplier(orbit: Any) -> float:
 def has_settled(states: Any, scales: Any, orbit: Any, search: Any, outcome: int, out: Any) -> int:
     """Judge by the outcome of Newton's method whether a motion has settled to an orbit; see `APPROACHES`.
 
-    `out`, shape (1,), is the largest absolute value of a Floquet multiplier.
+    Parameters
+    ----------
+    states : float64 array, shape (n, any)
+        States at successive firings: displacement, m, velocity, m/s, and others, which are ignored.
+    scales : float64 array
+        Half-widths of the window, m and m/s, first.
+    orbit : float64 array, shape (m, 10)
+        See `ORBIT`.
+    search : float64 array, shape (4,)
+        See `TRIED`.
+    outcome : int
+        Last outcome of `improve`.
+    out : float64 array, shape (1,)
+        Output: largest absolute value of a Floquet multiplier.
     """
     for i in range(orbit.shape[0]):
         for k in range(6, 10):
@@ -252,7 +274,10 @@ def has_settled(states: Any, scales: Any, orbit: Any, search: Any, outcome: int,
 
 
 def gap_at(states: Any, scales: Any, orbit: Any, block: int, shift: int) -> float:
-    """Return the largest distance of one period of states from an orbit, shifted by `shift` firings."""
+    """Return the largest distance of one period of states from an orbit, shifted by `shift` firings.
+
+    Arrays as for `has_settled`; the distance is divided by the half-widths.
+    """
     count = orbit.shape[0]
     begin = states.shape[0] % count + block * count
     gap = 0.0
@@ -264,7 +289,10 @@ def gap_at(states: Any, scales: Any, orbit: Any, block: int, shift: int) -> floa
 
 
 def is_approaching(states: Any, scales: Any, orbit: Any, lies_on: float) -> bool:
-    """Whether states lie on an orbit or approach it; see `printhammer.chaos.orbits.settled`."""
+    """Whether states lie on an orbit or approach it; see `printhammer.chaos.orbits.settled`.
+
+    Arrays as for `has_settled`; `lies_on` is the distance, in half-widths, within which states lie on it.
+    """
     count = orbit.shape[0]
     blocks = states.shape[0] // count
     shift, least = 0, math.inf
@@ -277,22 +305,11 @@ def is_approaching(states: Any, scales: Any, orbit: Any, lies_on: float) -> bool
     for k in range(part):
         early += gap_at(states, scales, orbit, k, shift) / part
         late += gap_at(states, scales, orbit, blocks - part + k, shift) / part
-    begin, end = apart(states, scales, count, False), apart(states, scales, count, True)
+    plane = states[:, :2]
+    begin = mean_apart(plane, scales, count, count, False)
+    end = mean_apart(plane, scales, count, count, True)
     slower = min(1.0, math.sqrt(end / begin)) if begin > 0.0 else 0.0
     return late <= lies_on or (late <= NEAR and late < slower * early)
-
-
-def apart(states: Any, scales: Any, count: int, late: bool) -> float:
-    """Return the mean distance between states (x, v) `count` firings apart, late or early in the series."""
-    pairs = states.shape[0] - count
-    used = min(count * max(pairs // (4 * count), 1), pairs)
-    total = 0.0
-    for i in range(pairs - used if late else 0, pairs if late else used):
-        largest = 0.0
-        for k in range(2):
-            largest = max(largest, abs(states[i + count, k] / scales[k] - states[i, k] / scales[k]))
-        total += largest
-    return float(total / used)
 
 
 def is_planar(hammer: Any) -> int:
