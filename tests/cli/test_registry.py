@@ -37,7 +37,6 @@ LONG = {
     "curve",
     "orbits",
     "energy",
-    "dead-time",
     "feedback",
     "tune",
     "sweep",

@@ -164,7 +164,7 @@ int main(void) {{
             assert abs(fired[place] - exact).max() <= 0.5 + 1e-6
 
 
-def test_bad_axes_are_refused(tables: AxisTables) -> None:
+def test_bad_axes_are_refused(tables: AxisTables, behind_a_rail: ph.Hammer) -> None:
     hammer = ph.load("hendriks-1983-1")
     for axis, values, key in (
         ("weather", GAPS, "axis"),
@@ -175,6 +175,8 @@ def test_bad_axes_are_refused(tables: AxisTables) -> None:
     ):
         with refused(key):
             tune_along(hammer, axis, values, rate=RATE)
+    with refused("rail.waveform"):
+        tune_along(behind_a_rail, "rail", ["100 V", "130 V"], rate=RATE, largest_current="2 A")
     with refused("gap"):
         tables.at("30 um")
     with refused("budget"):
@@ -202,7 +204,6 @@ def test_between_two_rails_dots_are_those_of_the_design(behind_a_rail: ph.Hammer
         assert abs(late).max() < 15e-6
 
 
-@pytest.mark.slow
 def test_a_warm_coil_is_on_longer(behind_a_rail: ph.Hammer) -> None:
     tables = tune_along(
         behind_a_rail, "temperature", ["20 degC", "80 degC"], rate="600 Hz", history=1, reach=1
@@ -214,5 +215,3 @@ def test_a_warm_coil_is_on_longer(behind_a_rail: ph.Hammer) -> None:
     drive = tables.strategy(behind_a_rail, "50 degC")(driven, [(0, 1, 2)], 600.0)[0]
     for dot in ph.simulate(driven, drive).dots:
         assert dot.peak_force == pytest.approx(single.force, rel=0.05)
-    with refused("rail.waveform"):
-        tune_along(behind_a_rail, "rail", ["100 V", "130 V"], rate=RATE, largest_current="2 A")

@@ -217,7 +217,7 @@ def test_settings_of_the_command_line() -> None:
         (
             "magnet",
             {"sensor": {"resolution": {"force": "1 % of reading"}}},
-            "a resolution of reading",
+            "a resolution of reading: expected a resolution with a constant step",
         ),
         ("magnet", {"sensor": {"bandwidth": "1 kHz"}}, "expected this setting for records only"),
         ("magnet", {"sensor": {"outliers": 0.6}}, "outliers = 0.6: expected a fraction from 0 to 50 %"),

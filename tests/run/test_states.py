@@ -134,7 +134,7 @@ def test_a_period_includes_the_current() -> None:
     ],
 )
 def test_what_is_no_state_is_refused(state: tuple[float, ...], key: str) -> None:
-    with interpreted(), refused(key):
+    with refused(key):
         ph.simulate(on_a_rail(), ph.PulseTrain(DRIVERS[0]), state=state)
 
 
@@ -150,18 +150,17 @@ def test_a_current_in_a_state_needs_a_voltage() -> None:
 def test_members_under_a_voltage_are_single_runs_on_any_number_of_threads() -> None:
     hammer = on_a_rail()
     drives = [ph.PulseTrain(DRIVERS[0], rate=rate, pulses=3) for rate in (900.0, 1000.0, 1100.0)]
-    with interpreted():
-        ensemble = ph.Ensemble(hammer, drives, 4e-3, tolerance=1e-9)
-        alone, both = (ensemble.run(strobes="firings", threads=count).strobes for count in (1, 2))
-        assert alone is not None
-        assert both is not None
-        assert alone.current is not None
-        np.testing.assert_array_equal(alone.x, both.x)
-        np.testing.assert_array_equal(alone.current, both.current)
-        for member, drive in enumerate(drives):
-            motion = ensemble.motion(member)
-            assert alone.x[member].tolist() == motion.strobe[1].tolist()
-            assert alone.current[member].tolist() == [motion.state_at(t)[4] for t in drive.times.tolist()]
+    ensemble = ph.Ensemble(hammer, drives, 4e-3, tolerance=1e-9)
+    alone, both = (ensemble.run(strobes="firings", threads=count).strobes for count in (1, 2))
+    assert alone is not None
+    assert both is not None
+    assert alone.current is not None
+    np.testing.assert_array_equal(alone.x, both.x)
+    np.testing.assert_array_equal(alone.current, both.current)
+    for member, drive in enumerate(drives):
+        motion = ensemble.motion(member)
+        assert alone.x[member].tolist() == motion.strobe[1].tolist()
+        assert alone.current[member].tolist() == [motion.state_at(t)[4] for t in drive.times.tolist()]
     with refused("engine"):
         ensemble.run(engine="lanes")
 

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests import known_maps
+from tests.errors import refused
 from tests.known_maps import CUBIC, HENON, NAMES, SHIFT, UNITS, standing_in
 
 from printhammer.chaos.continuation.arclength import Steps
@@ -212,8 +213,9 @@ def test_a_curve_is_begun_at_any_of_its_points_from_a_file(tmp_path: Path) -> No
         for asked in (last + 1, "fold", -2):
             with pytest.raises(InputError, match=f"expected a point of the curve from 0 to {last}"):
                 start_of(path, asked, regime)
-        with pytest.raises(InputError, match="expected a regime"):
+        with refused("regime", file=path) as caught:
             start_of(path, 0, None)
+        assert "expected a regime (hammer and drive) in addition to the file" in str(caught.value)
         other = dataclasses.replace(regime, hammer=regime.hammer.replace("mass", 2.0))
         with pytest.raises(InputError, match="hammer_fingerprint = "):
             start_of(path, 0, other)

@@ -152,7 +152,6 @@ def test_a_search_that_finds_nothing_says_so(hammer: ph.Hammer) -> None:
     assert len(found.to_dataset()["orbit"]) == 0
 
 
-@pytest.mark.slow
 @pytest.mark.golden
 def test_branches_lead_to_orbits_that_no_motion_comes_close_to() -> None:
     # Saddles with multipliers of 89 and -4, partners in a fold, and one of period 2 between them with -315.

@@ -64,7 +64,10 @@ def test_a_curve_from_the_file_of_a_branch(cli: Callable, tmp_path: Path, ball: 
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (("--event", "Neimark-Sacker"), "the events of the branch are"),
+        (
+            ("--event", "Neimark-Sacker"),
+            "event = Neimark-Sacker: no such event; the events of the branch are:",
+        ),
         (("--event", "sausage"), "expected a number"),
         (("--event", "99"), "expected the number of one of"),
     ],

@@ -80,9 +80,12 @@ def test_results_of_another_spec_are_refused(cli, spec: Path, tmp_path: Path) ->
     spec.write_text(SPEC.replace("8 mil", "8.1 mil"), "utf-8")
     outcome = cli("sweep", spec, "--out", out)
     assert outcome.status == 2
-    assert "spec fingerprint" in outcome.err
+    assert f"{out}: the store was written with spec fingerprint" in outcome.err
+    assert "or another folder for the results" in outcome.err
     spec.write_text("tolerance = 1e-9" + SPEC, "utf-8")
-    assert "tolerance 2e-11" in cli("sweep", spec, "--out", out).err
+    outcome = cli("sweep", spec, "--out", out)
+    assert outcome.status == 2
+    assert f"{out}: the store was written with tolerance 2e-11: expected 1e-09, or another" in outcome.err
     assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
 
 
