@@ -15,7 +15,7 @@ from tests.studio.reading import STATE, node
 import printhammer as ph
 from printhammer.drive.file import read_drive
 from printhammer.drive.waveforms.shapes import SHAPES, Sampled
-from printhammer.studio import Shelf
+from printhammer.studio import Shelf, live
 from printhammer.studio.controls import fields_of
 from printhammer.studio.launch import FORMAT, KIND
 from printhammer.support.tables.readings import read_table
@@ -104,6 +104,16 @@ def test_a_drive_is_written_as_python_writes_it_and_read_again(
     assert (patch["pattern"], patch.get("pulses", 9)) == (state["pattern"], 9)
     assert patch["rate"] == pytest.approx(state["rate"], rel=1e-12)
     assert read_drive(ask("write", {**state, **patch})["found"]).waveform == drive.waveform
+
+
+def test_a_driver_without_a_decay_has_the_first_of_pythons(monkeypatch: pytest.MonkeyPatch) -> None:
+    rail = "format = 1\n[train]\nrate = '1 kHz'\n[waveform]\nshape = 'rail'\n"
+    rail += "voltage = '40 V'\nwidth = '300 us'\n"
+    for decays in (live.DECAYS, ("zener", "diode", "rail")):
+        monkeypatch.setattr(live, "DECAYS", decays)
+        with node("engine/files.js", ASKED, Shelf(ph.load(NAME), only=True)) as asked:
+            assert asked("drive", rail)["found"]["waveform"]["decay"] == decays[0]
+    assert fields_of(read_drive(rail).waveform)["decay"] == "diode"
 
 
 def test_a_sinusoidal_force_is_written_and_read_again(ask: Any) -> None:

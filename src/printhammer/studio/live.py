@@ -13,10 +13,10 @@ import math
 import struct
 from base64 import b64decode, b64encode
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any, Final, get_args
+from typing import TYPE_CHECKING, Any, Final
 
 from printhammer import __version__
-from printhammer.drive.waveforms.drivers import Rail
+from printhammer.drive.waveforms.drivers import DECAYS
 from printhammer.drive.waveforms.shapes import SHAPES, Sine
 from printhammer.errors import InputError
 from printhammer.run.energy import Ledger
@@ -171,7 +171,7 @@ def _limits() -> dict[str, Any]:
     named["ENERGIES"] = [field.name for field in fields(Ledger)]
     named["LINE"] = _line()
     named |= {"DISPLAY_TOLERANCE": DISPLAY_TOLERANCE, "TOLERANCE": TOLERANCE, "REFUSALS": REFUSALS}
-    named["DECAYS"] = get_args(Rail.model_fields["decay"].annotation)
+    named["DECAYS"] = DECAYS
     return named
 
 

@@ -8,7 +8,6 @@ const TIMING = { train: ["rate", "period", "pulses", "start"], times: ["at", "st
 const SINE = ["amplitude", "frequency", "phase"];
 const OTHER = ["burst", "sequence"]; // kinds of a drive that a state does not hold
 const CLOSE = 1e-9; // of a slot, within which a firing lies on it
-const DECAYS = ["diode", "zener", "rail"];
 // One number and one unit, as in printhammer/units.py: without the arithmetic that may be typed in the page.
 const AMOUNT = String.raw`[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?`;
 const FACTOR = String.raw`(?:[A-Za-z\u00b5\u03bc%\u00b0]+|1)(?:\s*\^\s*(?:[-+]?\d{1,2}(?:\.\d{1,4})?|\(\s*[-+]?\d{1,2}(?:\/[1-9]\d?)?\s*\)))?`;
@@ -152,7 +151,7 @@ export function waveformOf(table, shelf) {
     const [quantity] = driven;
     return { shape, times: columnOf(table.time, ["s"], "waveform.time"), values: columnOf(table[quantity], [DRIVEN[quantity]], `waveform.${quantity}`), quantity };
   }
-  const { voltages } = shelf.limits.WAVEFORMS[shape];
+  const { WAVEFORMS: { [shape]: { voltages } }, DECAYS } = shelf.limits;
   const isDriver = drivers.includes(shape);
   onlyOf(table, ["shape", ...shapes[shape].map(({ name }) => name), ...(isDriver ? ["decay"] : [])], "waveform");
   const made = { shape, ...(isDriver ? { decay: table.decay ?? DECAYS[0] } : {}), quantity: isDriver ? "voltage" : "current" };
