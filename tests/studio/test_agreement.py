@@ -1,7 +1,8 @@
 """Random states of the shipped hammers: the page computes what Python computes, as long as rounding allows.
 
 Two runs whose masses differ by rounding drift apart. Up to the time at which they differ by more than 5e-13
-of their range, the horizon of predictability, dots, forces and energies have to agree to 1e-9.
+of their range, the horizon of predictability, dots and energies have to agree to 1e-9, and curves to single
+precision.
 """
 
 import math
@@ -26,8 +27,11 @@ from printhammer.studio.coil import open_constants
 from printhammer.studio.controls import describe
 
 NUDGE, DRIFT, AGREES = 5e-16, 5e-13, 1e-9
+SINGLE, ASIDE = 1e-7, 1e-14
+"""Rounding to single precision, and time by which rounding may move the end of a step, s."""
 NAME = "hendriks-1983-1"
 LENGTHS = {"indentation": 1e-15}
+THROUGHPUT = 1e-4  # Rounding moves the ends of steps, on which the sum of the works of all steps depends
 WORKS = ("loading_work", "net_loss")
 FIELDS = ("flight_time", "impact_speed", "peak_force", "indentation", "contact_time", *WORKS)
 
@@ -98,6 +102,48 @@ def horizon_of(motion: Motion, other: Motion) -> float:
     return float(times[np.argmax(apart)]) if apart.any() else math.inf
 
 
+def check_curves(motion: Motion, curve: State, horizon: float) -> None:
+    """Compare the curves of a run with those of a page, which have single precision, up to a time."""
+    data = curve["data"]
+    t = data["t"][data["t"] <= min(horizon, motion.end)]
+    assert t.size > 1
+    places, speeds, drive, _, forces = motion.curves_at(t)
+    for name, expected in {"x": places, "v": speeds, "drive": drive}.items():
+        np.testing.assert_allclose(
+            data[name][: t.size], expected, rtol=0, atol=SINGLE * np.abs(expected).max()
+        )
+    # A force that jumps at the end of a step may have jumped or not: rounding moves the ends.
+    sides = [motion.curves_at(np.clip(t + aside, 0.0, motion.end))[4] for aside in (0.0, -ASIDE, ASIDE)]
+    named = {name for name in data if name.startswith("F ")}
+    assert named >= {f"F {name}" for name in forces if np.any(forces[name])}
+    for name in sorted(named):
+        own = [side[name.removeprefix("F ")] for side in sides]
+        error = np.min(np.abs(data[name][: t.size] - own), axis=0)
+        assert error.max() <= SINGLE * np.abs(own[0]).max(), name
+
+
+def check_dots_before(motion: Motion, shown: State, horizon: float) -> int:
+    """Compare the dots of a run that end before a time; return their number."""
+    # That a dot is lost is known at the end of the run alone.
+    ends = [
+        dot.fired_at + (dot.flight_time or 0.0) + (dot.contact_time or 0.0) if dot.struck else motion.end
+        for dot in motion.dots
+    ]
+    before = next((k for k, end in enumerate(ends) if end >= horizon), len(ends))
+    page = shown["dots"] if math.isinf(horizon) else shown["dots"][:before]
+    for dot, own in zip(motion.dots[:before], page, strict=True):
+        assert own["struck"] == dot.struck
+        for name in FIELDS:
+            expected = getattr(dot, name)
+            assert (own[name] is None) == (expected is None), name
+            if expected is not None:
+                # A net loss is a difference of works, an indentation one of places.
+                scale = max(abs(expected), abs(dot.loading_work or 0.0) if name in WORKS else 0.0)
+                within = AGREES * scale + LENGTHS.get(name, 0.0)
+                assert own[name] == pytest.approx(expected, rel=0.0, abs=within), name
+    return before
+
+
 def check_state(engine: Engine, state: State) -> str:
     """Compare the curves and dots of a state; return what could be compared."""
     frames = engine.work("curves", state)
@@ -108,33 +154,18 @@ def check_state(engine: Engine, state: State) -> str:
     motion = run_of(state)
     horizon = horizon_of(motion, run_of(state, NUDGE))
     curve, shown = frames
-    if math.isinf(horizon):
-        assert (curve["status"], curve["steps"]) == (motion.status, motion.steps)
-    before = 0
-    for dot, own in zip(motion.dots, shown["dots"], strict=math.isinf(horizon)):
-        fired = dot.fired_at + (dot.flight_time or 0.0) + (dot.contact_time or 0.0)
-        if fired >= horizon or (not dot.struck and not math.isinf(horizon)):
-            break
-        before += 1
-        assert own["struck"] == dot.struck
-        for name in FIELDS:
-            expected = getattr(dot, name)
-            assert (own[name] is None) == (expected is None), name
-            if expected is not None:
-                # A net loss is a difference of works, an indentation one of places.
-                scale = max(abs(expected), abs(dot.loading_work or 0.0) if name in WORKS else 0.0)
-                within = AGREES * scale + LENGTHS.get(name, 0.0)
-                assert own[name] == pytest.approx(expected, rel=0.0, abs=within), name
-    if math.isinf(horizon):
-        ledger = motion.energy
-        for name, value in shown["energy"].items():
-            expected = getattr(ledger, name)
-            scale = max(abs(expected), 1e-3 * abs(ledger.throughput))
-            # Rounding moves the ends of steps, on which the sum of the works of all steps depends.
-            within = (1e-4 if name == "throughput" else AGREES) * scale
-            assert value == pytest.approx(expected, rel=0.0, abs=within), name
-        return "whole"
-    return f"{before} dots"
+    check_curves(motion, curve, horizon)
+    before = check_dots_before(motion, shown, horizon)
+    if math.isfinite(horizon):
+        return f"{before} dots"
+    assert (curve["status"], curve["steps"]) == (motion.status, motion.steps)
+    ledger = motion.energy
+    for name, value in shown["energy"].items():
+        expected = getattr(ledger, name)
+        scale = max(abs(expected), 1e-3 * abs(ledger.throughput))
+        within = (THROUGHPUT if name == "throughput" else AGREES) * scale
+        assert value == pytest.approx(expected, rel=0.0, abs=within), name
+    return "whole"
 
 
 def test_the_page_computes_what_python_computes(tmp_path: Path) -> None:
@@ -143,8 +174,9 @@ def test_the_page_computes_what_python_computes(tmp_path: Path) -> None:
     few = [ph.load(name) for name in ("duffing-holmes", NAME)]
     with Engine(Shelf(*few, only=True), tmp_path) as engine:
         for hammer in few:
-            done = [check_state(engine, random_state(hammer.name, rng)) for _ in range(3)]
-            assert "whole" in done
+            done = [check_state(engine, random_state(hammer.name, rng)) for _ in range(6)]
+            assert "refused" not in done
+            assert done.count("whole") >= 3
 
 
 def check_dots(engine: Engine, wave: dict[str, Any]) -> None:
