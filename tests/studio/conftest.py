@@ -1,6 +1,7 @@
 """Tests in a browser: run where a Chromium is found; where none is, they are left out and that is said."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from tests.studio.browser import Page, browser, chromium
 from printhammer.hammer.hammer import load
 from printhammer.studio import Shelf, live_page
 from printhammer.studio.bundle import page_files
+from printhammer.studio.live import VIEWS
 
 NEEDS = "opened_browser"
 HAMMERS = ("hendriks-1983-1", "hendriks-1983", "bouncing-ball", "duffing-holmes")
@@ -45,9 +47,9 @@ def opened_browser() -> Iterator[Any]:
         yield tab
 
 
-@pytest.fixture
-def page(address: str, opened_browser: Any) -> Iterator[Page]:
-    """The page with all views; nothing but the file itself is asked for."""
+@contextmanager
+def visited(address: str, opened_browser: Any) -> Iterator[Page]:
+    """Open a page; nothing but the file itself is asked for."""
     opened = opened_browser()
     opened.size(1280, 720)
     opened.open(address)
@@ -55,6 +57,20 @@ def page(address: str, opened_browser: Any) -> Iterator[Page]:
     yield opened
     assert [place for place in opened.requests if not place.startswith(("blob:", "file:", "data:"))] == []
     opened.call("Page.close")
+
+
+@pytest.fixture
+def page(address: str, opened_browser: Any) -> Iterator[Page]:
+    """The page as it opens, with four views."""
+    with visited(address, opened_browser) as opened:
+        yield opened
+
+
+@pytest.fixture
+def whole_page(address: str, opened_browser: Any) -> Iterator[Page]:
+    """The page with all views."""
+    with visited(f"{address}#views={'-'.join(VIEWS)}", opened_browser) as opened:
+        yield opened
 
 
 @pytest.fixture(scope="session")

@@ -1,6 +1,7 @@
 """The studio end to end, in a headless Chromium."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ from tests.studio.browser import Page
 
 import printhammer as ph
 from printhammer.studio import bounds
+from printhammer.studio.live import VIEWS
 
 CTRL, SHIFT = 2, 8
 AXE = Path(__file__).parent / "vendor" / "axe.min.js"
@@ -16,7 +18,11 @@ STATE = "window.studio.studio.store.state"
 HELPERS = (Path(__file__).parent / "helpers.js").read_text("utf-8")
 PAINTED = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))"
 FRAMES = {"line": "line", "strobe": "strobe", "map": "map"}
-VIEWS = ("motion", "sketch", "map", "forces", "phase", "strobe", "loops", "energy", "line")
+
+
+@pytest.fixture
+def page(whole_page: Page) -> Page:
+    return whole_page
 
 
 def state(page: Page) -> dict[str, Any]:
@@ -44,6 +50,90 @@ def saved(page: Page, selector: str, value: str) -> str:
     """Choose an export and return the text that would be saved."""
     page.run(f"helpers.save({selector!r}, {value!r})")
     return page.wait("window.kept")
+
+
+@pytest.mark.slow
+def test_a_visit(page: Page) -> None:
+    """Look, drag, click the map, pin, undo, reload, drop, export; no complaint."""
+    page.run(HELPERS)
+    for view in VIEWS:
+        page.wait(f"window.studio.studio.frames[{FRAMES.get(view, 'dots')!r}]")
+        page.run(PAINTED)
+        assert inked(page, view) > 3, view
+
+    # Drag a slider.
+    box = page.box("[data-key='forms thickness']")
+    middle = box["y"] + box["height"] / 2
+    page.drag(*((box["x"] + part * box["width"], middle) for part in (0.5, 0.55, 0.62, 0.7)))
+    settled(page, "state.constants['pack.thickness'] > 0")
+    constants = state(page)["constants"]
+    hammer = ph.load("hendriks-1983-1")
+    assert constants["pack.thickness"] > hammer.pack.thickness
+    assert constants["pack.thickness"] + constants["pack.front"] == pytest.approx(hammer.platen)
+    places = page.run("window.studio.studio.frames.motion.places")
+    assert places["front"] == pytest.approx(constants["pack.front"])
+
+    # Click the map: every view follows.
+    before = state(page)["rate"]
+    box = page.box(".view-map canvas")
+    page.drag((box["x"] + 0.5 * box["width"], box["y"] + 0.25 * box["height"]))
+    settled(page, f"state.rate !== {before}")
+    rate = state(page)["rate"]
+    assert 1400.0 < rate < 2000.0
+    fired = page.run("window.studio.studio.frames.motion.fired")
+    assert fired[1] - fired[0] == pytest.approx(1.0 / rate)
+    page.wait(f"window.studio.studio.frames.strobe?.rate === {rate}")
+
+    # Pin, then undo and redo.
+    page.run("document.querySelector('.pin').click()")
+    assert page.run("window.studio.studio.ghosts.length") == 1
+    page.run("document.querySelector('.grid').focus(); document.body.focus()")
+    page.run("document.querySelector('.undo').click()")
+    settled(page, f"state.rate === {before}")
+    page.run("document.querySelector('.undo').click()")
+    settled(page, "Object.keys(state.constants).length === 0")
+    page.run("document.querySelector('.redo').click()")
+    page.run("document.querySelector('.redo').click()")
+    settled(page, f"state.rate === {rate}")
+    kept = state(page)
+
+    # Reload from the address, in which the rate was before the pin.
+    page.wait(f"location.hash.includes('rate={rate:g}') && location.hash.includes('pins=')")
+    page.call("Page.reload")
+    page.wait("window.studio?.studio?.frames.map?.detail === 'full'")
+    assert state(page) == kept
+    page.run(HELPERS)
+
+    # Drop a hammer, a measured curve, and something else.
+    drop(page, "other.toml", hammer.replace("mass", 1.1 * hammer.mass).to_toml())
+    settled(page, "state.text.length > 100")
+    drop(page, "measured.csv", "time [us],displacement [um]\n0,50\n200,180\n400,60\n")
+    page.wait("window.studio.studio.overlay?.name === 'measured.csv'")
+    drop(page, "letter.txt", "Dear Sir")
+    page.wait("document.querySelector('.status').classList.contains('bad')")
+    page.run("document.querySelector('.undo').click()")
+    page.run("document.querySelector('.undo').click()")
+    settled(page, "state.text === ''")
+
+    # Everything leaves.
+    assert ph.Hammer.from_toml(saved(page, "select.out", "hammer, TOML")).pack.thickness == pytest.approx(
+        kept["constants"]["pack.thickness"]
+    )
+    assert "[train]" in saved(page, "select.out", "drive, TOML")
+    page.wait("window.studio.studio.frames.strobe?.data.x && window.studio.studio.frames.line?.data.x")
+    assert saved(page, ".view-line .leave", "CSV").startswith(
+        "wanted_x [m],wanted_y [m],x [m],y [m],darkness"
+    )
+    for view in VIEWS:
+        page.wait(f"window.studio.studio.views['{view}'].table()")
+        leave = f".view-{view} .leave"
+        assert saved(page, leave, "CSV").count("\n") >= 9, view
+        picture = saved(page, leave, "SVG")
+        assert picture.startswith("<svg"), view
+        assert picture.count("<path") > 3, view
+        assert "NaN" not in re.sub(r'href="data:[^"]*"', "", picture), view
+        assert "PNG" in saved(page, leave, "PNG")[:8], view
+    assert page.complaints == []
 
 
 @pytest.mark.slow

@@ -8,11 +8,23 @@ from typing import Any
 import pytest
 from tests.studio.browser import Page
 
+from printhammer.studio.live import VIEWS
+
 HELPERS = (Path(__file__).parent / "helpers.js").read_text("utf-8")
-RATIOS = (1.0, 1.25, 2.0)
-SIZES = ((1440, 900), (1024, 768), (390, 844))
+RATIOS = (1.0, 1.25, 1.5, 2.0)
+SIZES = ((1440, 900), (1280, 720), (1024, 768), (670, 900), (390, 844))
 DRAWN = "new Promise((done) => setTimeout(() => requestAnimationFrame(done), 280))"
 """Waits until a new size is drawn, and captions are written."""
+COMPLETE = (
+    "(({ busy, stale, frames, store }) => !busy && !stale"
+    " && (!store.state.views.includes('map') || frames.map.detail === 'full'))(window.studio.studio)"
+)
+"""The state is shown, and its map where one is."""
+
+
+@pytest.fixture
+def page(whole_page: Page) -> Page:
+    return whole_page
 
 
 def resized(page: Page, width: int, height: int, ratio: float) -> None:
@@ -43,7 +55,7 @@ def test_nothing_is_cut_or_overlaps(page: Page, tmp_path: Path, ratio: float) ->
         assert page.run("helpers.drawn()") == [], (width, ratio)
     for story in range(6):
         page.run(f"document.querySelectorAll('.story')[{story}].click()")
-        page.wait("!window.studio.studio.busy && !window.studio.studio.stale")
+        page.wait(COMPLETE)
         page.run(DRAWN)
         assert page.run("helpers.drawn()") == [], (story, ratio)
     page.run("for (const part of document.querySelectorAll('details')) part.open = true")
@@ -58,7 +70,7 @@ def test_nothing_is_cut_or_overlaps(page: Page, tmp_path: Path, ratio: float) ->
 def test_a_picture_is_the_same_at_every_pixel_ratio(page: Page, tmp_path: Path) -> None:
     import numpy as np
 
-    for view in ("motion", "map", "line"):
+    for view in ("motion", "forces", "map", "phase", "line"):
         seen = []
         for ratio in RATIOS:
             resized(page, 1440, 900, ratio)
@@ -69,7 +81,7 @@ def test_a_picture_is_the_same_at_every_pixel_ratio(page: Page, tmp_path: Path) 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("width", [1024, 670])
+@pytest.mark.parametrize("width", [1024, 670, 390])
 def test_views_stack_on_small_screens(page: Page, width: int) -> None:
     resized(page, width, 800, 1.0)
     boxes = page.run(
@@ -80,6 +92,23 @@ def test_views_stack_on_small_screens(page: Page, width: int) -> None:
     assert all(box["width"] > 0.65 * width for box in boxes)
     tops = sorted((box["top"], box["bottom"]) for box in boxes)
     assert all(upper[1] <= lower[0] for upper, lower in itertools.pairwise(tops))
+    assert len(boxes) == len(VIEWS)
+    assert page.run("document.documentElement.scrollHeight > 2000")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("width", "height"), [(1280, 720), (1920, 1080), (2560, 1080)])
+def test_everything_fits_on_the_screen(page: Page, width: int, height: int) -> None:
+    page.size(width, height)
+    page.wait(f"innerWidth === {width}")
+    size = page.run("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
+    assert size == [width, height]
+    for view in VIEWS:
+        box = page.box(f".view-{view}")
+        assert box["width"] > 250, view
+        assert box["height"] > 180, view
+        assert box["x"] + box["width"] <= width
+        assert box["y"] + box["height"] <= height
 
 
 @pytest.mark.slow
@@ -102,7 +131,7 @@ def test_forced_colours_leave_everything_to_be_seen(page: Page, tmp_path: Path) 
     page.run(HELPERS)
     page.run(DRAWN)
     page.picture(tmp_path / "forced.png")
-    for view in ("motion", "map", "line"):
+    for view in ("motion", "forces", "phase", "map", "line"):
         assert page.run(f"helpers.inked({view!r})") > 3, view
     colours = (
         "((each) => { const style = getComputedStyle(each); return [style.backgroundColor, style.color]; })"

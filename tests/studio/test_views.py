@@ -142,6 +142,11 @@ def test_a_state_that_follows_another_is_marked_while_it_takes_long(page: Page) 
     )
     page.wait("window.held.length === 1")
     page.wait("document.querySelector('.view-motion.outdated') !== null")
+    seen = "getComputedStyle(document.querySelector('.view-motion .body > *')).opacity"
+    assert float(page.run(seen)) < 0.5
+    said = "getComputedStyle(document.querySelector('.view-motion'), '::after')"
+    assert "for what is set now" in page.run(f"{said}.content")
+    assert page.run(f"{said}.display") != "none"
     assert page.run(f"{STUDIO}.frames.motion.fired[1]") == pytest.approx(1 / 900)
     page.run("window.held[0](); 1")
     page.wait("!document.querySelector('.view-motion.outdated')")
