@@ -168,6 +168,7 @@ def check_state(engine: Engine, state: State) -> str:
     return "whole"
 
 
+@pytest.mark.slow
 def test_the_page_computes_what_python_computes(tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
     # The first has no coil, so that two modules are linked and not four.

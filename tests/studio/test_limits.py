@@ -11,6 +11,8 @@ from tests.studio.test_live import NAME
 import printhammer as ph
 from printhammer.studio import Shelf, bounds
 
+pytestmark = pytest.mark.slow  # linking needs the extra `page`
+
 LIMITS = {"MOST_STEPS": 200, "MOST_MAP_STEPS": 400, "MOST_SECTION_STEPS": 2000}
 SET = {**STATE, "hammer": NAME, "pulses": 9}
 

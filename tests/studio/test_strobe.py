@@ -30,6 +30,7 @@ def judged(engine: Engine, rate: float, **changed: Any) -> list[dict[str, Any]]:
     return engine.work("section", state, counts=COUNTS, judged=JUDGED)
 
 
+@pytest.mark.slow
 def test_points_and_exponent_before_the_class_are_those_of_the_library(engine: Engine) -> None:
     state = {**STATE, "hammer": NAME, "rate": 1000.0}
     frames = engine.work("section", state, counts=[25, 60, 150], judged=None)
