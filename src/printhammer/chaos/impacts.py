@@ -188,7 +188,7 @@ def sections(
 def _counts(
     touches: SupportsIndex, transient: SupportsIndex, firings: SupportsIndex | None
 ) -> tuple[int, int, int]:
-    """Validate the numbers of touches and discarded firings; return both, and the firing limit."""
+    """Validate the counts of touches, transient firings and maximum firings; return them as integers."""
     wanted, skipped = read_count(touches, "touches"), read_count(transient, "transient", least=0)
     room = MOST_PULSES - skipped - 1
     limit = min(_FIRINGS_A_TOUCH * wanted, room) if firings is None else read_count(firings, "firings")
@@ -246,7 +246,7 @@ BINS: Final = 60
 LAGS: Final = 40
 """Default for the largest lag of the autocorrelation; at most a quarter of the number of intervals."""
 
-_FEWEST: Final = 8  # Smallest number of intervals of a train
+_FEWEST: Final = 8  # Smallest number of intervals for the statistics of a train
 _SAME: Final = 1e-9
 """Relative difference below which all intervals are equal, so that their autocorrelation is undefined."""
 
@@ -357,7 +357,7 @@ def impact_train(
     lags : int, optional
         Largest lag of the autocorrelation, clipped to a quarter of the intervals.
     **firing
-        How a hammer is fired, as for `printhammer.Regime.of`.
+        Firing of the hammer: period or rate, waveform and drive, as for `printhammer.Regime.of`.
 
     Returns
     -------
@@ -402,7 +402,7 @@ def impact_train(
 
 
 def autocorrelation(series: FloatArray, longest: int) -> FloatArray:
-    """Compute the autocorrelation of a series at the lags from 0 to `longest`.
+    """Compute the autocorrelation of a series for the lags from 0 to `longest`.
 
     The sums of the products of deviations are divided by the sum at lag 0 (G. E. P. Box and G. M. Jenkins,
     Time Series Analysis, 1970, section 2.1.5). NaN if the numbers differ by no more than 1e-9 of the largest.
@@ -416,14 +416,14 @@ def autocorrelation(series: FloatArray, longest: int) -> FloatArray:
 
 
 def _range(intervals: FloatArray) -> tuple[float, float]:
-    """Return the range of the interval histogram, s, at least a thousandth of the mean interval wide."""
+    """Return the range of the bins of the interval histogram, s; at least 0.001 of the mean interval wide."""
     low, high = float(intervals.min()), float(intervals.max())
     room = max(0.0, 0.5 * (1e-3 * float(intervals.mean()) - (high - low)))
     return low - room, high + room
 
 
 def _fano(times: FloatArray, length: float) -> tuple[int, float]:
-    """Return the number of windows of a given length, s, and the Fano factor of the impacts per window."""
+    """Count windows of a given length, s; return their number and the Fano factor of the impacts in them."""
     # Windows start half an interval before the first impact, so that impacts of a clock avoid the edges.
     begin = times[0] - 0.5 * (times[-1] - times[0]) / (len(times) - 1)
     windows = int((times[-1] - begin) // length)

@@ -363,9 +363,9 @@ def _highest(grid: FloatArray, x: FloatArray, after: FloatArray) -> tuple[FloatA
 
 
 def _top(t: FloatArray, x: FloatArray, v: FloatArray) -> FloatArray:
-    """Interpolate the highest maximum of each motion from samples of displacement and velocity, shape (M,).
+    """Interpolate the highest local maximum of each sampled motion, m, shape (M,); NaN without a maximum.
 
-    NaN without such a crossing. The velocity is interpolated linearly between samples, shape (M, T).
+    The velocity, shape (M, T), is taken as linear between samples.
     """
     falls = (v[:, :-1] > 0.0) & (v[:, 1:] <= 0.0)
     drop = np.where(falls, v[:, :-1] - v[:, 1:], 1.0)

@@ -29,10 +29,10 @@ FIRINGS: Final = 1000
 """Default number of firings per train of a bifurcation diagram."""
 
 _JUDGED: Final = 200
-"""Default number of recorded firings per train: the firings after the transient."""
+"""Default number of recorded firings per train, counted from the end of the transient."""
 
 REFINE: Final = 2
-"""Default number of times to halve the parameter step between neighbours that differ."""
+"""Default number of times to halve the parameter step where neighbouring trains differ."""
 
 MOST_STATES: Final = 100_000_000
 """Largest number of states in a diagram; a larger diagram raises `InputError`."""
@@ -102,7 +102,7 @@ def bifurcation(
         Whether to compute the exponents of aperiodic trains, which separate strange from undecided trains;
         this takes many times as long.
     **firing
-        How the hammer is fired, as for `printhammer.Regime.of`; period or rate only if another parameter
+        Firing of the hammer, as for `printhammer.Regime.of`; period or rate only if another parameter
         varies.
 
     Returns
@@ -152,7 +152,7 @@ def bifurcation(
 
 
 def _result(builder: DiagramBuilder) -> Bifurcation:
-    """Build the diagram from the trains computed before the end or an interrupt."""
+    """Build the diagram from the trains finished at the end or at an interrupt."""
     order = np.argsort(builder.values, kind="stable")
     rows = (len(builder.ways) * order + np.arange(len(builder.ways))[:, np.newaxis]).astype(np.int64)
     table = builder.table

@@ -1,4 +1,4 @@
-"""Construction of a bifurcation diagram: trains at a grid of values, refined values, Lyapunov exponents.
+"""Construction of a bifurcation diagram: trains at a parameter grid, refinement, Lyapunov exponents.
 
 The final state at one value of the parameter is the initial state at the next value.
 
@@ -54,10 +54,10 @@ STRAND: Final = 16
 """Number of successive parameter values in a strand; strands are computed in parallel."""
 
 SAME: Final = 1e-3
-"""Largest distance between periodic orbits that count as the same, in half-widths of the strobe window."""
+"""Largest distance between two periodic orbits on the same attractor, in half-widths of the window."""
 
 _SHIFTED: Final = 0.5
-"""Largest difference of the means of two point sets on the same attractor, in standard deviations."""
+"""Largest difference of the means of two point sets on one attractor, in standard deviations; arbitrary."""
 
 
 @dataclass
@@ -67,7 +67,7 @@ class Strand:
     rows: list[int]
     """Row indices in the table of all trains; each train starts in the final state of the preceding row."""
     before: int
-    """Index of the strand whose last parameter value precedes this strand; -1 for the first strand."""
+    """Index of the preceding strand, whose last train this strand continues; -1 for the first strand."""
 
 
 @dataclass
@@ -75,7 +75,7 @@ class Trains:
     """Table of all trains of a diagram: their regimes and the results of their runs."""
 
     regimes: list[Regime]
-    """Regime of each train, in the order of the rows."""
+    """Regime of each train, in row order."""
     columns: Columns
     """States of the trains at the recorded firings."""
     cycles: Any
@@ -88,7 +88,7 @@ class Trains:
 
 
 def strands_of(rows: Sequence[int], first: int) -> list[Strand]:
-    """Divide rows of successive trains into strands of `STRAND` trains, numbered from `first`."""
+    """Divide rows of successive trains into strands of `STRAND` trains; `first` numbers the first strand."""
     cut = [list(rows[k : k + STRAND]) for k in range(0, len(rows), STRAND)]
     return [Strand(part, first + k - 1 if k else -1) for k, part in enumerate(cut)]
 
@@ -100,7 +100,7 @@ def carry(
     run: Callable[[list[int], FloatArray], None],
     trial: Callable[[list[int], FloatArray], tuple[Columns, Any, Any]],
 ) -> None:
-    """Run all strands in parallel; then rerun trains until every strand continues the preceding strand.
+    """Run all strands in parallel; then rerun trains until every strand continues its predecessor.
 
     `start` is the initial state of a strand. `run` runs the trains of selected rows from given states and
     stores the results in the table; `trial` returns the results instead: columns, periods, distances.
@@ -140,7 +140,7 @@ def carry(
 
 
 def is_same_attractor(table: Trains, row: int, columns: Columns, place: int, cycle: int) -> bool:
-    """Whether a train that was run again reached the same attractor as before.
+    """Whether a train that was run again reached the same attractor as its first run.
 
     Two periodic trains are on the same attractor if their orbits agree within `SAME`, two aperiodic trains if
     the means of their points differ by at most half of their standard deviations, and two trains whose runs
@@ -167,7 +167,7 @@ JUMP: Final = 0.2
 
 @dataclass
 class DiagramBuilder:
-    """Builder of a bifurcation diagram; trains are numbered in order of creation, by value and direction."""
+    """Builder of a bifurcation diagram; one table row per parameter value and direction."""
 
     regime: Regime
     name: str
@@ -185,7 +185,7 @@ class DiagramBuilder:
         self.done = self.known = 0
 
     def add(self, values: FloatArray, level: int) -> list[int]:
-        """Add trains at new values of the parameter; return the indices of these values."""
+        """Add table rows for trains at new parameter values; return the indices of the new values."""
         first = len(self.values)
         regimes = [self.regime.with_(self.name, value) for value in values.tolist()]
         every = [regime for regime in regimes for _way in self.ways]
@@ -207,11 +207,11 @@ class DiagramBuilder:
         return list(range(first, len(self.values)))
 
     def rows(self, places: Sequence[int], way: int) -> list[int]:
-        """Return the table rows of the trains, in one direction, at the parameter values of given indices."""
+        """Return the table rows of the trains at given value indices, in the direction with index `way`."""
         return [len(self.ways) * place + way for place in places]
 
     def base(self, grid: FloatArray) -> None:
-        """Run the trains at the parameter values of `grid`."""
+        """Add and run the trains at the parameter values of `grid`, in all directions."""
         places = self.add(grid, 0)
         if self.ways == ("from rest",):
             self.run(places, np.array([state_or_rest(self.table.regimes[row], self.begin) for row in places]))
@@ -223,7 +223,7 @@ class DiagramBuilder:
         carry(self.table, strands, self.begin, self.run, self.trial)
 
     def refine(self, level: int) -> None:
-        """Run trains half-way between neighbouring parameter values whose trains differ."""
+        """Add and run trains midway between neighbouring parameter values whose trains differ."""
         order = np.argsort(self.values, kind="stable").tolist()
         pairs = [pair for pair in itertools.pairwise(order) if self.is_different(*pair)]
         middles = [0.5 * (self.values[low] + self.values[high]) for low, high in pairs]
@@ -246,7 +246,7 @@ class DiagramBuilder:
         self.run(rows, np.array(states))
 
     def is_different(self, place: int, neighbour: int) -> bool:
-        """Whether trains at two parameter values differ in status or period, or by a jump of the orbit."""
+        """Whether trains at two parameter values differ in status, period, or by more than `JUMP`."""
         table = self.table
         for way in range(len(self.ways)):
             a, b = self.rows([place, neighbour], way)
@@ -264,7 +264,7 @@ class DiagramBuilder:
         return False
 
     def trial(self, rows: Sequence[int], states: FloatArray) -> tuple[Any, Any, Any]:
-        """Run trains from given states; return table columns, periods, and distances from periodicity."""
+        """Run trains of table rows from given states; return their columns, periods and repeat distances."""
         regimes = [self.table.regimes[row] for row in rows]
         done = self.done
         effort = replace(self.effort, progress=lambda part, _all: self.report_progress(done + part))
@@ -272,7 +272,7 @@ class DiagramBuilder:
         fronts = np.array([math.inf if r.hammer.front is None else r.hammer.front for r in regimes])
         scales = self.table.scales[list(rows)]
         cycles, distances = cycles_of(columns, fronts, scales)
-        # If time is counted within the period, motions with rests on the backstop repeat to the last bit.
+        # With the time counted within the period, motions that rest on the backstop repeat to the last bit.
         able = np.array([is_memoryless(regime) for regime in regimes])
         open_rows = np.flatnonzero(able & (cycles == 0) & (columns.status == OK))
         if open_rows.size:
@@ -283,7 +283,7 @@ class DiagramBuilder:
         return columns, cycles, distances
 
     def run(self, rows: Sequence[int], states: FloatArray) -> None:
-        """Run trains from given initial states and store the results in the table."""
+        """Run the trains of table rows from given initial states and store the results."""
         columns, cycles, distances = self.trial(rows, states)
         put(self.table.columns, rows, columns)
         self.table.cycles[list(rows)] = cycles
@@ -294,7 +294,7 @@ class DiagramBuilder:
         self.done += len(rows)
 
     def is_resting(self, columns: Columns, row: int, regime: Regime) -> bool:
-        """Whether a train without a short period repeats a longer cycle that rests on the backstop."""
+        """Whether an aperiodic train repeats a longer cycle in which the armature rests on the backstop."""
         if not is_memoryless(regime) or columns.status[row] != OK or regime.phase:
             return False
         points = np.column_stack([columns.x[row], columns.v[row]])
@@ -302,10 +302,10 @@ class DiagramBuilder:
         return bool(count and rests_of(regime, points[-count:], self.effort.tolerance))
 
     def compare(self) -> None:
-        """Mark the trains whose period changes at finer tolerances: rounding errors determine their cycles.
+        """Mark the trains whose period changes at finer tolerances, i.e. whose cycle rounding decides.
 
         An armature that comes to rest on the backstop forgets its past, but between two rests a small error
-        may grow to the size of the motion; rounding then decides the length of the cycle.
+        may grow to the size of the motion.
         """
         table = self.table
         long = table.cycles >= LONG_CYCLE
@@ -314,7 +314,7 @@ class DiagramBuilder:
             return
         regimes = [table.regimes[row] for row in rows]
         fronts, scales = np.full(len(rows), math.inf), table.scales[rows]
-        # The transient covers the longest cycle, and the firings after it more than one cycle.
+        # The transient covers the longest cycle; more than one cycle follows.
         transient = int(table.cycles[rows].max())
         for share in FINER:
             finer = self.effort.at(share * self.effort.tolerance)
@@ -323,16 +323,16 @@ class DiagramBuilder:
             self.sensitive[rows] |= cycles != table.cycles[rows]
 
     def report_progress(self, done: int) -> None:
-        """Report the number of finished trains; trains that are run again to join strands are not counted."""
+        """Report the number of finished trains, not counting the trains that were rerun to join strands."""
         self.effort.report(min(done, self.known), self.known)
 
     def measure(self) -> None:
-        """Compute Lyapunov exponents of the aperiodic trains, over as many firings as the diagram shows."""
+        """Compute Lyapunov exponents of the aperiodic trains, over as many firings as the diagram records."""
         columns, table = self.table.columns, self.table
         begun = {}
         for row, regime in enumerate(table.regimes):
             x, v, branch, _memory, *electric = columns.last[row].tolist()
-            # A start inside the pack would need the memory of the pack; such a train stays undecided.
+            # The initial state carries no pack memory: a train that starts inside the pack stays undecided.
             if branch >= 0.0 or math.isnan(x):
                 continue
             if columns.status[row] == OK and not table.cycles[row] and math.isnan(self.exponents[row]):

@@ -23,7 +23,7 @@ from printhammer.run.supply import current_scale
 from printhammer.support.arrays import FloatArray, IntArray, TextArray
 
 TOLERANCE: Final = 1e-9
-"""Default tolerance of diagrams and basins; its errors are far below the distances that decide a period.
+"""Default tolerance of diagrams and basins; its errors are far below `AGREEMENT`, which decides a period.
 
 With `DISPLAY_TOLERANCE` of `printhammer.run.ensemble`, weakly stable orbits never settle to within 1e-6 of
 the half-width of the strobe window.
@@ -68,12 +68,12 @@ class Columns(Declared):
         return len(self.x)
 
     def handed(self, row: int) -> State:
-        """Return the final state of a train, from which the next train can continue."""
+        """Return the final state of the train in a row, the initial state of the next train."""
         return tuple(self.last[row].tolist())
 
 
 def blank_columns(count: int, points: int) -> Columns:
-    """Return the columns of trains that have not been run: NaN, status "not run"."""
+    """Build columns for `count` trains that have not been run: NaN states, status "not run"."""
     return Columns(
         x=np.full((count, points), np.nan),
         v=np.full((count, points), np.nan),
@@ -86,7 +86,7 @@ def blank_columns(count: int, points: int) -> Columns:
 
 
 def put(columns: Columns, rows: Sequence[int] | IntArray, others: Columns) -> None:
-    """Copy the columns `others` into the given rows of `columns`."""
+    """Copy the rows of `others` into the given rows of `columns`."""
     where = np.asarray(rows, dtype=np.int64)
     for name, values in vars(others).items():
         getattr(columns, name)[where] = values
@@ -122,9 +122,9 @@ def run_columns(
 def _run(
     regimes: Sequence[Regime], states: FloatArray, firings: int, transient: int, effort: Effort
 ) -> Columns:
-    """Run trains whose initial states are all of one kind: at rest, inside the pack, or elsewhere."""
+    """Run trains whose initial states are all of one kind: at rest, inside the pack, or free."""
     rest = bool(np.isnan(states[0, 0]))
-    # The cells of a basin share one regime; each column of a diagram has a different regime.
+    # The cells of a basin share one regime; the columns of a diagram have one regime each.
     known = {id(regime): regime for regime in regimes}
     made = {key: _train(regime, firings, rest) for key, regime in known.items()}
     trains = [made[id(regime)] for regime in regimes]
@@ -138,7 +138,7 @@ def _run(
     ensemble = Ensemble(
         [regime.hammer for regime in regimes],
         [drive for drive, _times in trains],
-        # The run ends one period after the last firing, so that its end does not affect the last state.
+        # The run extends one period beyond the last firing, so that its end does not affect the last state.
         [float(times[-1]) + regime.period for regime, (_drive, times) in zip(regimes, trains, strict=True)],
         states=None if rest else states[:, places],
         starts=[float(times[0]) for _drive, times in trains],
@@ -173,9 +173,9 @@ def _run(
 def run_in_stretches(
     regimes: Sequence[Regime], states: FloatArray, firings: int, transient: int, effort: Effort
 ) -> Columns:
-    """Compute the columns of memoryless trains (`is_memoryless`) as `run_columns` does, one period at a time.
+    """Run memoryless trains one period at a time; otherwise as `run_columns`.
 
-    The computation is slower, but its rounding error does not grow with time; see
+    Slower than one long run, but the rounding error does not grow with time; see
     `printhammer.chaos.strobe.train.STRETCH`.
     """
     columns = blank_columns(len(regimes), firings - transient)
@@ -217,7 +217,7 @@ def run_in_stretches(
 
 
 def _train(regime: Regime, firings: int, rest: bool) -> tuple[Drive, FloatArray]:
-    """Build the drive of a train; return the drive and its firing times, including one beyond the last."""
+    """Build the drive of a train; return drive and firing times, s, with one time beyond the last firing."""
     if rest and regime.drive is None:
         drive = regime.pulses(firings + 2)
         return drive, drive.times[: firings + 1]
@@ -226,7 +226,7 @@ def _train(regime: Regime, firings: int, rest: bool) -> tuple[Drive, FloatArray]
 
 
 def state_or_rest(regime: Regime, state: State) -> State:
-    """Return a carried-over state, or `FROM_REST` if it is not a valid initial state of this hammer."""
+    """Return the final state of the preceding train if it is valid for this regime, else `FROM_REST`."""
     if math.isnan(state[0]):
         return FROM_REST
     try:
@@ -239,7 +239,7 @@ def state_or_rest(regime: Regime, state: State) -> State:
 
 
 def scales_of_columns(regimes: Sequence[Regime]) -> FloatArray:
-    """Compute the scales of displacement, velocity, memory and current for each train, shape (M, 4).
+    """Compute the scales of displacement, velocity, memory and current of each train, shape (M, 4).
 
     The scales are the half-widths of the strobe window of the train (`printhammer.run.regime`) and a
     typical current.
@@ -291,7 +291,7 @@ def confirm(
     scales: FloatArray,
     effort: Effort,
 ) -> None:
-    """Confirm ambiguous periods from `cycles_of` by Newton's method; update periods and distances.
+    """Check ambiguous periods from `cycles_of` by Newton's method; update periods and distances in place.
 
     Periods are ambiguous if the states alone do not show them (`printhammer.chaos.orbits.settled`); an
     unconfirmed period becomes 0.

@@ -1,9 +1,9 @@
 """Bifurcation diagram: states at the firings, windows of one classification, and routes to chaos.
 
-A window is an interval of the parameter in which all trains that were run have the same classification. A
-value stands for the interval half-way to its neighbours, so that widths of windows add up to the whole range.
-Between two neighbouring values there may be windows that the diagram does not show. A route is the series of
-windows before the first strange train; it tells whether period doublings lead to chaos.
+A window is an interval of the parameter in which all computed trains have the same classification. A value
+represents the interval half-way to its neighbours, so that the widths of the windows add up to the range. The
+diagram cannot show windows between two neighbouring values. A route is the series of windows before the first
+strange train; it shows whether period doublings lead to chaos.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ SERIES: Final = (2, 4, 8)
 """Orbit periods, in firings, of the successive windows of a period-doubling cascade."""
 
 MOST_UNDECIDED: Final = 32
-"""Maximum number of undecided aperiodic trains on a route before the search for chaos stops; arbitrary."""
+"""Number of undecided aperiodic trains after which the search for chaos along a route stops; arbitrary."""
 
 
 class Window(Declared):
@@ -85,7 +85,7 @@ class Route(Declared):
         return self.worded("{:.9g}".format)
 
     def worded(self, shown: Callable[[float], str]) -> str:
-        """Return the sentence on the first chaotic train, with parameter values formatted by `shown`."""
+        """Describe the route to the first chaotic train; `shown` formats parameter values."""
         values = f"With {self.way} values"
         way = ", ".join(window.verdict for window in self.before)
         if not self.complete:
@@ -102,7 +102,7 @@ class Route(Declared):
 
 
 def cells(values: FloatArray) -> FloatArray:
-    """Compute the width of the parameter interval around each value, for ascending values."""
+    """Compute the width of the interval that each of the ascending parameter values represents."""
     if len(values) < 2:
         return np.zeros(len(values))
     edges = np.concatenate([values[:1], 0.5 * (values[1:] + values[:-1]), values[-1:]])
@@ -110,7 +110,7 @@ def cells(values: FloatArray) -> FloatArray:
 
 
 def doublings(windows: Sequence[Window]) -> list[Window]:
-    """Find the first window of every three successive windows with the periods 2, 4 and 8.
+    """Find period-doubling cascades: return the first of every three windows with periods 2, 4 and 8.
 
     Undecided windows are skipped, since trains take long to settle near a period doubling.
     """
@@ -226,7 +226,7 @@ class Bifurcation(Result, rows="direction column"):
         )
 
     def _value_text(self) -> tuple[Callable[[float], str], str]:
-        """Return a formatter with enough digits to distinguish neighbouring values, and the unit."""
+        """Return a formatter of parameter values, precise enough to tell neighbours apart, and the unit."""
         si = self.regime.quantity(self.parameter).si
         unit = {"s": "ms", "m": "um"}.get(si, si)
         steps = np.diff(self.values)
@@ -254,7 +254,7 @@ class Bifurcation(Result, rows="direction column"):
         return Grid(columns, direction, most=12)
 
     def _undecided_reasons(self) -> list[str]:
-        """List the reasons why trains that ran to the end are undecided, one sentence per reason."""
+        """List why completed trains are undecided, one sentence per reason."""
         undecided = (self.verdicts == "undecided") & (self.status == "ok")
         known = undecided & ~np.isnan(self.exponents)
         settling = known & (self.exponents < -SIGNIFICANT * self.standard_errors)
@@ -363,7 +363,7 @@ class Bifurcation(Result, rows="direction column"):
         return self.directions.index(direction)
 
     def _group(self, row: int, order: Sequence[int]) -> list[Window]:
-        """Group neighbouring columns, listed in ascending or descending order, into windows."""
+        """Group neighbouring columns with the same classification into windows; `order` is up or down."""
         names, cycles = self.verdicts[row].tolist(), self.cycles[row].tolist()
         widths = cells(self.values)
         windows = []
@@ -376,11 +376,11 @@ class Bifurcation(Result, rows="direction column"):
         return windows
 
     def _is_strange(self, row: int, k: int) -> bool:
-        """Whether an aperiodic train is chaotic, by the Lyapunov exponent computed from its last point."""
+        """Whether an aperiodic train is chaotic, by the Lyapunov exponent of its continuation."""
         x, v = (float(states[row, k, -1]) for states in (self.x, self.v))
         regime = self.regime.with_(self.parameter, float(self.values[k]))
         front = regime.hammer.front
-        # Inside the pack, and between firings, the stored state is incomplete.
+        # Inside the pack and between firings the stored state lacks the memory and the phase.
         if self.status[row, k] != "ok" or self.phase or (front is not None and x > front):
             return False
         points = self.x.shape[2]
@@ -389,11 +389,11 @@ class Bifurcation(Result, rows="direction column"):
 
 
 def hysteresis(diagram: Bifurcation) -> BoolArray:
-    """Mask of the parameter values at which the two directions lead to different attractors, shape (C,).
+    """Mask of the parameter values at which rising and falling parameters lead to different attractors.
 
-    Periodic trains differ if their periods differ, or if their orbits are further apart than `SAME` of the
-    builder; an aperiodic train differs from every periodic train, and from no aperiodic train. All False for
-    a single direction.
+    Periodic trains differ if their periods differ or their orbits are further apart than `SAME` of the
+    builder; an aperiodic train differs from every periodic train and from no aperiodic train. The shape is
+    (C,); all False for a single direction.
     """
     different = np.zeros(len(diagram.values), np.bool_)
     if len(diagram.directions) < 2:

@@ -30,13 +30,13 @@ from printhammer.errors import InputError
 from printhammer.results import Declared, part
 from printhammer.support.arrays import FloatArray
 
-_GROWTH: Final = 1.5  # Factor on the step after a step that was accepted
+_GROWTH: Final = 1.5  # Factor by which the step grows after an accepted step
 _LEAST_COSINE: Final = 0.97
-"""Cosine of the angle between successive tangents below which the step is halved and repeated."""
+"""Smallest cosine of the angle between successive tangents; below, the step is halved and repeated."""
 _FARTHEST: Final = 0.4
-"""Largest distance of a corrected point from the predicted point, in steps; beyond it a step is rejected."""
+"""Largest distance between corrected and predicted point, in steps; a larger one rejects the step."""
 _LEAP: Final = 1.0
-"""Change of a multiplier in one step, relative to 1 + |multiplier|, above which the step is halved."""
+"""Largest change of a multiplier in one step, relative to 1 + |multiplier|; a larger one halves the step."""
 _SAME: Final = 1e-6
 """Scaled distance below which two points of a curve are identical."""
 
@@ -173,7 +173,7 @@ def follow(
         halves.append((nodes, stop))
         if stop.reason == "closed":
             if sign < 0.0:
-                # Traced in the other direction, a closed curve is the same: reverse its nodes.
+                # Traced in the other direction, a closed curve is the same curve with its nodes reversed.
                 whole = _reversed([begin, *nodes])
                 return Curve(whole, (stop, stop))
             return Curve([begin, *nodes], (stop, stop))
@@ -188,7 +188,7 @@ def _reversed(nodes: list[Node]) -> list[Node]:
 def _half(
     follower: Corrector, start: Node, bounds: tuple[float, float], steps: Steps, watch: Watch | None
 ) -> tuple[list[Node], Stop]:
-    """Follow a curve in one direction from its start; return the nodes after the start, and the stop."""
+    """Follow a curve in one direction from its start node; return the following nodes and the stop."""
     nodes: list[Node] = []
     here, length = start, steps.first
     home = follower.point(start)
@@ -218,7 +218,7 @@ def _half(
             return nodes, Stop("closed", start.parameter, start.state, sentence)
         stop = watch(here, ahead) if watch is not None else None
         if stop is not None and stop.node is here and 0.5 * length >= steps.smallest:
-            # The end of the curve lies somewhere within the last step: approach it with half the step.
+            # The curve ends somewhere within the last step: approach the end with half the step.
             length *= 0.5
             continue
         if stop is None and reached is not None:
@@ -236,14 +236,14 @@ def _half(
 
 
 def _is_joined(follower: Corrector, here: Node, ahead: Node, length: float) -> bool:
-    """Whether a corrected point lies on the curve of its predecessor, by distance, tangent, multipliers."""
+    """Whether a corrected point lies on the same curve as its predecessor: near, aligned, without a leap."""
     predicted = follower.point(here) + length * here.tangent
     near = float(np.linalg.norm(follower.point(ahead) - predicted)) <= _FARTHEST * length
     return near and float(here.tangent @ ahead.tangent) >= _LEAST_COSINE and not _has_leap(here, ahead)
 
 
 def _has_leap(here: Node, ahead: Node) -> bool:
-    """Whether a multiplier jumps between two points with the same sequence of contacts."""
+    """Whether a multiplier jumps between two nodes whose sequences of contacts are equal."""
     if here.value.label != ahead.value.label:
         return False
     before, after = here.multipliers, ahead.multipliers
@@ -262,7 +262,7 @@ def _lost(node: Node, trouble: str, *, jumped: bool = False) -> Stop:
 
 
 def _beyond(node: Node, bounds: tuple[float, float]) -> float | None:
-    """Return the parameter bound that a node has reached while the tangent points outward, else None."""
+    """Return the parameter bound that a node has reached or crossed heading outward, else None."""
     if node.parameter <= bounds[0] and node.tangent[-1] < 0.0:
         return bounds[0]
     if node.parameter >= bounds[1] and node.tangent[-1] > 0.0:
@@ -283,7 +283,7 @@ def _bound_stop(node: Node, bound: float) -> Stop:
 
 
 def _at_parameter(follower: Corrector, here: Node, ahead: Node, parameter: float) -> Node | None:
-    """Correct the point between two nodes at a given parameter; its tangent is in the direction of travel."""
+    """Correct a point between two nodes at a fixed parameter; its tangent is in the direction of travel."""
     share = (parameter - here.parameter) / (ahead.parameter - here.parameter)
     begin = follower.point(here)
     z = begin + share * (follower.point(ahead) - begin)
@@ -297,7 +297,7 @@ def _at_parameter(follower: Corrector, here: Node, ahead: Node, parameter: float
 
 
 def _is_passed(follower: Corrector, here: Node, ahead: Node, home: FloatArray, start: Node) -> bool:
-    """Whether a closed curve passes its start between two successive nodes."""
+    """Whether a closed curve passes through its start between two successive nodes."""
     begin = follower.point(here)
     along = follower.point(ahead) - begin
     share = float((home - begin) @ along) / float(along @ along)

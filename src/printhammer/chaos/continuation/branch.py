@@ -99,7 +99,7 @@ def event_of(point: BranchPoint, phase: float = 0.0) -> BranchEvent:
 
 
 def _grazing_of(point: BranchPoint) -> tuple[str, str]:
-    """Return the grazed surface, and whether its contact appears, vanishes, splits or merges."""
+    """Return the surface of a grazing, and whether its contact appears, vanishes, splits or merges."""
     assert point.sides is not None
     ordered = sorted(point.sides, key=lambda node: node.parameter)
     before, after = (node.value.extra for node in ordered)
@@ -120,7 +120,7 @@ def _grazing_of(point: BranchPoint) -> tuple[str, str]:
 
 
 def _is_parted(touches: list[Touch], length: float) -> bool:
-    """Whether a contact is split in two: the armature leaves for less than the shortest contact."""
+    """Whether two successive touches stem from one split contact: a gap shorter than any contact."""
     durations = [touch.t_out - touch.t_in for touch in touches]
     if len(touches) < 2 or min(durations) == 0.0:
         return False

@@ -50,26 +50,26 @@ BIRTH: Final = "period doubling"
 _ROUNDS: Final = 60  # Iteration limit of bisections and root searches; arbitrary
 _SHARE: Final = 1e-13
 """Accuracy to which a special point is located, as a fraction of a continuation step."""
-_REAL: Final = 1e-9  # Imaginary part above which a multiplier is complex
+_REAL: Final = 1e-9  # Imaginary part up to which a multiplier counts as real
 _ROUNDING: Final = 1e-8
 """Magnitude of a test function below which its sign change is rounding noise."""
 _SHARE_OF_CHANGE: Final = 1e-10
 _SMALL_MARGIN: Final = 0.05
 _CLOSE_MARGIN: Final = 1e-7
-"""Search for a contact change: final bracket, in steps; grazing margins that begin and end interpolation."""
+"""Search for a contact change: final bracket, in steps; margins at which interpolation begins and ends."""
 _NEAR: Final = 1e-4
 """Distance, as a fraction of a step, within which a fold and a crossing are the same point."""
-_AMPLITUDE: Final = 1e-2  # First scaled distance from a doubling at which its orbit is sought
+_AMPLITUDE: Final = 1e-2  # First scaled distance from a period doubling at which to seek the doubled orbit
 _LEAST_AMPLITUDE: Final = 1e-6
 _CLOSER: Final = 4.0
-"""Smallest scaled distance from a doubling to try for an orbit born there; ratio of successive distances."""
+"""Smallest scaled distance from a doubling to try for the doubled orbit; ratio of successive distances."""
 _ASIDE: Final = 0.5
 _NEW_MULTIPLIER: Final = 0.3
-"""Limits for an orbit born at a doubling: relative offset from the tangent; |multiplier - 1|."""
+"""Limits for a doubled orbit: offset from the critical direction, relative; |multiplier - 1|."""
 _HALF_NEAR: Final = 0.05
-"""Largest scaled distance of an orbit from an orbit of half its period near their common doubling."""
+"""Largest scaled distance between an orbit and one of half its period, for both to meet at a doubling."""
 _HALF_DOUBLES: Final = 0.5
-"""Largest distance of a multiplier from -1 at which a period doubling is searched for nearby."""
+"""Largest distance of a multiplier from -1 at which a nearby period doubling is searched for."""
 
 
 class BranchPoint(Declared):
@@ -101,7 +101,7 @@ def doubling_test(jacobian: FloatArray) -> float:
 
 
 def torus_test(jacobian: FloatArray) -> float:
-    """Compute the Neimark-Sacker test function: product of mu_i mu_j - 1 over pairs of multipliers."""
+    """Compute the Neimark-Sacker test function, the product of mu_i mu_j - 1 over pairs of multipliers."""
     multipliers = np.linalg.eigvals(jacobian).astype(np.complex128)
     i, j = np.triu_indices(len(multipliers), 1)
     return float(np.prod(multipliers[i] * multipliers[j] - 1.0).real)
@@ -150,7 +150,7 @@ def points_of(
         "branching": crossing_test,
     }
     every: list[BranchPoint] = []
-    # A branch that begins at a period doubling turns back in the parameter there, which is not a fold.
+    # A branch that begins at a period doubling turns back in the parameter there without a fold.
     places = (0, len(curve.nodes) - 2)
     births = [place for place, stop in zip(places, curve.stops, strict=True) if stop.reason == BIRTH]
     for after, (here, ahead) in enumerate(itertools.pairwise(curve.nodes)):
@@ -173,7 +173,7 @@ def points_of(
 
 
 def _without_folds_at_crossings(points: list[BranchPoint], curve: Curve) -> list[BranchPoint]:
-    """Remove folds that coincide with crossings: where a curve turns back at a pitchfork there is no fold."""
+    """Remove folds that coincide with crossings: a curve that turns back at a pitchfork has no fold there."""
     crossings = [point for point in points if point.kind in CROSSINGS]
 
     def is_at(point: BranchPoint, crossing: BranchPoint) -> bool:
@@ -191,12 +191,12 @@ def _without_folds_at_crossings(points: list[BranchPoint], curve: Curve) -> list
 
 
 def _has_sign_change(before: float, after: float) -> bool:
-    """Whether a test function changes sign by more than rounding; area-preserving maps need the threshold."""
+    """Whether a test function changes sign by more than rounding noise, as of area-preserving maps."""
     return before * after < 0.0 and max(abs(before), abs(after)) > _ROUNDING
 
 
 def _has_pair(node: Node) -> bool:
-    """Whether a complex pair of multipliers lies close to the unit circle."""
+    """Whether a node has a complex pair of multipliers within 1e-3 of the unit circle."""
     pair = np.abs(node.multipliers.imag) > _REAL
     return bool((pair & (np.abs(np.abs(node.multipliers) - 1.0) < 1e-3)).any())
 
@@ -241,7 +241,7 @@ def zero_between(
 def _changes(
     follower: Corrector, here: Node, ahead: Node, after: int, margin: Callable[[Node], float] | None
 ) -> list[tuple[float, Kind, BranchPoint]]:
-    """Locate all points between two nodes at which the contact sequence of the orbit changes."""
+    """Locate all changes of the contact sequence between two nodes of a curve."""
     changes: list[tuple[float, Kind, BranchPoint]] = []
     begin, first = 0.0, here
     while first.value.label != ahead.value.label and len(changes) < _ROUNDS:
@@ -267,7 +267,7 @@ def _change(
     start: tuple[float, Node],
     margin: Callable[[Node], float] | None,
 ) -> tuple[float, tuple[Node, Node], bool]:
-    """Locate the first change of the contacts; return step fraction, nodes on both sides, and convergence."""
+    """Locate the first contact change in a step: step fraction, nodes on both sides, whether converged."""
     low, inside = start
     high, beyond = 1.0, ahead
     m_low = m_high = math.nan
@@ -351,13 +351,13 @@ def follow_doubled(
 
 
 def _is_born(way: FloatArray, row: FloatArray, amplitude: float, node: Node) -> bool:
-    """Whether an orbit lies, to first order, in the critical direction of the period doubling."""
+    """Whether a converged orbit lies, to first order, in the critical direction of a period doubling."""
     aside = float(np.linalg.norm(way - amplitude * row))
     return aside <= _ASIDE * amplitude and float(np.abs(node.multipliers - 1.0).min()) <= _NEW_MULTIPLIER
 
 
 def birth_of(half: Corrector, here: Node, ahead: Node) -> Stop | None:
-    """Locate the period doubling in which a branch of even period ends; None if not found.
+    """Locate the period doubling at which a branch of even period ends, as a `Stop`; None if not found.
 
     At the doubling, states half a period apart coincide, and the curve retraces the same orbits half a period
     later. `half` corrects points onto the curve of orbits of half the period; `here` and `ahead` are
@@ -387,7 +387,7 @@ def birth_of(half: Corrector, here: Node, ahead: Node) -> Stop | None:
 
 
 def doubling_near(follower: Corrector, node: Node) -> Node | None:
-    """Locate the period doubling near a fixed point on its curve by the secant method; None if not found."""
+    """Locate the period doubling near a node along its curve by the secant method; None if not found."""
     step = 1e-3
     z = follower.point(node)
     before, value = node, doubling_test(node.value.jacobian)

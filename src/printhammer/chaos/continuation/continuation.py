@@ -28,7 +28,7 @@ from printhammer.run.regime import Fired, Regime
 from printhammer.support.arrays import FloatArray
 
 _SETTLE: Final = 500
-"""Number of firings after which a train from rest is assumed to have settled."""
+"""Number of firings after which a train from rest is assumed to have settled; arbitrary."""
 
 
 @computation
@@ -69,7 +69,7 @@ def continuation(
         Step sizes and maximum number of steps, replacing `most`; lengths in half-widths of the strobe window
         and fifths of the parameter range.
     **firing
-        How the hammer is fired, as for `printhammer.Regime.of`; for an orbit only its phase may be given.
+        Firing of the hammer, as for `printhammer.Regime.of`; for an orbit only its phase may be given.
 
     Returns
     -------
@@ -128,7 +128,7 @@ def _orbit_to_start_from(
     for orbit in orbits(regime, longest=many, threads=effort.threads):
         if orbit.firings == many:
             state = state_later(orbit.regime, orbit.section, regime.phase, effort.tolerance)
-            # On its way out of the pack the armature has a memory.
+            # For an armature moving out of the pack, (x, v) is not the complete state.
             if np.isfinite(state).all() and is_usable(regime.hammer, *state.tolist()):
                 return regime, state, many
             return orbit.regime, np.array(orbit.section), many

@@ -7,8 +7,8 @@ for which the equation of the crossing, l B(z, z) = 0, holds (W. J. F. Govaerts,
 Bifurcations of Dynamical Equilibria*, SIAM 2000; H. B. Keller, in P. H. Rabinowitz (ed.), *Applications of
 Bifurcation Theory*, Academic Press 1977, 359).
 
-Where one of the two curves turns back in the parameter, the crossing is a pitchfork, otherwise a
-transcritical point.
+Where one of the two curves turns back in the parameter, the crossing is a pitchfork; otherwise it is
+transcritical.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ _DIFFERENCE: Final = 1e-3
 _FLAT: Final = 1e-6
 """Relative mixed second derivative below which the tangent of the crossing curve is undetermined."""
 _UPRIGHT: Final = 0.01
-"""Component of a tangent along the parameter below which a curve turns back; arbitrary."""
+"""Largest component along the parameter of the tangent of a curve that turns back; arbitrary."""
 _AMPLITUDE: Final = 1e-2
 _LEAST_AMPLITUDE: Final = 1e-5
 _CLOSER: Final = 4.0
-"""Smallest scaled distance from a crossing to try for the second curve; ratio of successive distances."""
+"""Smallest scaled distance from a crossing to try for a point of the crossing curve; ratio of distances."""
 _ASIDE: Final = 0.5
-"""Largest distance from the predicted point, relative to the step, for a point to lie on the curve."""
+"""Largest distance from the predicted point, relative to the step, of a point on the crossing curve."""
 
 
 def locate_crossing(
@@ -71,7 +71,7 @@ def locate_crossing(
 
 
 def crossing_direction(follower: Corrector, node: Node) -> FloatArray | None:
-    """Compute the scaled tangent, shape (n + 1,), of the second curve at a crossing; None if undetermined."""
+    """Compute the scaled tangent of the crossing curve at a crossing, shape (n + 1,); None if unknown."""
     z = follower.point(node)
     value = follower.family(node.state, node.parameter)
     if value.trouble:

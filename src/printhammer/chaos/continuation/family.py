@@ -25,10 +25,10 @@ from printhammer.run.start import initial_state
 from printhammer.support.arrays import FloatArray
 
 _SPACING: Final = 1e-6
-"""Relative step of the parameter derivative by finite differences, which only steers Newton's method."""
+"""Relative step of the finite-difference derivative in the parameter, which only steers Newton's method."""
 _MUCH: Final = 1e3
 """Multiplier above which the parameter step of the finite difference is reduced in proportion."""
-_BESIDE: Final = 1e-7  # Finite-difference step of the state at gentle touches, in scales of the run
+_BESIDE: Final = 1e-7  # Finite-difference step of the state at gentle touches, in the scales of the run
 _GENTLE: Final = 3e-4
 """Impact speed on the pack, relative to the speed scale, below which finite differences are used."""
 _IN_PACK: Final = f"{IN_PACK} at the section; another phase of the period can be chosen"
@@ -90,7 +90,7 @@ class Passage(Declared):
 
 
 class Course(Declared):
-    """States, pack forces and energies, J, of a periodic orbit over one period."""
+    """Motion of a periodic orbit over one period: states, pack forces and energies, J."""
 
     states: FloatArray = part("displacement, m, and velocity, m/s, at the sections, shape (firings, 2)")
     peak_forces: FloatArray = column(
@@ -152,7 +152,7 @@ class RegimeFamily:
     def _differences(self, problem: Problem, end: float, state: FloatArray) -> FloatArray | None:
         """Compute the derivative of the strobe map, shape (2, 2), by finite differences of runs.
 
-        A gentle touch is so shallow that the finite differences of the contact law in the tangent flow fail.
+        The tangent flow differentiates the contact law by finite differences, which fail at a gentle touch.
         """
         columns = []
         for move in np.diag(_BESIDE * np.array(problem.scales)):
@@ -170,7 +170,7 @@ class RegimeFamily:
     def _slope(
         self, state: FloatArray, parameter: float, image: FloatArray, growth: float
     ) -> FloatArray | None:
-        # A large multiplier comes with a large curvature.
+        # A large multiplier implies a large curvature.
         step = _SPACING * min(1.0, _MUCH / max(growth, 1.0)) * (abs(parameter) or 1.0)
         beside = [self.end_of(state, parameter + sign * step) for sign in (-1.0, 1.0)]
         if beside[0] is not None and beside[1] is not None:
@@ -180,7 +180,7 @@ class RegimeFamily:
         return None if beside[0] is None else np.asarray((image - beside[0]) / step)
 
     def end_of(self, state: FloatArray, parameter: float) -> FloatArray | None:
-        """Compute the state at the last section alone, without derivatives; None if the run ends early."""
+        """Compute only the state, (m, m/s), at the last section; None if the run ends early."""
         try:
             problem, end = self._problem(self.regime.with_(self.name, parameter), state)
         except InputError:
@@ -200,7 +200,7 @@ class RegimeFamily:
         return problem, float(moments[-1])
 
     def course(self, state: FloatArray, parameter: float) -> Course:
-        """Compute states, forces and energies of an orbit over one period, from its state at the section."""
+        """Compute states, pack forces and energies of an orbit over one period, from its section state."""
         regime = self.regime.with_(self.name, parameter)
         problem, end = self._problem(regime, state)
         record = problem.run(end)

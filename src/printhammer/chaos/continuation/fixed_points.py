@@ -1,6 +1,6 @@
 """Fixed points of a map with a parameter, one at a time, by Newton's method.
 
-State u and parameter p together are a point z = (u, p). A point is corrected onto the curve of fixed points
+The state u and the parameter p form a point z = (u, p). A point is corrected onto the curve of fixed points
 G(u, p) = u within the plane z . row = constant. All variables are scaled: u and p are each divided by a
 scale.
 """
@@ -45,7 +45,7 @@ class MapValue(Declared):
 
     @classmethod
     def none(cls, count: int, trouble: str) -> MapValue:
-        """Return the placeholder for a map value that does not exist, with the reason."""
+        """Build the placeholder for a map value that does not exist; `trouble` is the reason."""
         nan = math.nan
         return cls(np.full(count, nan), np.full((count, count), nan), np.full(count, nan), (), trouble)
 
@@ -146,11 +146,11 @@ class Corrector:
         return self.correct(z, np.eye(self.count + 1)[-1])
 
     def onto(self, z: FloatArray) -> Node | None:
-        """Find the fixed point near z, at the parameter of z if possible, else nearby; None if not found."""
+        """Find the fixed point near z, at the parameter of z if possible; None if Newton's method fails."""
         node = self.at_parameter(z)
         if node is not None:
             return node
-        # At a fold the parameter cannot be fixed; the smallest correction is well defined.
+        # At a fold no fixed point need exist at the parameter; the smallest correction is well defined.
         for _ in range(_MOST_CORRECTIONS):
             value = self.family(z[:-1] * self.scales[:-1], float(z[-1] * self.scales[-1]))
             if value.trouble:

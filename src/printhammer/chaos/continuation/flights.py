@@ -1,4 +1,4 @@
-"""Flights from one impact on a surface to a later impact, and the impacts of an orbit near a grazing.
+"""Flights between impacts on a surface, and the impacts of an orbit near a grazing.
 
 At a touch the displacement is that of the surface; the remaining state variable is the velocity, 0 at a
 grazing. With a rigid backstop, the strobe map has a square-root singularity at a grazing. If the surface is
@@ -35,7 +35,7 @@ from printhammer.support.arrays import FloatArray
 _CURRENT: Final = "with a voltage drive, the current at a touch belongs to the state"
 _CLOSE: Final = 0.01
 """Time before and after an impact during which the surface is removed, as a fraction of the period."""
-_STILL: Final = 1e-9  # Speed, relative to the typical one, below which an orbit turns at its section
+_STILL: Final = 1e-9  # Speed, relative to the speed scale, below which an orbit turns at its section
 _SPACING: Final = 1e-6  # Finite-difference step of Newton's method, in scaled variables
 _ROUNDS: Final = 20  # Iteration limit of Newton's method; arbitrary
 _PRECISION: Final = 1e-12  # Scaled correction below which Newton's method has converged
@@ -45,7 +45,7 @@ _SLOWER: Final = (0.98, 0.9, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.02, 0.005)
 
 
 class Flight(Declared):
-    """Motion from one impact on a surface to a later impact, without the surface close to both impacts."""
+    """Motion from one impact on a surface to a later impact, with the surface removed near both impacts."""
 
     end: FloatArray = part("displacement, m, and velocity, m/s, at the end, shape (2,)")
     jacobian: FloatArray = part("derivative with respect to the state at the start, shape (2, 2)")
@@ -59,7 +59,7 @@ class Flight(Declared):
 def fly(
     regime: Regime, surface: Surface, phase: float, speed: float, firings: int, tolerance: float
 ) -> Flight:
-    """Compute the flight of the armature from a surface, at a given phase of the drive and speed, m/s."""
+    """Compute the flight from an impact at a given drive phase and speed, m/s, to the impact after it."""
     hammer = regime.hammer
     place = hammer.front if surface == "pack" else hammer.position
     assert place is not None
@@ -80,7 +80,7 @@ def fly(
         return made
 
     leaving = _acceleration(problem(begin, alone=True), close)
-    # In a contact with a compliant surface the surface is not removed.
+    # A motion inside a compliant surface needs the surface.
     outside = rigid or (leaving < 0.0) == (surface == "pack")
     cuts = [begin, begin + close, end - close, end] if outside else [begin, end]
     for number, (start, stop) in enumerate(itertools.pairwise(cuts)):
@@ -106,7 +106,7 @@ def fly(
 
 
 def _acceleration(problem: Problem, time: float) -> float:
-    """Compute the acceleration of the armature at the start of a run of length `time`, s; result in m/s^2."""
+    """Compute the acceleration of the armature, m/s^2, at the start of a run that ends at `time`, s."""
     record = problem.run(problem.start + time)
     (row,) = problem.resample(record, np.array([problem.start]))
     push = row[2] if problem.drive.quantity == "force" else 0.0
@@ -123,7 +123,7 @@ class NearTouch(Declared):
 
 
 def near_touches(regime: Regime, state: FloatArray, firings: int, tolerance: float) -> list[NearTouch]:
-    """List the turning points and rigid-backstop impacts of an orbit, those closest to a grazing first."""
+    """List turning points and rigid impacts of an orbit, in ascending order of distance from a grazing."""
     train, _ = regime.train(firings + 1)
     begin, *_, end = (float(time) for time in regime.moments(train, firings))
     hammer = regime.hammer
@@ -222,7 +222,7 @@ def touch_at(
 def fading(
     regime: Regime, name: str, touch: NearTouch, firings: int, tolerance: float, width: float
 ) -> list[tuple[float, float, float]] | None:
-    """Follow an impact down to its grazing; return phase, speed and parameter for decreasing speeds.
+    """Follow an impact to its grazing; return (phase, speed in m/s, parameter) at decreasing speeds.
 
     A branch of orbits is smooth in these variables up to the grazing, which is the last entry. In terms of
     the state at a section, the curvature of the branch diverges, since the derivative of the strobe map grows
@@ -251,11 +251,11 @@ _GENTLE: Final = 1e-2
 _NEAR: Final = 1e-2
 """Largest distance from the last orbit to the grazing that ends its branch, in parameter scales."""
 _STEEP: Final = 10.0
-"""Multiplier above which an orbit is close to its grazing, without a further bifurcation before it."""
+"""Multiplier above which an orbit is close enough to its grazing to exclude a bifurcation before it."""
 _CLOSER: Final = 0.7
-"""Impact speed, relative to that at the last attempt, below which a grazing is sought again."""
+"""Ratio of the impact speed to that of the last attempt, below which a grazing is sought again."""
 _ON_CURVE: Final = 1e-5
-"""Largest scaled closing error of an orbit that is accepted as one of the last orbits of a branch."""
+"""Largest scaled closing error of an orbit that is appended to a branch before its grazing."""
 
 
 def grazing_end(
@@ -314,7 +314,7 @@ def _orbits(
 
 
 def fades(family: RegimeFamily, scales: FloatArray) -> Callable[[Node, Node], bool]:
-    """Build a predicate of two successive nodes: whether the slowest impact approaches a grazing.
+    """Build a predicate of two successive nodes: whether the slowest impact fades toward a grazing.
 
     A grazing is located only if the impact speed has fallen well below the speed at the last attempt.
     """

@@ -87,7 +87,7 @@ class Branches(Result):
 
     @property
     def message(self) -> str:
-        """Summary of the number, periods and failures of the branches, in one line."""
+        """Summary of the branches in one line: number, periods, closed loops and failures."""
         if not self.found:
             return "; ".join(("no branch was found", *self.refused))
         counts = Counter(branch.firings for branch in self.found)
@@ -100,7 +100,7 @@ class Branches(Result):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Provenance of the first branch, which all branches share."""
+        """Provenance of the first branch; all branches share it."""
         return self.found[0].provenance if self.found else super().provenance
 
     def notes(self) -> dict[str, Any]:
@@ -209,7 +209,7 @@ def regimes(
 def follow_doublings(
     branch: Branch, levels: int, *, most: int = MOST, threads: int | None = None
 ) -> Branches:
-    """Follow the branches that begin at period doublings and crossings of a branch, for `levels` generations.
+    """Follow the branches born at period doublings and crossings of a branch, for `levels` generations.
 
     Raises
     ------
@@ -235,7 +235,7 @@ class _Collected:
         self.done: set[tuple[int, int]] = set()
 
     def result(self) -> Branches:
-        """Return all branches collected, shorter periods first."""
+        """Return all branches collected, in ascending order of period."""
         return Branches(tuple(sorted(self.found, key=lambda branch: branch.firings)), tuple(self.refused))
 
     @contextmanager
@@ -247,7 +247,7 @@ class _Collected:
             raise InterruptedBranches(self.result()) from None
 
     def add(self, orbits: list[Orbit]) -> None:
-        """Follow the branch through each orbit that does not lie on a known branch."""
+        """Follow the branch through each orbit that lies on no known branch, and add it."""
         left = list(orbits)
         while left:
             left = [orbit for orbit in left if not self.is_known(orbit)]
@@ -259,7 +259,7 @@ class _Collected:
                     self.found.append(branch)
 
     def followed(self, orbit: Orbit) -> Branch | str:
-        """Follow the branch through an orbit; return the branch, or the reason for the failure."""
+        """Follow the branch through an orbit; return the branch, or a sentence on the failure."""
         bounds = read_bounds(orbit.regime, RATE, self.bounds)
         tracer = Tracer(orbit.regime, RATE, bounds, self.effort.alone)
         try:
@@ -268,19 +268,19 @@ class _Collected:
             return f"{orbit.name} at {orbit.regime.rate:.9g} Hz: {error}"
 
     def is_known(self, orbit: Orbit) -> bool:
-        """Whether an orbit lies on a branch already found."""
+        """Whether an orbit lies on a branch that has been collected."""
         alike = [branch for branch in self.found if branch.firings == orbit.firings]
         return any(_is_on(branch, orbit) for branch in alike)
 
     @staticmethod
     def switch_of(branch: Branch, event: BranchEvent) -> Callable[..., Branch] | None:
-        """Return the method that follows another branch from an event; None if no branch begins there."""
+        """Return the method that follows the branch born at an event; None if no branch is born there."""
         if event.kind == "period doubling":
             return branch.doubled
         return branch.crossing if event.kind in CROSSINGS else None
 
     def switch(self, level: int) -> None:
-        """Continue the branches that start at period doublings and branch points of the known branches."""
+        """Follow the branches born at period doublings and crossings of the collected branches."""
         for number, branch in enumerate(list(self.found)):
             for place, event in enumerate(branch.events):
                 follow = self.switch_of(branch, event)
@@ -301,7 +301,7 @@ class _Collected:
 
 
 def _state_at(orbit: Orbit, phase: float) -> FloatArray:
-    """Return the state of an orbit, (m, m/s), at a section with the phase `phase`."""
+    """Compute the state of an orbit, (m, m/s), at the section with the phase `phase`."""
     if phase == orbit.phase:
         return orbit.section
     motion = orbit.motion()
@@ -321,12 +321,12 @@ def _has_end_at(branch: Branch, value: float, state: FloatArray) -> bool:
 
 
 def _is_on(branch: Branch, orbit: Orbit) -> bool:
-    """Whether an orbit lies on a branch, at the section of any of its segments."""
+    """Whether an orbit lies on a branch, tested at the section of every segment of the branch."""
     return any(_is_at_section(branch, orbit, float(phase)) for phase in np.unique(branch.phases))
 
 
 def _is_at_section(branch: Branch, orbit: Orbit, phase: float) -> bool:
-    """Whether an orbit lies on those segments of a branch whose section has a given phase."""
+    """Whether an orbit lies on the segments of a branch whose section has the given phase."""
     value, state = orbit.regime.value(branch.parameter), _state_at(orbit, phase)
     half_widths = branch.regime.window.half_widths
     values = branch.values

@@ -35,20 +35,20 @@ PRECISION: Final = 1e-10
 """Scaled correction of Newton's method below which an orbit has converged; see `arclength`."""
 
 _PARTS: Final = 5.0
-"""Ratio of the parameter range to the parameter scale; state scales are half-widths of the window."""
+"""Ratio of the parameter range to the parameter scale; arbitrary."""
 _LOST: Final = ("lost", "jump", "no value")
 GRAZING: Final = "grazing"
 _AT_GRAZING: Final = "it grazes the rigid backstop, where the strobe map has no derivative"
 _SHORTER: Final = 1e-6
-"""Scaled closing error after a fraction of the firings, below which an orbit has the shorter period."""
+"""Scaled closing error after a fraction of the firings below which an orbit has the shorter period."""
 _DIGITS: Final = ".9g"
 _MOST_SECTIONS: Final = 8  # Maximum number of segments of a branch at different sections; arbitrary
 _SAME_PHASE: Final = 1e-3
-"""Difference between two section phases, as a fraction of the period, below which both are the same."""
+"""Difference of section phases, as a fraction of the period, below which two phases are the same."""
 _CLEAR: Final = 1e-3
-"""Scaled distance from the end of a segment within which orbits are removed before a section change."""
+"""Scaled distance from the end of a segment within which orbits are dropped at a section change."""
 _LEAST_CHORD: Final = 1e-5
-"""Smallest scaled distance between two orbits whose chord defines the direction of the branch."""
+"""Smallest scaled distance between two orbits whose chord gives the direction of the branch."""
 _NO_STOP: Final = Stop("section", math.nan, np.zeros(0), "the section moves")
 
 
@@ -152,7 +152,7 @@ class Tracer:
         return pieces, stop
 
     def before_end(self, nodes: list[Node]) -> list[Node]:
-        """Remove orbits at the end of a segment, where an impact close to the section spoils derivatives."""
+        """Drop orbits at the end of a segment, where an impact near the section spoils the derivatives."""
         places = np.array([np.append(node.state, node.parameter) for node in nodes]) / self.scales
         away = np.linalg.norm(places - places[0], axis=1) > _CLEAR
         return nodes[min(int(np.argmax(away)) if away.any() else 0, len(nodes) - 2) :]
@@ -160,9 +160,9 @@ class Tracer:
     def way_at(
         self, family: RegimeFamily, nodes: list[Node], quiet: tuple[Regime, FloatArray]
     ) -> FloatArray | None:
-        """Compute the scaled direction in which a branch continues at a section of another phase.
+        """Compute the scaled direction in which a branch continues at a section with another phase.
 
-        The first of the `nodes` is the last orbit; `quiet` is the regime at the new phase and the state of
+        The first of `nodes` is the last orbit; `quiet` contains the regime at the new phase and the state of
         this orbit there. The direction is that of the chord from an earlier orbit, since the tangent is
         useless: a contact at the section has no derivative, and at a fold the sign of the parameter is
         ambiguous. None if no orbit is far enough away, or if a run ends early.
@@ -186,7 +186,7 @@ class Tracer:
         return self if same else replace(self, regime=replace(self.regime, phase=phase))
 
     def grazed(self, family: RegimeFamily, curve: Curve) -> Curve:
-        """Extend a curve that ends near a grazing of a rigid backstop up to the grazing."""
+        """Extend a curve that ends near a grazing of a rigid backstop to the grazing itself."""
         if not has_rigid_backstop(self.regime):
             return curve
         nodes, stops = curve.nodes, list(curve.stops)
@@ -205,7 +205,7 @@ class Tracer:
         return Curve(nodes, (stops[0], stops[1]))
 
     def followed(self, firings: int, event: BranchEvent, most: int, threads: int | None) -> Branch:
-        """Follow the branch that is born at a period doubling, or that crosses at a branch point."""
+        """Follow the new branch at an event: born at a period doubling, or crossing at a branch point."""
         if event.phase != self.regime.phase:
             return self.at_phase(event.phase).followed(firings, event, most, threads)
         way = self.doubled if event.kind == "period doubling" else self.crossed
@@ -226,7 +226,7 @@ class Tracer:
         return self.described([(family, curve.nodes)], curve.stops, steps, threads)
 
     def doubled(self, firings: int, event: BranchEvent, most: int, threads: int | None) -> Branch:
-        """Follow the branch born at a period doubling of orbits of `firings` firings."""
+        """Follow the branch that is born at a period doubling of orbits of `firings` firings."""
         family = self.family(2 * firings)
         steps = Steps(most=most, precision=PRECISION)
         curve = follow_doubled(
@@ -250,7 +250,7 @@ class Tracer:
         return self.described([(family, nodes)], (born, curve.stops[1]), steps, threads)
 
     def at(self, value: float, state: FloatArray, firings: int) -> FloatArray | None:
-        """Find the orbit near a state at a given value of the parameter; return its state, or None."""
+        """Find the orbit near a state at a value of the parameter; return its state, or None if not found."""
         follower = Corrector(self.family(firings), self.scales, PRECISION)
         node = follower.at_parameter(follower.scaled(state, value))
         return None if node is None else np.asarray(node.state)
@@ -260,7 +260,7 @@ class Tracer:
         return f"{self.parameter} = {value:{_DIGITS}} {self.regime.quantity(self.parameter).si}"
 
     def watch(self, firings: int, steps: Steps, effort: Effort) -> Any:
-        """Build the callback that decides, between two nodes, whether the branch ends."""
+        """Build the callback that ends the branch between two nodes: at a grazing, merger or doubling."""
         half, whole = None, self.family(firings)
         if firings % 2 == 0:
             half = Corrector(self.family(firings // 2), self.scales, steps.precision)
@@ -283,7 +283,7 @@ class Tracer:
                 return self.merged(shorter, here, ahead) if shorter else None
             if born.node is None:
                 return born
-            # The event was located for half the period; the branch stores values of the whole period.
+            # The doubling was located on the curve of half the period; the branch stores whole-period values.
             value = whole(born.node.state, born.node.parameter)
             last = replace(born.node, value=value) if not value.trouble else here
             return replace(born, node=last)
@@ -296,9 +296,9 @@ class Tracer:
         return end is not None and bool(np.abs((end - node.state) / self.scales[:2]).max() < _SHORTER)
 
     def merged(self, shorter: list[RegimeFamily], here: Node, ahead: Node) -> Stop:
-        """Return the stop of a branch that has jumped to an orbit of fewer firings.
+        """Build the stop of a branch whose last step jumped to an orbit of fewer firings.
 
-        Near a period doubling, the curves of both periods are so close that a step may jump between them.
+        Near a period doubling the curves of both periods are so close that a step may jump between them.
         """
         longest = max(shorter, key=lambda part: part.firings)
         half = Corrector(longest, self.scales, PRECISION)
@@ -319,7 +319,7 @@ class Tracer:
         steps: Steps,
         threads: int | None,
     ) -> Branch:
-        """Build the branch and the properties of its orbits from segments that use different sections."""
+        """Build a `Branch` from segments with different sections; compute the properties of its orbits."""
         family = pieces[0][0]
         # A segment begins with the last orbit of the segment before it.
         owned = [

@@ -59,7 +59,7 @@ CYCLES: Final = 5
 """Number of cycles over which a path has to grow to count as chaos; within one cycle, any path may grow."""
 
 FOLLOWS: Final = 0.7
-"""Largest distance of images of neighbours, relative to arbitrary pairs, in a deterministic series."""
+"""Distance of the images of neighbours, relative to random pairs, below which a series is deterministic."""
 
 _CUT: Final = 10  # Ratio of the series length to the largest lag of the displacement (Gottwald and Melbourne)
 _PASSES: Final = 4  # Smallest number of cycles in a series for a cycle to be considered
@@ -164,7 +164,7 @@ def zero_one(
     seed : int, optional
         Seed of the random generator of the angles.
     **firing
-        How a hammer is fired, as for `printhammer.Regime.of`.
+        Firing of the hammer, as for `printhammer.Regime.of`.
 
     Returns
     -------
@@ -232,7 +232,7 @@ def zero_one(
 
 
 def _classify(k: float, cycle: int, rest: FloatArray, resolution: float) -> tuple[str, str]:
-    """Classify a series by K and its transient; return the classification and the reason if undecided."""
+    """Classify a series by K and its transient; return the class and, if undecided, the reason."""
     if k <= REGULAR:
         return "regular", ""
     quarter = rest.size // 4

@@ -75,7 +75,7 @@ def indices_add_up(regime: Regime) -> bool:
 
 
 def energies_of(regime: Regime) -> list[str]:
-    """Return the names of the energies in a summary: work of the drive, losses of the hammer's components."""
+    """Return the names of the energies in a summary: drive work, and losses of the hammer's components."""
     work = "drive_work" if regime.fired.quantity == "force" else "coil_work"
     damping = [] if regime.hammer.damping is None else ["damping_loss"]
     return [work, "pack_loss", "backstop_loss", *damping]
@@ -144,7 +144,7 @@ class Orbits(Result):
 
     @property
     def coverage(self) -> float:
-        """Estimated fraction of untried converging guesses that lead to a known orbit; NaN without guesses.
+        """Estimated probability that a further converging guess reaches a known orbit; NaN without guesses.
 
         The estimate is not a bound: orbits near no guess are not counted.
 
@@ -155,7 +155,7 @@ class Orbits(Result):
 
     @property
     def unseen(self) -> float:
-        """Estimated lower bound on the number of orbits that the search has missed.
+        """Estimated lower bound on the number of orbits that the search missed.
 
         The larger of two bounds: f1 (f1 - 1) / (2 (f2 + 1)), with f1 and f2 the numbers of orbits reached
         from exactly one and exactly two guesses (A. Chao, Scand. J. Statist. 11 (1984) 265); and the least
@@ -176,7 +176,7 @@ class Orbits(Result):
 
     @property
     def incomplete(self) -> tuple[int, ...]:
-        """Numbers of firings over which the indices do not add up to 1, so that orbits are missing."""
+        """Numbers of firings whose fixed-point indices do not sum to 1, so that orbits are missing."""
         return tuple(count for count, total in self.indices.items() if total != 1)
 
     @property

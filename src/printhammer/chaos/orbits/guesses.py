@@ -24,20 +24,20 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray
 
 PHASES: Final = (0.0, 0.5)
-"""Phases at which orbits are sought; orbits inside the pack at the first phase are found at the second."""
+"""Section phases of the search; orbits inside the pack at the first phase are found at the second."""
 
 _ALIKE: Final = 0.02
 """Distance, in half-widths of the strobe window, below which two guesses are duplicates."""
 _EARLY_ALIKE: Final = 0.1
-"""Distance, in half-widths, below which two guesses from the first firings of motions are duplicates."""
+"""As `_ALIKE`, for guesses from the first firings of motions, which cover the plane more coarsely."""
 _LOOKED_AT: Final = 4000
 """Maximum number of close returns, closest first, that are tested for duplicates; arbitrary."""
 _EARLY: Final = 2
-"""Number of first firings of a motion whose close returns count as early."""
+"""Number of firings from the start of a motion within which close returns count as early."""
 _LEAST: Final = 16
 """Smallest number of firings over which a motion is recorded."""
-_ROOM: Final = 1.2  # Extent of the spread beyond the window, in half-widths of the window
-# Extent of the spread of an unbounded motion: a ball that bounces once a period rises 5 scales
+_ROOM: Final = 1.2  # Extent of the initial states beyond the strobe window, in half-widths of the window
+# Extent of the initial states without a bound: a ball that bounces once a period rises 5 half-widths
 _SCALES: Final = 6.0
 _PLASTIC: Final = 1.324717957244746
 """Real root of x^3 = x + 1, whose inverse powers spread points evenly over a square."""
@@ -58,16 +58,16 @@ class Records(Declared):
 
 
 def firings_for(period: int) -> int:
-    """Compute the number of firings over which motions are recorded to find orbits of a period."""
+    """Compute the number of firings to record per motion in a search for orbits of a period."""
     return max(2 * period, _LEAST)
 
 
 def record(
     regime: Regime, starts: FloatArray, firings: int, long: int, threads: int | None = None
 ) -> list[Records]:
-    """Simulate motions from states at a firing, shape (M, 2); return their records at each of `PHASES`.
+    """Simulate motions from initial states, shape (M, 2); record their states at each of `PHASES`.
 
-    The motion from the first state lasts `long` firings, all other motions `firings` firings.
+    The motion from the first state lasts `long` firings; every other motion lasts `firings` firings.
     """
     longest = max(firings, long) if len(starts) else 0
     drive, _ = regime.train(longest + 1)
@@ -96,11 +96,11 @@ def record(
 
 
 def spread(regime: Regime, count: int, visited: FloatArray) -> FloatArray:
-    """Spread states evenly: half over the strobe window, half over the region visited by motions.
+    """Distribute initial states evenly: half over the strobe window, half over the region of `visited`.
 
     If backstop and pack do not both bound the displacement, the region extends over at least six half-widths
-    of the window on either side: a ball that bounces once per period rises to five half-widths. Each row is a
-    state: displacement, m, and velocity, m/s.
+    of the window on either side: a ball that bounces once per period rises to five half-widths. A row is
+    displacement, m, and velocity, m/s.
     """
     window = regime.window
     low, high = np.array([window.x[0], window.v[0]]), np.array([window.x[1], window.v[1]])
@@ -122,7 +122,7 @@ def spread(regime: Regime, count: int, visited: FloatArray) -> FloatArray:
     share = (0.5 + number * np.array([1.0 / _PLASTIC, 1.0 / _PLASTIC**2])) % 1.0
     odd = (number % 2).astype(bool)
     states: FloatArray = np.where(odd, wide_low + share * (wide_high - wide_low), low + share * (high - low))
-    # A state is valid where the law of the magnet holds and no rigid backstop is penetrated.
+    # Outside the range of the magnet's law, or behind a rigid backstop, no motion can start.
     magnet, backstop = regime.hammer.magnet, regime.hammer.backstop
     least, most = magnet.domain if magnet is not None else (-np.inf, np.inf)
     if backstop is not None and backstop.law == "rigid":
@@ -205,9 +205,9 @@ def close_returns(
 def joined(
     shorter: Sequence[Guess], period: int, most: int, scales: FloatArray, known: Collection[tuple[int, int]]
 ) -> list[Guess]:
-    """Concatenate pairs of shorter orbits to form initial guesses of `period` firings.
+    """Concatenate pairs of shorter orbits into initial guesses for orbits of `period` firings.
 
-    At most `most` pairs are used, those with the smallest jumps between the orbits first; pairs of indices in
+    At most `most` pairs are used, in ascending order of the jump between the two orbits; pairs of indices in
     `known` are skipped.
     """
     guesses: list[tuple[float, Guess]] = []
@@ -225,7 +225,7 @@ def joined(
 
 
 def _is_new(cycle: FloatArray, kept: FloatArray, apart: float) -> bool:
-    """Whether a cycle of states differs from all known cycles by more than `apart`, up to a cyclic shift."""
+    """Whether a cycle of states differs by more than `apart` from all known cycles, cyclically shifted."""
     if not len(kept):
         return True
     return all(

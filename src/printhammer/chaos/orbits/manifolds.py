@@ -171,7 +171,7 @@ class _Limits:
 
 @dataclass
 class _Curve:
-    """Points of a manifold curve, starting at the saddle, and the reason for the end of the curve."""
+    """Manifold curve: its points, from the saddle outward, and the reason for its end."""
 
     points: FloatArray
     end: str
@@ -201,7 +201,7 @@ class Scaled:
 
 
 def _direction(own: Scaled, saddle: FloatArray, firings: int, stable: bool) -> tuple[FloatArray, float, int]:
-    """Return the eigenvector at a saddle, its growth factor per step, and the firings of a step.
+    """Return the eigenvector at a saddle, the growth factor per step, and the firings per step.
 
     If the multiplier is negative, images alternate between the sides of the saddle, so that one step is two
     periods.
@@ -218,7 +218,7 @@ def _direction(own: Scaled, saddle: FloatArray, firings: int, stable: bool) -> t
 
 
 def _unstable(own: Scaled, saddle: FloatArray, side: float, firings: int, limits: _Limits) -> _Curve:
-    """Grow an unstable manifold from images of a fundamental segment."""
+    """Grow an unstable manifold as the images of a fundamental segment; return the curve."""
     vector, growth, firings = _direction(own, saddle, firings, stable=False)
     start = _NEAR / growth
 
@@ -264,7 +264,7 @@ def _unstable(own: Scaled, saddle: FloatArray, side: float, firings: int, limits
 
 
 def _sink(own: Scaled, point: FloatArray, firings: int, spacing: float) -> FloatArray | None:
-    """Find the stable fixed point within one spacing of a point by Newton's method; None if not found."""
+    """Find the stable fixed point within one spacing of a point by Newton's method, or None."""
     guess = point
     for _ in range(_NEWTON):
         image, jacobian = own.image(guess, firings)
@@ -280,11 +280,11 @@ def _sink(own: Scaled, point: FloatArray, firings: int, spacing: float) -> Float
 
 
 def _has_gap(row: list[FloatArray], k: int, spacing: float) -> bool:
-    """Whether a point has to be inserted after the k-th point of a curve."""
+    """Whether a point has to be inserted after point k: wide gap, sharp bend, or end of the curve."""
     here, there = row[k], row[k + 1]
     step = float(np.hypot(*(there - here)))
     if not math.isfinite(step):
-        # A point is inserted between a finite and a non-finite point, to come closer to the end of the curve.
+        # Between a finite and a non-finite point, insert points to approach the end of the curve.
         return bool(np.isfinite(here).any() != np.isfinite(there).any())
     if step > spacing:
         return True
@@ -295,7 +295,7 @@ def _has_gap(row: list[FloatArray], k: int, spacing: float) -> bool:
 
 
 def _stable(own: Scaled, saddle: FloatArray, side: float, firings: int, limits: _Limits) -> _Curve:
-    """Continue a stable manifold: each new point is the state whose image lies on the known curve."""
+    """Continue a stable manifold: each new point is the preimage of a point of the known curve."""
     vector, shrink, firings = _direction(own, saddle, firings, stable=True)
     made = _Inward(saddle, side * _NEAR * vector, shrink)
     place, step, total = 1.0, 0.05, 0.0
@@ -311,7 +311,7 @@ def _stable(own: Scaled, saddle: FloatArray, side: float, firings: int, limits: 
         # The prediction extrapolates the curve, which is straight at first.
         ahead = made.at(place + step) if len(made.points) >= _FEW else made.ahead(step)
         move = ahead - last
-        # Far away the cost of a run is unbounded.
+        # A run from a state far from the curve may take unboundedly long.
         near = float(np.hypot(*move)) <= 2.0 * limits.spacing
         solved = _preimage(own, wanted, last + move, firings, limits.spacing) if near else None
         if solved is None:
@@ -334,9 +334,9 @@ def _stable(own: Scaled, saddle: FloatArray, side: float, firings: int, limits: 
 
 @dataclass
 class _Inward:
-    """Known part of a stable manifold; the curve parameter grows by 1 from a point to its preimage.
+    """Known section of a stable manifold; its parameter grows by 1 from each point to its preimage.
 
-    Up to the parameter 1 the curve is treated as straight.
+    From 0 to 1 the curve is treated as straight.
     """
 
     saddle: FloatArray
@@ -351,13 +351,13 @@ class _Inward:
         self.places.append(1.0)
 
     def ahead(self, step: float) -> FloatArray:
-        """Extrapolate the curve by a step beyond its end, along the line from the saddle."""
+        """Extrapolate the curve beyond its end by a parameter step, along the line from the saddle."""
         return np.asarray(self.saddle + (self.points[-1] - self.saddle) * self.shrink**-step)
 
     def at(self, place: float) -> FloatArray:
-        """Interpolate the point at a parameter: beyond 1 by the cubic through four neighbours.
+        """Interpolate the point at a parameter value: on the straight start, or by a cubic beyond 1.
 
-        The interpolated quantity is the offset from the saddle, divided by the offset under the linear map.
+        The cubic interpolates the offset from the saddle divided by the offset under the linear map.
         """
         if place <= 1.0:
             return np.asarray(self.saddle + self.shrink ** (1.0 - place) * self.reach)
@@ -375,7 +375,7 @@ class _Inward:
 def _preimage(
     own: Scaled, wanted: FloatArray, guess: FloatArray, firings: int, spacing: float
 ) -> FloatArray | None:
-    """Find the preimage of a point, close to a guess, by Newton's method; None if not found."""
+    """Find the preimage of the point `wanted` near a guess by Newton's method, or None."""
     point = guess
     for _ in range(_NEWTON):
         image, jacobian = own.image(point, firings)
@@ -398,6 +398,6 @@ def _angle(one: FloatArray, other: FloatArray) -> float:
 
 
 def _along(points: FloatArray) -> FloatArray:
-    """Compute the arc length along a curve at each of its points; a jump adds no length."""
+    """Compute the arc length from the first point of a curve to each point; jumps add no length."""
     steps = np.nan_to_num(np.hypot(*np.diff(points, axis=0).T))
     return np.concatenate([[0.0], np.cumsum(steps)])

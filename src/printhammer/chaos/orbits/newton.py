@@ -45,7 +45,7 @@ SINGULAR: Final = "singular derivative"
 
 _LONGEST_STEP: Final = 1.0
 _LEAST_SHARE: Final = 2.0**-7
-"""Longest Newton step, in half-widths of the strobe window; smallest damping factor of a step."""
+"""Largest Newton step, in half-widths of the strobe window; smallest damping factor of a step."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Images:
 
     @classmethod
     def empty(cls, count: int) -> Images:
-        """Return a table of images filled with NaN, one row per state."""
+        """Build a table of `count` images with all values NaN."""
         return cls(
             np.full((count, 2), np.nan),
             np.full((count, 2, 2), np.nan),
@@ -69,7 +69,7 @@ class Images:
 
 
 class StrobeMaps(Protocol):
-    """Interface that computes the images of states, shape (n, 2), each after its own number of firings."""
+    """Interface of a strobe map: images of many states, shape (n, 2), each with its number of firings."""
 
     def __call__(self, states: FloatArray, firings: IntArray) -> Images:
         """Compute the images of states under the strobe map, with derivatives."""
@@ -124,7 +124,7 @@ def close_orbits(
 
 
 class _Search:
-    """State of Newton's method for many initial guesses at once; distances in half-widths of the window."""
+    """Newton iterations of many initial guesses at once; distances in half-widths of the strobe window."""
 
     def __init__(self, maps: StrobeMaps, guesses: FloatArray, firings: IntArray, scales: FloatArray) -> None:
         count, self.segments = guesses.shape[:2]
@@ -143,7 +143,7 @@ class _Search:
         self.open &= np.isfinite(self.residual)
 
     def step(self, goal: float, enough: float) -> IntArray:
-        """Try one damped step of every orbit that is still open; return the indices of these orbits."""
+        """Try one damped Newton step for every open orbit; return the indices of these orbits."""
         self._end(self.open & (self.residual <= goal), CLOSED)
         rows = np.flatnonzero(self.open)
         if not rows.size:
@@ -185,7 +185,7 @@ class _Search:
         self.open[rows] = False
 
     def _evaluate(self, z: FloatArray, rows: IntArray) -> tuple[Images, FloatArray, FloatArray, TextArray]:
-        """Compute images of all segment starts, gaps to the following starts, their norms, and failures."""
+        """Evaluate orbits at trial states; return images, closing defects, their norms, and failures."""
         images = self.maps((z * self.scales).reshape(-1, 2), self.firings[rows].reshape(-1))
         ends = images.states.reshape(z.shape) / self.scales
         defects = ends - np.roll(z, -1, axis=1)
@@ -204,7 +204,7 @@ class _Search:
         reasons: TextArray,
         which: BoolArray | None = None,
     ) -> None:
-        """Store the values at accepted points, and compute the next full steps."""
+        """Store the accepted iterates and compute the full Newton step from each."""
         chosen = np.ones(len(residual), np.bool_) if which is None else which
         shape = (len(residual), self.segments, 2, 2)
         jacobians = images.jacobians.reshape(shape) * self.scales / self.scales[:, np.newaxis]
@@ -217,7 +217,7 @@ class _Search:
         self._aim(rows[~bad])
 
     def _aim(self, rows: IntArray) -> None:
-        """Solve the linear system of the full step, and clip it to the longest allowed step."""
+        """Solve the linear systems of the full Newton steps; clip each step to the largest allowed."""
         m = self.segments
         matrix = np.zeros((len(rows), 2 * m, 2 * m))
         for i in range(m):
@@ -243,7 +243,7 @@ _PIECE: Final = 30_000
 
 
 class ExactMaps:
-    """Exact images: one state at a time, in threads, with derivatives from the tangent flow."""
+    """Strobe map by single runs in threads, with derivatives from the tangent flow."""
 
     def __init__(self, regime: Regime, effort: Effort) -> None:
         self.regime, self.effort = regime, effort.quiet
@@ -262,7 +262,7 @@ class ExactMaps:
 
 
 class FastMaps:
-    """Fast images, after at most `longest` firings: an ensemble, with derivatives from differences."""
+    """Strobe map by one ensemble, up to `longest` firings, with finite-difference derivatives."""
 
     def __init__(self, regime: Regime, longest: int, effort: Effort) -> None:
         regime.check_planar()
@@ -272,7 +272,7 @@ class FastMaps:
         self.scales = regime.window.half_widths
 
     def __call__(self, states: FloatArray, firings: IntArray) -> Images:
-        """Compute the images of states as an ensemble, each after its own number of firings."""
+        """Compute the images of states by one ensemble run, each after its own number of firings."""
         images = Images.empty(len(states))
         step, hammer = _SPACING * self.scales, self.regime.hammer
         neighbours = states[:, np.newaxis] + np.array([[0.0, 0.0], [step[0], 0.0], [0.0, step[1]]])

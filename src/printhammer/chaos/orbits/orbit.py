@@ -37,7 +37,7 @@ NEUTRAL: Final = 1e-6
 """Distance of the absolute value of a multiplier from 1 within which stability is undecided."""
 
 CLOSES: Final = 1e-6
-"""Largest closing error of a valid orbit, in half-widths of the strobe window.
+"""Largest closing error of a valid orbit over a whole period, in half-widths of the strobe window.
 
 If the larger multiplier exceeds 1 in absolute value, the limit is multiplied by that absolute value.
 """
@@ -294,7 +294,7 @@ def orbit_of(regime: Regime, closing: Closing, tolerance: float) -> Orbit:
     residual = float(np.abs((returned - start) / regime.window.half_widths).max())
     jacobians = np.roll(closing.jacobians, -first, axis=0)
     multipliers = multipliers_of(jacobians)
-    # The residual of Newton's method grows along the orbit.
+    # The residual of multiple shooting grows along the orbit.
     if not residual <= CLOSES * max(1.0, abs(multipliers[0])):
         return no_orbit(regime, firings, tolerance, "does not close when re-integrated as a whole")
     states = run.at_firings()
@@ -321,7 +321,7 @@ def orbit_of(regime: Regime, closing: Closing, tolerance: float) -> Orbit:
 
 
 def multipliers_of(jacobians: FloatArray) -> npt.NDArray[np.complex128]:
-    """Compute the eigenvalues of a product of matrices, shape (m, 2, 2), the last factor on the left.
+    """Compute the eigenvalues of the product of 2 x 2 matrices, shape (m, 2, 2), last factor on the left.
 
     The eigenvalues are computed from trace and determinant, and the determinant as the product of the
     factors' determinants, since the rounding of the matrix product would destroy the small eigenvalue of a
@@ -341,7 +341,7 @@ def multipliers_of(jacobians: FloatArray) -> npt.NDArray[np.complex128]:
 
 
 class _Run:
-    """Run over several drive periods from a section, in a train whose earlier pulses may still act."""
+    """Run over several drive periods from a section, within a train of earlier pulses."""
 
     def __init__(self, regime: Regime, start: FloatArray, periods: int, tolerance: float) -> None:
         self.regime, self.periods = regime, periods
@@ -359,7 +359,7 @@ class _Run:
         return Motion(self.problem, self.record, end, times, "default")
 
     def at_firings(self) -> FloatArray:
-        """Return displacement, velocity, mode and memory at the firing of each period, one row per period.
+        """Return displacement, m, velocity, m/s, mode and memory, m, at each firing, one row per period.
 
         The first row belongs to the last firing at or before the section.
         """
@@ -373,7 +373,7 @@ class _Run:
 def _contacts_and_dots(
     regime: Regime, start: FloatArray, firings: int, tolerance: float
 ) -> tuple[Rows[Contact], Rows[Dot]]:
-    """Return the contacts and dots that begin in one period of an orbit; the run lasts until they end."""
+    """Compute the contacts and dots that begin in one period of an orbit, each followed to its end."""
     skipped = 0 if regime.phase == 0.0 or regime.drive is not None else 1
     run = _Run(regime, start, firings + skipped + 1, tolerance)
     motion, period = run.motion, firings * regime.period
@@ -411,7 +411,7 @@ def _numbers(values: Iterable[float | None]) -> FloatArray:
 
 
 def orbits_table(orbits: Sequence[Orbit], attributes: Mapping[str, Any]) -> pd.DataFrame:
-    """Convert orbits to a table with one row per firing of each orbit."""
+    """Tabulate orbits, one row per firing of each orbit."""
     import pandas as pd
 
     tables = []

@@ -25,7 +25,7 @@ MOST_FIRINGS: Final = 64  # Largest orbit period that can be searched for, in fi
 STARTS: Final = 1024
 GUESSES: Final = 48
 FOLLOW: Final = 2
-"""Defaults of `orbits`: numbers of starts and of guesses, and largest period of followed branches."""
+"""Defaults of `orbits`: number of starts, number of guesses, largest period of followed branches."""
 
 
 @computation
@@ -119,7 +119,7 @@ def orbit(
         if images.reasons[0] or not np.isfinite(images.states).all():
             break
         states.append(images.states[0])
-    # If a section on the way falls into the pack, the orbit is one segment.
+    # If one of the sections falls into the pack, the orbit is a single segment.
     segments = np.ones(count, np.int64) if len(states) == count else np.array([count])
     guess = np.array(states[: len(segments)])
     (closing,) = close_orbits(exact, guess[np.newaxis], segments[np.newaxis], scales, **LONE)

@@ -41,7 +41,7 @@ NEAR: Final = 0.1
 
 _SHRINKS: Final = 1e-5
 _NOISE: Final = 1e-9
-"""Smallest decreases of a distance that count as shrinking: relative, and absolute in half-widths."""
+"""Smallest decrease of a distance that counts as shrinking: relative, and absolute in half-widths."""
 _GOAL: Final = 1e-13
 _ENOUGH: Final = 1e-9
 """Residual at which Newton's method stops, and residual that is accepted if it stops decreasing."""
@@ -65,7 +65,7 @@ class Settled(Declared):
 
 
 def shown(points: FloatArray, period: int) -> BoolArray:
-    """Mask of the motions with states so close `period` firings apart that the period needs no Newton test.
+    """Mask of the motions whose states alone prove the period `period`, without a Newton test.
 
     Points, shape (n, m, k), are the states at m successive firings, divided by the scales.
     """
@@ -115,9 +115,9 @@ def settled(regime: Regime, points: FloatArray, period: int, scales: FloatArray)
 def is_approaching(
     points: FloatArray, orbit: FloatArray, within: float = NEAR, lies_on: float = LIES_ON
 ) -> bool:
-    """Whether successive states, shape (m, 2), lie on a periodic orbit or converge to the orbit.
+    """Whether successive states, shape (m, 2), lie on a periodic orbit or converge to it.
 
-    False if the states converge to a point beside the orbit: their steps then shrink, but their distance from
+    False if the states converge to a point off the orbit: their steps then shrink, but their distance from
     the orbit does not.
     """
     count = len(orbit)
@@ -132,10 +132,9 @@ def is_approaching(
 
 
 def noise_about(multiplier: float) -> float:
-    """Compute the distance from a stable orbit, in half-widths, that integration errors can cause.
+    """Compute the largest distance from a stable orbit, in half-widths, attributable to integration errors.
 
-    The allowed distance grows as the largest multiplier falls, since the boundary of the basin is then
-    further away.
+    The distance grows as the largest multiplier falls, since the basin boundary is then further away.
     """
     return max(LIES_ON, DISTINCT * (1.0 - multiplier))
 
@@ -151,7 +150,7 @@ def _by_states(points: FloatArray, scaled: FloatArray, period: int) -> Settled:
 
 
 def _apart(points: FloatArray, count: int, period: int) -> tuple[FloatArray, FloatArray]:
-    """Compute the mean distance of states `count` firings apart, early and late in each motion."""
+    """Compute the mean distance of states `count` firings apart, early and late in each scaled motion."""
     apart = np.abs(points[:, count:] - points[:, :-count]).max(axis=2)
     part = period * max(apart.shape[1] // (4 * period), 1)
     return apart[:, :part].mean(axis=1), apart[:, -part:].mean(axis=1)

@@ -1,9 +1,8 @@
 """Stages of a search for periodic orbits: blocks of starts, batches of guesses, branches through orbits.
 
-*Branches.* Further orbits at the same period lie on the branches through known orbits.
-
-A branch of periodic orbits turns back at its folds and returns to the same period, at orbits so unstable that
-no motion comes close to them.
+*Branches.* A branch of periodic orbits through a known orbit may turn back at its folds and return to the
+period of the drive, at orbits so unstable that no motion comes close to them. Such orbits are found by
+following the branch.
 """
 
 from __future__ import annotations
@@ -42,14 +41,14 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray
 
 SHARE: Final = 0.05
-"""Range of drive periods over which a branch is followed, on either side, as a fraction of the period."""
+"""Half-range of drive periods over which a branch is followed, as a fraction of the period."""
 
-_PARTS: Final = 5.0  # Parameter range by its scale, as in `printhammer.chaos.continuation.tracer`
+_PARTS: Final = 5.0  # Ratio of parameter range to parameter scale, as in `continuation.tracer`
 _STEPS: Final = Steps(most=150, precision=1e-10)
 
 
 def crossings(orbit: Orbit) -> list[FloatArray]:
-    """Find the states at which the branch of an orbit, followed in the period, regains the orbit's period."""
+    """Find further orbits at the same drive period: states where the branch of an orbit returns to it."""
     regime, own = orbit.regime, orbit.regime.period
     if PERIOD not in regime.names:
         return []
@@ -73,12 +72,12 @@ def crossings(orbit: Orbit) -> list[FloatArray]:
 
 
 _LONG: Final = 400
-"""Number of firings of the train from rest whose close returns are guesses."""
+"""Number of firings of the long record, the train from rest, that is searched for close returns."""
 _BLOCKS: Final = (128, 1024)  # Numbers of starts, ascending; requests are rounded up, as for `_BATCHES`
 _BATCHES: Final = (8, 48)
 """Numbers of guesses, ascending; requests are rounded up to an entry or a repeated doubling of the last."""
 _EVEN: Final = 8
-"""Orbit period, in firings, below which orbits get more guesses, in inverse proportion to the period."""
+"""Orbit period, in firings, below which the number of guesses is raised in inverse proportion."""
 _JOINED: Final = 48
 """Maximum number of guesses per stage and period that are concatenations of two shorter orbits."""
 _TOUCHES: Final = 4
@@ -100,7 +99,7 @@ LONE: Final[dict[str, Any]] = {"goal": 1e-13, "enough": 1e-9, "iterations": 60}
 
 
 def shortest(closing: Closing, scales: FloatArray) -> Closing:
-    """Shorten a closed orbit whose states repeat after a fraction of its firings."""
+    """Shorten a closed orbit whose states repeat after a fraction of its firings to that fraction."""
     ends = np.cumsum(closing.firings)
     total = int(ends[-1])
     for k in range(1, len(closing.states)):
@@ -114,14 +113,14 @@ def shortest(closing: Closing, scales: FloatArray) -> Closing:
 
 @dataclass
 class _Known:
-    """Known orbit of a search, with the number of guesses that led to it and the stages that found it."""
+    """Orbit found by a search, with its number of hits and the (block, batch) stages that found it."""
 
     closing: Closing
     stages: list[tuple[int, int]]
     hits: int = 1
 
     def is_visible(self, block: int, batch: int) -> bool:
-        """Whether the orbit was found by a stage up to a given block of starts and batch of guesses."""
+        """Whether a stage up to the given block of starts and batch of guesses found the orbit."""
         return any(i <= block and j <= batch for i, j in self.stages)
 
 
@@ -194,7 +193,7 @@ class Search:
         self.effort.report(self.done, self.all)
 
     def _through(self, regime: Regime, records: Records) -> list[_Known]:
-        """Find all distinct orbits from recorded motions, with the section at the phase of a regime."""
+        """Find all distinct orbits from recorded motions, at the section phase of a regime."""
         fast = FastMaps(regime, self.longest, self.effort.at(TOLERANCE))
         different: list[_Known] = []
         seen: set[bytes] = set()
@@ -218,7 +217,7 @@ class Search:
         return self._refine(regime, different)
 
     def _further(self, fast: FastMaps, different: list[_Known], records: Records, seen: set[bytes]) -> None:
-        """Try additional close returns: from longer motions, and from motions just after a touch.
+        """Try additional close returns: of longer motions, and of motions just after a touch.
 
         These guesses are tried last, so that no orbit of the earlier stages is lost.
         """
@@ -251,7 +250,7 @@ class Search:
                 self._try(fast, different, more, (len(self.blocks) - 1, last))
 
     def _complete(self, fast: FastMaps, different: list[_Known], records: Records) -> None:
-        """Try more guesses for each period whose fixed-point indices do not sum to 1.
+        """Try more guesses for every period whose fixed-point indices do not sum to 1.
 
         The guesses are close returns, and then states near known orbits.
         """
@@ -282,12 +281,12 @@ class Search:
         ]
 
     def _batch(self, guesses: list[Guess], batch: int, period: int) -> list[Guess]:
-        """Return the guesses that a batch adds to the preceding batches."""
+        """Select the guesses of one batch, i.e. those beyond the preceding batches."""
         begin, end = (_share(count, period) // 2 for count in (0, *self.batches)[batch : batch + 2])
         return guesses[begin:end]
 
     def _concatenate(self, different: list[_Known], period: int, stage: tuple[int, int]) -> list[Guess]:
-        """Concatenate pairs of orbits available to a stage, except pairs that an earlier stage has tried."""
+        """Concatenate pairs of orbits known to a stage, except pairs that an earlier stage has tried."""
         block, batch = stage
         seen = [orbit for orbit in different if orbit.is_visible(block, batch)]
         before = [
@@ -300,7 +299,7 @@ class Search:
     def _try(
         self, maps: ExactMaps | FastMaps, different: list[_Known], tried: list[Guess], stage: tuple[int, int]
     ) -> None:
-        """Converge guesses by Newton's method, and add the orbits that are new."""
+        """Converge guesses by Newton's method; append new orbits, and count the hits of known orbits."""
         options = _FAST if isinstance(maps, FastMaps) else LONE
         for guess in tried:
             self.tried[int(guess.firings.sum()) - 1] += 1
@@ -308,7 +307,7 @@ class Search:
             self._add(different, _Known(closing, [stage]))
 
     def _refine(self, regime: Regime, different: list[_Known]) -> list[_Known]:
-        """Converge orbits again, with the requested tolerance."""
+        """Converge the orbits of a search again at the requested tolerance."""
         exact = ExactMaps(regime, self.effort)
         refined: list[_Known] = []
         closings = _converge(exact, [orbit.closing for orbit in different], self.scales, _EXACT)
@@ -317,7 +316,7 @@ class Search:
         return refined
 
     def _add(self, different: list[_Known], new: _Known) -> None:
-        """Add a closed orbit unless it is known; orbits that share a state are the same."""
+        """Append a closed orbit unless it shares a state with a known orbit, which gets the hit instead."""
         if not new.closing.closed:
             self.failures[new.closing.reason] += 1
             return
@@ -342,7 +341,7 @@ class Search:
         )
 
     def _describe(self, described: list[tuple[Orbit, int]], known: Sequence[tuple[Regime, _Known]]) -> None:
-        """Compute the properties of orbits, and add those not yet found at another section."""
+        """Compute the properties of orbits; append those not yet found at another section."""
         quiet = self.effort.quiet
         orbits = quiet.mapped(lambda pair: orbit_of(pair[0], pair[1].closing, quiet.tolerance), known)
         for orbit, (_regime, own) in zip(orbits, known, strict=True):
@@ -361,7 +360,7 @@ class Search:
                 described.append((orbit, own.hits))
 
     def _along(self, described: list[tuple[Orbit, int]]) -> None:
-        """Add orbits on branches through short orbits, and concatenations with these new orbits."""
+        """Append orbits on the branches through short orbits, and concatenations with these new orbits."""
         first = [orbit for orbit, _hits in described]
         short = [orbit for orbit in first if orbit.firings <= self.follow and orbit.smooth]
         states = self.effort.quiet.mapped(crossings, short)
@@ -375,7 +374,7 @@ class Search:
         for orbit, _hits in described:
             by_phase.setdefault(orbit.phase, []).append(orbit)
         for phase, every in by_phase.items():
-            # The pairs of the first orbits, which head the list, have been tried already.
+            # Pairs of the earlier orbits, first in the list, have been tried already.
             old = sum(orbit.phase == phase for orbit in first)
             if old == len(every):
                 continue
@@ -392,7 +391,7 @@ class Search:
             self._describe(described, [(every[0].regime, known) for known in different])
 
     def _mirror(self, described: list[tuple[Orbit, int]]) -> None:
-        """Add mirror images of orbits, x -> -x half a period later, if the hammer has no one-sided surface.
+        """Append mirror images of orbits, x -> -x half a period later, unless a surface breaks the symmetry.
 
         If the forces are not odd, Newton's method finds no orbit, or a different orbit.
         """
@@ -419,23 +418,23 @@ class Search:
 
 
 def _index_sum(different: Sequence[_Known], period: int) -> int:
-    """Compute the sum of the fixed-point indices of known orbits over a number of firings."""
+    """Sum the fixed-point indices of known orbits over a number of firings."""
     own = [(int(known.closing.firings.sum()), multipliers_of(known.closing.jacobians)) for known in different]
     return index_sums(own, period)[period]
 
 
 def _share(guesses: int, period: int) -> int:
-    """Return the number of guesses for a period, so that every period takes about the same work."""
+    """Scale the number of guesses for a period, so that all periods take about the same computation."""
     return guesses * max(1, _EVEN // period)
 
 
 def _doublings(first: int, below: int) -> list[int]:
-    """List the products of a number and the powers of 2 that lie below a limit."""
+    """Return `first` times the powers of 2, as long as the product is below a limit."""
     return [first << k for k in range(below.bit_length()) if first << k < below]
 
 
 def _steps(ladder: Sequence[int], most: int) -> list[int]:
-    """List the numbers of an ascending sequence, extended by doubling, up to the first of at least `most`."""
+    """Extend an ascending sequence by doubling; return its terms up to the first of at least `most`."""
     rungs = list(ladder)
     while rungs[-1] < most:
         rungs.append(2 * rungs[-1])
@@ -459,7 +458,7 @@ def _converge(
     scales: FloatArray,
     options: Mapping[str, Any],
 ) -> list[Closing]:
-    """Converge guesses by Newton's method; return the outcomes, one per guess, in input order."""
+    """Converge guesses by Newton's method; return one outcome per guess, in input order."""
     known: dict[int, Closing] = {}
     counts = [len(guess.firings) for guess in tried]
     for segments in sorted(set(counts)):

@@ -11,8 +11,8 @@ status is "a current flows".
 
 *Quiet section.* The phase of the drive at which an orbit is farthest from all its contacts.
 
-If an impact on a rigid backstop meets the section, the state jumps; if the armature is moving out of the pack
-at the section, the state includes a memory. Any orbit can be observed at another phase.
+If an impact on a rigid backstop coincides with the section, the state jumps; if the armature is moving out of
+the pack at the section, the state includes a memory. The same orbit can be observed at another phase.
 """
 
 from __future__ import annotations
@@ -54,11 +54,11 @@ CURRENT: Final = "a current flows"
 """Status of an image if the coil carries a current at the section, which then belongs to the state."""
 _OK: Final = "ok"
 RANGE_LEFT: Final = "range left"
-"""Status of an image if no motion can start with the displacement, e.g. behind a rigid backstop."""
+"""Status of an image whose initial displacement is inaccessible, e.g. behind a rigid backstop."""
 
 _TURN_STEPS: Final = 60  # Iteration limit of the root search for an extremum; arbitrary
 _STILL: Final = 1e-9
-"""Relative speed below which a motion is at an extremum; the displacement error is of second order."""
+"""Relative speed at which the root search for an extremum stops; the displacement error is quadratic."""
 STILL_COIL: Final = 1e-9
 """Current or flux linkage, relative to a typical value, below which the coil counts as currentless."""
 
@@ -156,7 +156,7 @@ def image_of(
 
 
 def is_possible(hammer: Hammer, x: float, v: float) -> bool:
-    """Whether a motion can start with a displacement, m, and a velocity, m/s."""
+    """Whether (x, v), m and m/s, is a valid initial state: inside the laws' ranges, not behind a backstop."""
     try:
         initial_state(hammer, (x, v))
     except InputError:
@@ -165,12 +165,12 @@ def is_possible(hammer: Hammer, x: float, v: float) -> bool:
 
 
 def is_usable(hammer: Hammer, x: float, v: float) -> bool:
-    """Whether displacement, m, and velocity, m/s, are the whole state: not when moving out of the pack."""
+    """Whether (x, v), m and m/s, is the complete state; False for an armature moving out of the pack."""
     return not (v <= 0.0 and x > front_with_memory(hammer))
 
 
 def front_with_memory(hammer: Hammer) -> float:
-    """Return the front position of a pack with a memory, m; infinite without such a pack."""
+    """Return the front position of a pack whose law has a memory, m; infinite for every other hammer."""
     if hammer.pack is None or not getattr(import_module(hammer.pack.module), "MEMORY", False):
         return math.inf
     return hammer.pack.front
@@ -194,7 +194,7 @@ def margin_of(problem: Problem, record: Record) -> float:
 
 
 def turns(problem: Problem, record: Record) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Locate all local extrema of a run; return times, s, displacements, m, and signs (1: a maximum)."""
+    """Locate the displacement extrema of a run; return times, s, displacements, m, and signs (1: maximum)."""
     nodes = record.nodes
     before, after = nodes[:-1, 2], nodes[1:, 2]
     rows = np.flatnonzero(
@@ -227,14 +227,14 @@ def turns(problem: Problem, record: Record) -> tuple[FloatArray, FloatArray, Flo
 
 
 _BEYOND: Final = 0.01  # Time by which a run extends beyond the last section, as a fraction of the period
-# Time between an impact and the section below which they coincide, as a fraction of the period
+# Time between an impact and a section, as a fraction of the period, below which the two coincide
 _ON_IMPACT: Final = 1e-3
 
 
 def quiet_section(
     regime: Regime, state: FloatArray, firings: int, tolerance: float
 ) -> tuple[Regime, FloatArray] | None:
-    """Choose the phase farthest from all contacts of an orbit; return the regime and the state there.
+    """Choose the phase farthest from all contacts of an orbit; return regime and state at that phase.
 
     Parameters
     ----------
@@ -269,7 +269,7 @@ def quiet_section(
 
 
 def is_on_impact(regime: Regime, state: FloatArray, firings: int, tolerance: float) -> bool:
-    """Whether an orbit meets a rigid backstop within a thousandth of a period of its section."""
+    """Whether an orbit hits a rigid backstop within a thousandth of a period of its section."""
     backstop = regime.hammer.backstop
     if backstop is None or backstop.law != "rigid":
         return False
@@ -283,7 +283,7 @@ def is_on_impact(regime: Regime, state: FloatArray, firings: int, tolerance: flo
 def _around(
     regime: Regime, state: FloatArray, firings: int, tolerance: float
 ) -> tuple[Problem, Record, FloatArray] | None:
-    """Integrate an orbit; return problem, record, and the times in the period with an open contact, s."""
+    """Integrate an orbit; return problem, record, and contact times modulo the period, s, from `_busy`."""
     train, _ = regime.train(firings + 1)
     begin, *_, end = (float(time) for time in regime.moments(train, firings))
     try:
@@ -322,7 +322,7 @@ def mirror_image(regime: Regime, state: FloatArray, tolerance: float) -> FloatAr
 
 
 def _busy(contacts: FloatArray, begin: float, end: float) -> FloatArray:
-    """Return sample times within contacts, counted from the section, 20 per contact."""
+    """Sample every contact of a run at 20 evenly spaced times; return the times since the section, s."""
     times = [np.zeros(0)]
     for _surface, t_in, _v_in, t_out, *_ in contacts:
         low, high = (begin if np.isnan(t_in) else t_in), (end if np.isnan(t_out) else t_out)

@@ -55,7 +55,7 @@ POINTS = 200
 """Default number of strobe points, as in Fig. 11."""
 
 _SETTLED = 1000
-"""Number of strobe points of a settled series, and number of firings discarded before the series."""
+"""Default number of points of a settled series, and of the firings discarded before the first point."""
 
 
 class Strobe(Result):
@@ -168,7 +168,7 @@ def strobe(
         Whether to classify the motion, from firings 1001 to 2000, independent of the points and their
         phase; see `printhammer.chaos.strobe.verdict`.
     **firing
-        How the hammer is fired: period or rate, waveform, drive, overlap and phase of the points, as for
+        Firing of the hammer: period or rate, waveform, drive, overlap and phase of the points, as for
         `printhammer.Regime.of`.
 
     Returns
@@ -268,7 +268,7 @@ def points_of(series: Any, firing: Firing) -> Any:
 def strobe_of(
     train: Train, firing: IntArray, states: States, tolerance: float, judged: Verdict | None
 ) -> Strobe:
-    """Build the result `Strobe` of a train from its states at selected firings and its classification."""
+    """Build a `Strobe` from the states of a train at selected firings and the classification."""
     return Strobe(
         hammer=train.hammer,
         drive=train.drive,

@@ -34,14 +34,14 @@ STAGES: Final = (32, 128)
 """Numbers of firings after which trains are tested for an early period."""
 
 CLOSER: Final = 1e-2
-"""Largest distance of states for an early period, as a fraction of the distance allowed at the end."""
+"""Tolerance of the early test: largest distance of repeated states, as a fraction of `AGREEMENT`."""
 
 LARGEST_MULTIPLIER: Final = 0.99
-"""Largest absolute eigenvalue of the derivative over a period that is allowed for an early period."""
+"""Largest absolute Floquet multiplier with which the early test accepts a period."""
 
 _SHORT: Final = 301
 _SURE: Final = 5.0
-"""Number of firings of a first estimate of the exponent; multiple of its standard error that is decisive."""
+"""Firings of the first estimate of the exponent; number of standard errors that makes its sign decisive."""
 
 
 @computation
@@ -142,7 +142,7 @@ def largest_multiplier(train: Train, states: States, period: int, tolerance: flo
 
 
 def _classify_late(trains: Sequence[Train], exponents: bool, effort: Effort) -> list[Verdict]:
-    """Classify trains that the early stages left undecided, from the states at firings 1001 to 2000."""
+    """Classify the trains that the early test left undecided, from their states at firings 1001 to 2000."""
     judged, tolerance = (FIRST, LAST), effort.tolerance
     states, _ = run_trains(trains, np.arange(FIRST, LAST + 1), None, effort)
     distances = [own.distances(train) for own, train in zip(states, trains, strict=True)]
@@ -156,7 +156,7 @@ def _classify_late(trains: Sequence[Train], exponents: bool, effort: Effort) -> 
         if why or not exponents or period_of(row) is not None
     }
     left = [i for i in range(len(trains)) if i not in verdicts]
-    # A start inside the pack would need its memory; such a train gets its exponent from rest.
+    # The initial state carries no pack memory: a train inside the pack gets its exponent from rest.
     on_it = [i for i in left if not _in_pack(trains[i], states[i], 0)]
     begun = [(trains[i].regime, _state(states[i], 0)) for i in on_it]
     for i, exponent in zip(on_it, exponents_onward(begun, _SHORT, effort), strict=True):

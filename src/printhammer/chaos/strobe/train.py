@@ -45,7 +45,7 @@ def exact_cycle(states: FloatArray) -> int:
 
 
 def rests_of(regime: Regime, states: FloatArray, tolerance: float) -> int:
-    """Count the states, (m, m/s), at firings after which the armature rests before the next firing.
+    """Count the states, (m, m/s), from which the armature comes to rest before the next firing.
 
     After a rest, the derivative of the next state with respect to the present state is 0.
     """
@@ -86,7 +86,7 @@ def pack_branches(x: FloatArray, branch: npt.NDArray[np.integer[Any]], front: fl
 def handed_on(
     hammer: Hammer, x: float, v: float, mode: int, memory: float, electric: Sequence[float] = NO_CURRENT
 ) -> State:
-    """Return the start of the next train: the final state if valid as a start, else `FROM_REST`."""
+    """Return the initial state of the next train: the final state if valid as a start, else `FROM_REST`."""
     begun = state_to_begin(hammer, x, v, mode, memory)
     return FROM_REST if begun is None else (*begun, *electric)
 
