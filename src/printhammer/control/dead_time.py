@@ -122,7 +122,7 @@ _SAME: Final = 1e-9  # Relative tolerance of the impact speed
 
 
 class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
-    """Time from switching on to impact, as a function of rail voltage and coil temperature."""
+    """Table of the time from switch-on to impact, by rail voltage and coil temperature."""
 
     hammer: Hammer = part("driven hammer")
     blow: float = scalar("m/s", "impact speed that the solved widths give")
@@ -223,7 +223,7 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
 
 @dataclass(frozen=True)
 class _Fired:
-    """Firing from rest: impact time, s, impact speed, m/s, current, A, coil heat, J; NaN without impact."""
+    """Firing from rest: impact time, s, and speed, m/s, peak current, A, coil heat, J; NaN without impact."""
 
     time: float = np.nan
     speed: float = np.nan
@@ -253,7 +253,7 @@ def dead_time(
     temperature : sequence of float or str, optional
         Coil temperatures, degC; by default 20, 60 and 100 degC.
     blow : float or str, optional
-        Impact speed, m/s, that the computed widths give; by default the impact speed of the own pulse at
+        Impact speed, m/s, for which widths are computed; by default the impact speed of the own pulse at
         nominal rail and temperature, which a lower rail or a warmer coil may not reach.
 
     Raises
@@ -313,7 +313,7 @@ def dead_time(
 
 
 def _reference(hammer: Hammer, waveform: Waveform, tolerance: float) -> tuple[_Fired, float]:
-    """Simulate a firing at the nominal rail; return its outcome and the length of later simulations, s."""
+    """Simulate a firing at the nominal rail; return its outcome and the time span for other firings, s."""
     span = 4.0 * float(waveform.width)  # type: ignore[attr-defined]
     for _ in range(_DOUBLINGS):
         fired = _fire(hammer, waveform, span, tolerance)

@@ -46,7 +46,7 @@ from printhammer.support.arrays import FloatArray
 from printhammer.support.roots import bisect
 
 COLDEST: Final = REFERENCE - 1.0 / COPPER
-"""Temperature at which the linear law of resistance reaches zero, degC."""
+"""Temperature at which the linear law of copper's resistance extrapolates to zero, degC."""
 
 FEEDS: Final = ("voltage", "current", "energy")
 """Names of the quantities that a driver may keep constant as the coil warms."""
@@ -71,7 +71,7 @@ class DotHeat:
 
     @property
     def apart(self) -> float:
-        """Largest dot rate at which the current of a dot decays before the next dot, Hz."""
+        """Largest dot rate at which the coil current decays before the next firing, Hz."""
         return 1.0 / self.lasts if self.lasts > 0.0 else math.inf
 
     @property
@@ -95,7 +95,7 @@ def dot_heat(heat: float | str, feed: str = "voltage") -> DotHeat:
 
 
 def read_temperature(value: float | str, name: str) -> float:
-    """Parse a temperature, a number in degC or text with that unit, and check that it is above `COLDEST`.
+    """Parse a temperature, a number in degC or text such as "60 degC"; it must exceed `COLDEST`.
 
     Raises
     ------
@@ -302,7 +302,7 @@ def thermal_duty(
 
 
 def steady(coil: ThermalCoil, heat: DotHeat, ambient: float, rate: float) -> float:
-    """Solve for the steady winding temperature, degC, at a dot rate, Hz; inf if there is none."""
+    """Solve for the steady winding temperature, degC, at a dot rate, Hz; inf above `HOTTEST`."""
 
     def excess(temperature: float) -> float:
         return rate * heat.at(temperature) * coil.whole - (temperature - ambient)
@@ -311,7 +311,7 @@ def steady(coil: ThermalCoil, heat: DotHeat, ambient: float, rate: float) -> flo
 
 
 def time_to(coil: ThermalCoil, heat: DotHeat, limit: float, ambient: float, rate: float) -> float:
-    """Integrate the warming from ambient temperature at a dot rate, Hz; return the time to the limit, s."""
+    """Integrate the warming of the winding from ambient; return the time to the temperature limit, s."""
     if limit <= ambient:
         return 0.0
     # At or below the largest continuous rate the limit is never exceeded.
@@ -342,7 +342,7 @@ def time_to(coil: ThermalCoil, heat: DotHeat, limit: float, ambient: float, rate
         times = run.t_events or [np.zeros(0)]
         if times[0].size:
             return float(times[0][0])
-        # Just above the continuous rate the limit may come arbitrarily late.
+        # Just above the continuous rate the time to the limit is arbitrarily long.
         if span > 64.0 * slowest:
             return math.inf
         span *= 4.0
@@ -361,7 +361,7 @@ def _rate(value: float | str, heat: DotHeat) -> float:
 TEMPERATURES: Final = (20.0, 40.0, 60.0, 80.0, 100.0, 120.0, 140.0)
 """Winding temperatures at which a hammer with a driver is simulated, degC."""
 
-_LEFT: Final = 1e-3  # Residual current at which a pulse counts as ended, as a fraction of its largest
+_LEFT: Final = 1e-3  # Residual current at which a pulse counts as ended, as a fraction of its peak
 _DECAYED: Final = 0.01  # Residual fraction of the current that adds at most 2 % to the heat of the next dot
 _DOUBLINGS: Final = 8  # Iteration limit of the doublings of the simulated time; arbitrary
 

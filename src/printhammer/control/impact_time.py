@@ -101,13 +101,13 @@ class ImpactTime(Result, rows=_CELLS):
         return Summary([Grid(columns, self.title, most=24), said])
 
     def entries(self) -> Entries:
-        """Return the result arrays, with the noise in the unit of the signal."""
+        """Return the Dataset variables, with the noise in the unit of the signal."""
         entries = super().entries()
         note, values = entries["noise"]
         return {**entries, "noise": (replace(note, unit=self.unit), values)}
 
     def sensor(self, seed: int = 0) -> ImpactSensor:
-        """Return the estimator as a sensor for `printhammer.learn`, if a single setting was studied.
+        """Return an impact sensor for `printhammer.learn` with the errors of the only setting studied.
 
         The noise of the sensor is the standard deviation on the nominal hammer. The additional spread over
         units, which is constant for all dots of a unit, is the offset.
@@ -119,7 +119,7 @@ class ImpactTime(Result, rows=_CELLS):
         noise, units = float(self.deviation[0, 0, 0]), float(self.unit_deviation[0, 0, 0])
         if not np.isfinite(noise + units):
             raise InputError("no impact was seen in the samples", expected="less noise for a sensor")
-        # The mean error over units is known from the study and can be subtracted.
+        # The study yields the mean error over units, which can be subtracted.
         offset = float(np.sqrt(max(units**2 - noise**2, 0.0)))
         # Flagged estimates count as missed.
         missed = min(float(self.unit_missed[0, 0, 0] + self.unit_flagged[0, 0, 0]), _MOST_MISSED)
@@ -159,8 +159,8 @@ def impact_time(
     hammer : Hammer
         The nominal hammer, with a pack and a driver of its coil.
     signal : str, optional
-        "current", which shows an impact while it flows, or "voltage", which does so while the coil of a
-        permanent magnet is open.
+        "current", which shows an impact while current flows, or "voltage", which shows an impact while the
+        coil of a permanent magnet is open.
     noise : sequence of float or str, optional
         Standard deviations of a sample, A or V; by default 0.1, 0.3 and 1 % of the largest current of the
         hammer's own pulse, or of 10 V.
@@ -178,7 +178,7 @@ def impact_time(
     known : bool, optional
         Whether the estimator knows delay and bandwidth of the probe.
     dots : int, optional
-        Number of simulated dots per setting: as many of the nominal hammer, and as many of all units
+        Number of simulated dots per setting: this number for the nominal hammer, and again for all units
         together.
     units : int, optional
         Number of hammers drawn from the variability.

@@ -155,7 +155,7 @@ def recorded_impacts(
 
 
 def _errors_of_units(estimator: ImpactEstimator, units: Sequence[Hammer]) -> tuple[float, float]:
-    """Return the RMS errors, s, of the unflagged estimates and of the nominal flight time over units."""
+    """Return RMS errors over simulated units, s: of unflagged estimates, and of the nominal flight time."""
     records = [unit_record(unit, estimator, estimator.sampling) for unit in units]
     errors, believed = errors_of(estimator, records, len(records), np.random.default_rng(0))
     return root_mean_square(errors[believed]), flight_deviation(estimator, records)
@@ -164,7 +164,7 @@ def _errors_of_units(estimator: ImpactEstimator, units: Sequence[Hammer]) -> tup
 def _estimator(
     hammer: Hammer, table: Readings, signal: Signal, delay: float, bandwidth: float | None
 ) -> ImpactEstimator:
-    """Create an estimator for the time step and the noise of a record."""
+    """Build an impact estimator with the time step and the sample noise of a record."""
     steps = np.diff(table.values["time"])
     step = float(np.median(steps))
     if float(np.ptp(steps)) > _UNEVEN * step:

@@ -59,7 +59,7 @@ class FeedbackStrategy(Declared):
         return [loop.drive(self.controller.driver.edge) for loop in loops]
 
     def loops(self, hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) -> list[Loop]:
-        """Simulate the closed loop on a hammer for each pattern, from rest.
+        """Simulate the closed loop on a hammer from rest, one run per pattern; return the final loop states.
 
         The controller does not know the driven hammer and observes the hammer only through the sensor.
         Patterns are indices of the slots with a dot; `rate` is the slot rate, Hz.
@@ -92,12 +92,12 @@ class FeedbackStrategy(Declared):
         return loops
 
     def _legs(self, hammer: Hammer, now: Sequence[tuple[Loop, int]], ends: FloatArray) -> list[Leg]:
-        """Split runs up to `ends`, s, into stages; the pack changes when the next slot's dot is fired."""
+        """Split runs up to `ends`, s, into stages, one per pack; a firing of a dot changes the pack."""
         if self.places is None:
             return [Leg([hammer] * len(now), ends)]
         before = [self.places[loop.slots[max(dot - 1, 0)]] for loop, dot in now]
         after = [self.places[loop.slots[dot]] for loop, dot in now]
-        # A dot after a rest has not been fired yet.
+        # The dot after a rest has not been fired yet.
         fired = [loop.pulses[dot].fired if dot < len(loop.pulses) else np.inf for loop, dot in now]
         turns = np.minimum(fired, ends)
         return [Leg(before, turns), Leg(after, ends)]
@@ -143,7 +143,8 @@ class FeedbackStrategy(Declared):
             until = np.full(len(loops), np.inf) if following is None else leg.ends
             self._advance(leg, loops, until, times, used, x)
             while following is not None:
-                # A contact meets one pack: the change waits until the armature is outside both packs.
+                # The pack must not change during a contact: the change waits until the armature is outside
+                # both packs.
                 waits = [
                     loop.alive
                     and loop.time < end

@@ -52,9 +52,9 @@ _BEFORE: Final = 0.15
 CONTACT: Final = 1.1
 # Change of a touch time beyond which an estimate is rejected, in single-pulse flight times
 _ASTRAY: Final = 0.4
-# Current, as a fraction of the largest, that presses the armature against the backstop after a landing. With
+# Current, as a fraction of the limit, that presses the armature against the backstop after a landing. With
 # 0.8, dots of the shipped hammer 0.84 to 1.6 ms apart are within 9 % and 23 us; with 1 and without `_RELAXED`
-# its soft backstop throws the armature when the current ends, and they are up to 23 % too strong. With 0.7 a
+# the soft backstop throws the armature when the current ends, and dots are up to 23 % too strong. With 0.7 a
 # harder hammer of the tests touches 30 us earlier than expected.
 _CLAMP: Final = 0.8
 _CLAMPED, _LONGEST = 0.6, 1.2  # Usual and largest duration of the pressing current, in flight times
@@ -62,13 +62,13 @@ _FADED: Final = 3.0  # Time for a current to decay, in time constants of the dri
 # Time for the armature to come to rest after the pressing current, in flight times; with 0.4 a landing is too
 # short for the residual motion to decay
 _RELAXED: Final = 0.2
-_CLEAR: Final = 0.22  # Fraction of a launch's flight time after which the armature is off the backstop
-_PATIENCE: Final = 40e-6  # Time between the end of a contact and a throw that is decided again, s
+_CLEAR: Final = 0.22  # Fraction of a launch's flight time after which the armature has left the backstop
+_PATIENCE: Final = 40e-6  # Least time from the end of a contact to a throw that may be decided again, s
 _POLICIES: Final = 8  # Size of the policy cache; arbitrary
 
 
 class Ahead(NamedTuple):
-    """Predicted consequences of a control action: the pulse to fire, and the next pack contact.
+    """Prediction for a control action: the push, the throw that follows, and the next pack contact.
 
     Times after a touch, s, of the throw, of departure from the pack and of the next touch; width of the push,
     s; kind and speed, m/s, of the next touch.
@@ -125,7 +125,7 @@ class Controller:
         return FreeForce(self.hammer, self.hammer.origin, self.plant.front, self.driver.current)
 
     def launch(self, loop: Loop, dot: int) -> None:
-        """Add a launch from rest, timed so that the armature touches the pack when the dot is due."""
+        """Add a launch from rest, timed for a touch at the due time of a dot."""
         start = self.start
         learned = loop.learned
         late = (learned.front * self.stroke - start.place_slope * learned.scale) / start.speed
@@ -138,7 +138,7 @@ class Controller:
         loop.since = fired + _CLEAR * start.flight
 
     def _fire(self, loop: Loop, time: float, width: float) -> None:
-        """Add a firing: full current for `width`, s, from `time`, s, on."""
+        """Add a firing at `time`, s: full current for a width, s."""
         pulse = Pulse(time)
         pulse.switch(time, self.driver.current)
         pulse.switch(time + width, 0.0)
@@ -175,7 +175,7 @@ class Controller:
         for k, loop in enumerate(loops):
             if not loop.alive:
                 continue
-            # An estimate far from the expectation is rejected, and the plan is kept.
+            # An estimate far from the predicted touch is rejected, and the plan is kept.
             if abs(flight.touch[k] - loop.touch) < _ASTRAY * long and flight.speed[k] > 0.0:
                 loop.touch, loop.speed = float(flight.touch[k]), float(flight.speed[k])
                 loop.learned.take_scale(float(flight.scale[k]), float(flight.covariance[k, 2, 2]))
@@ -188,18 +188,18 @@ class Controller:
 
     def _prior_covariance(self, loop: Loop) -> FloatArray:
         """Return the prior covariance of displacement, speed and current scale at the next pack contact."""
-        # Later launches begin with the residual motion of a landing.
+        # Launches after the first begin with the residual motion of a landing.
         if loop.launched and len(loop.pulses) == 1:
             start = self.start
             slope = np.array([start.place_slope, start.speed_slope, 1.0])
             place, speed = _LAUNCH_ERRORS
             errors = np.array([place * self.stroke, speed, 0.0])
-            # The first launch differs by the effect of the current scale.
+            # The uncertainty of the first launch is mainly the effect of the current scale.
             return np.outer(slope, slope) * loop.learned.scale_error**2 + np.diag(errors**2)
         return np.diag([_PLACE_ERROR * self.stroke, _SPEED_ERROR, loop.learned.scale_error]) ** 2
 
     def decide(self, now: Sequence[tuple[Loop, int]], policy: Policy) -> None:
-        """Choose the pulses that follow the coming pack contacts; `now` pairs each run with a dot index."""
+        """Choose the pulses after the coming pack contacts; `now` pairs each run with its dot index."""
         kind = np.array([loop.kind for loop, _dot in now])
         speed = np.array([loop.speed for loop, _dot in now])
         touch = np.array([loop.touch for loop, _dot in now])
@@ -285,7 +285,7 @@ class Controller:
         return [Ahead(*row) for row in zip(*(column.tolist() for column in columns), strict=True)]
 
     def _throw(self, loop: Loop, touch: float, ahead: Ahead) -> None:
-        """Add a firing, at the end of the last pulse, that throws the armature at the pack."""
+        """Add the firing that throws the armature at the pack for the next dot."""
         self._fire(loop, loop.pulses[-1].at[-1], ahead.width)
         clear = max(ahead.leaves, ahead.fire) if ahead.width != ALWAYS else ahead.leaves
         loop.since = touch + clear
@@ -293,7 +293,7 @@ class Controller:
         loop.touch, loop.speed = touch + ahead.touch, ahead.speed
 
     def _push(self, loop: Loop, pulse: Pulse, release: float, back: float) -> None:
-        """Switch on full current from touch to release, if required, and then the return current."""
+        """Command full current from touch to `release`, if a push is required, then the return current."""
         if loop.kind == FREE and release > 0.0:
             pulse.switch(max(loop.touch, loop.time), self.driver.current)
         pulse.switch(max(loop.touch + release, loop.time), back)

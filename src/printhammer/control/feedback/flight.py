@@ -46,8 +46,8 @@ _SHORTEST: Final = 1e-6  # Shortest flight, s
 # Finite-difference steps: relative speed, and current scale
 _STEP: Final = 0.01
 _SCALE_STEP: Final = 0.02
-_BENDS: Final = 2  # Picard iterations of a path per fit
-_PLACES, _CURRENTS = 97, 129  # Numbers of displacements and currents of the force table
+_BENDS: Final = 2  # Number of Picard iterations of the path per fit
+_PLACES, _CURRENTS = 97, 129  # Grid size of the force table: displacements, currents; arbitrary
 
 
 class FreeForce:
@@ -244,7 +244,7 @@ _STRANGE: Final = 9.0
 
 
 class Contacts:
-    """Simulated contacts of the nominal hammer with packs at several distances."""
+    """Observer of the pack front, which simulates contacts of the nominal hammer at several distances."""
 
     def __init__(self, plant: Plant) -> None:
         self._plant = plant
@@ -324,7 +324,7 @@ class Contacts:
         return whole
 
     def _with_front(self, place: int) -> Hammer:
-        """Return the nominal hammer with its pack `place` grid steps farther away; cached."""
+        """Return the nominal hammer with its pack moved away by `place` grid steps; cached."""
         if place not in self._shifted:
             self._shifted[place] = self._plant.moved(place * _GRID).hammer
         return self._shifted[place]

@@ -27,7 +27,7 @@ AHEAD: Final = 1e-6  # Time before the touch at which the simulations of a map b
 PUSHED, FREE = 0, 1
 """Kinds of pack touch: with the coil current on, or in free flight."""
 
-ALWAYS: Final = 2e-3  # Width that stands for a push that is still on at the next touch, s
+ALWAYS: Final = 2e-3  # Width assigned to a push that is still on at the next touch, s; arbitrary, but long
 # Speeds of the touches, as fractions of the single pulse's impact speed
 _PUSHED_SPEEDS: Final = np.linspace(0.3, 1.1, 17)
 _FREE_SPEEDS: Final = np.linspace(0.6, 1.25, 14)
@@ -67,9 +67,9 @@ class ForceMap:
         return int(np.argmin(np.abs(self.back)))
 
     def release_for(self, force: float) -> FloatArray:
-        """Return the release times, s, shape (T, B), that give a peak force; NaN if the current is too weak.
+        """Return the release times, s, shape (T, B), for a peak force; NaN if the current is too weak.
 
-        The release is 0 if the touch exceeds the force without a push.
+        The release time is 0 if the touch exceeds the force without a push.
         """
         releases = np.full(self.force.shape[:2], np.nan)
         for place in np.ndindex(releases.shape):
@@ -84,7 +84,7 @@ class ForceMap:
         return float(np.interp(release, self.release, self.force[row, number]))
 
     def state(self, row: int) -> tuple[float, float]:
-        """Return displacement, m, and speed, m/s, just before a pack contact."""
+        """Return displacement, m, and speed, m/s, of touch `row` just before the pack contact."""
         speed = float(self.speed[row])
         return self.front - AHEAD * speed, speed
 
@@ -93,7 +93,7 @@ class ForceMap:
 class ImpactMap:
     """Outcome of each of A switching actions of the coil from each of the T touches of a force map."""
 
-    back: FloatArray  # Return current, A, (A,)
+    back: FloatArray  # Return current after the push, A, (A,)
     fire: FloatArray  # Time after the touch at which the next push begins, s, (A,)
     width: FloatArray  # Width of the next push, s; `ALWAYS` if the push lasts to the next touch, (A,)
     release: FloatArray  # Time after the touch at which the push ends, s, (T, A)

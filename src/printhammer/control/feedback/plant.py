@@ -29,7 +29,7 @@ from printhammer.support.threads import Progress
 
 @dataclass(frozen=True)
 class Plant:
-    """Plant: a hammer, its coil driver, its single-pulse dot, and the number of threads."""
+    """Controlled system: a hammer, its coil driver and its single-pulse dot."""
 
     hammer: Hammer
     driver: Driver
@@ -48,7 +48,7 @@ class Plant:
         return self.front - self.hammer.origin
 
     def moved(self, offset: float) -> Plant:
-        """Return a copy whose pack is farther away by `offset`, as a fraction of the stroke."""
+        """Return a copy with the pack moved away by `offset`, as a fraction of the stroke."""
         travel = Perturbation(travel=offset * self.stroke)
         return replace(self, hammer=perturbed(self.hammer, travel)) if offset else self
 
@@ -117,8 +117,8 @@ class BoundedSequence(PulseSequence):
 def driver_of(hammer: Hammer, current: float = LARGEST_CURRENT, edge: float | None = None) -> Driver:
     """Return a driver for a current-driven hammer, with a current limit, A.
 
-    The time constant `edge`, s, is by default the decay time constant of the hammer's own waveform. Its rise
-    is slower; a rise as fast as the decay needs a higher supply voltage.
+    The time constant `edge`, s, applies to rise and decay; by default it is the decay time constant of the
+    hammer's own waveform. That waveform rises more slowly; so fast a rise needs a higher supply voltage.
     """
     pulse = pulse_of(hammer)
     if pulse.quantity != "current":
@@ -145,7 +145,7 @@ _FARTHEST: Final = 5.0  # Prior standard deviations from nominal beyond which an
 
 @dataclass
 class Pulse:
-    """One firing and the current switchings decided so far.
+    """A firing of the closed loop, with the current switchings decided so far.
 
     The command changes to `levels`, A, at the times `at`, s.
     """
@@ -178,17 +178,17 @@ class Learned:
     scale_error: float = SCALE_ERROR
 
     def drift(self) -> None:
-        """Add process noise to the standard deviations of pack front and current scale, up to the priors."""
+        """Add process noise to the standard deviations of front and scale, up to their prior values."""
         self.front_error = float(min(np.hypot(self.front_error, _FRONT_DRIFT), FRONT_ERROR))
         self.scale_error = float(min(np.hypot(self.scale_error, _SCALE_DRIFT), SCALE_ERROR))
 
     def take_scale(self, scale: float, variance: float) -> None:
-        """Adopt an estimate of the current scale and its variance, unless the estimate is implausible."""
+        """Store an estimate of the current scale, unless it is more than `_FARTHEST` from nominal."""
         if abs(scale) <= _FARTHEST * SCALE_ERROR and variance > 0.0:
             self.scale, self.scale_error = scale, float(np.sqrt(variance))
 
     def take_front(self, front: float, variance: float) -> None:
-        """Adopt an estimate of the pack front and its variance, unless the estimate is implausible."""
+        """Store an estimate of the pack front, unless it is more than `_FARTHEST` from nominal."""
         if abs(front) <= _FARTHEST * FRONT_ERROR and variance > 0.0:
             self.front, self.front_error = front, float(np.sqrt(variance))
 
@@ -209,7 +209,7 @@ class Touched:
 
 @dataclass(frozen=True)
 class Printed:
-    """Pack contact as predicted when its pulse was chosen, before samples corrected the pack front."""
+    """Predicted pack contact, as of the choice of its pulse, before samples corrected the pack front."""
 
     # Time, s, speed, m/s, and kind of the touch
     touch: float
@@ -235,8 +235,8 @@ class Loop:
     touch: float = 0.0
     speed: float = 0.0
     kind: int = 0
-    since: float = 0.0  # Time from which on the armature is in free flight, s
-    time: float = 0.0  # Time that the simulation has reached, s
+    since: float = 0.0  # Start of the current free flight, s
+    time: float = 0.0  # Simulated time so far, s
     alive: bool = True  # Whether the simulation continues
     launched: bool = True  # Whether the coming touch follows a launch from rest
     rests: bool = False  # Whether the armature comes to rest and has not been launched yet
@@ -258,6 +258,6 @@ class Loop:
         return PulseSequence([pulse.waveform(edge) for pulse in self.pulses], [p.fired for p in self.pulses])
 
     def recent(self, driver: Driver) -> BoundedSequence:
-        """Return the drive of the latest pulses: those whose currents may still flow."""
+        """Return the drive of the latest `REMEMBERED` pulses, whose currents may still flow."""
         pulses = self.pulses[-REMEMBERED:]
         return driver.drive([pulse.waveform(driver.edge) for pulse in pulses], [p.fired for p in pulses])

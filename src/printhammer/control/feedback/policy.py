@@ -119,13 +119,13 @@ def between_fronts(front: FloatArray) -> tuple[IntArray, FloatArray]:
 
 
 NEVER: Final = 50.0  # Cost of an inadmissible action
-# Standard deviation of the front, as a fraction of the stroke, above which its uncertainty is penalised
+# Standard deviation of the pack front, as a fraction of the stroke, above which a penalty applies
 KNOWN: Final = 0.01
 _DISCOUNT: Final = 0.9  # Discount factor per dot
 _ROUNDS: Final = 8  # Number of dots before a rest after which the cost-to-go is taken as converged
 _LATENESS: Final = np.linspace(-0.9, 0.9, 13)  # Nodes of the lateness, as fractions of the limit
 _SPEED_DOUBT: Final = 0.04  # Standard deviation of the estimated speed of a touch, m/s
-# Derivative of the next touch with respect to speed, without a neighbour to difference, s / (m/s)
+# Derivative of the next touch time with respect to speed, s / (m/s), where no finite difference is available
 _STEEPEST: Final = 2e-3
 _NEAR: Final = 2  # Number of speed nodes to either side over which the steepest slope is taken
 _FAST: Final = 0.3  # Residual speed after a landing that costs 1, m/s
@@ -134,7 +134,7 @@ _EFFORT: Final = 0.1  # Cost of the largest return current over a whole period
 
 
 class Committed(NamedTuple):
-    """Past decisions at M pack contacts in progress: return current, printed force, and elapsed time.
+    """Decisions already carried out at M pack contacts in progress; only the next throw is still open.
 
     Return current, A; printed force relative to the single pulse; time since the touch, s.
     """
@@ -170,7 +170,7 @@ class Policy:
         return np.asarray(a**2 * (1.0 + _STEEP * a**4) + b**2 * (1.0 + _STEEP * b**4))
 
     def effort(self, release: FloatArray) -> FloatArray:
-        """Return the cost of the return current, which makes the armature strike the backstop harder."""
+        """Return the cost of the return currents, which make the armature strike the backstop harder."""
         table = self.table
         cost = _EFFORT * np.square(table.back / table.driver.current) * (table.fire - release)
         return np.asarray(cost / self.period)
@@ -204,7 +204,7 @@ class Policy:
         front_error: FloatArray,
         done: Committed | None = None,
     ) -> tuple[IntArray, FloatArray, Choice]:
-        """Choose the best action for each of M touches; return index, cost, and the outcomes of all actions.
+        """Select the action of least cost for each of M touches; return index, cost and all outcomes.
 
         The touches have a `kind`, a lateness `late`, s, and a `speed`, m/s. The next dot is due after `wait`,
         s, and `after` dots follow between the next dot and a rest. The pack is `front` farther away than
@@ -240,8 +240,8 @@ class Policy:
     def _doubts(self) -> FloatArray:
         """Return the cost due to the uncertain speed of a touch, for all actions, shape (touches, actions).
 
-        The steepest slope in the neighbourhood counts: near a discontinuity, where the number of bounces
-        changes, the table between two speeds is meaningless.
+        The cost uses the steepest slope among neighbouring speeds: near a discontinuity, where the number of
+        bounces changes, interpolation between two speeds is meaningless.
         """
         table = self.table
         doubts = np.zeros(table.next_touch.shape)
@@ -251,7 +251,7 @@ class Policy:
             steps = np.nan_to_num(np.abs(np.diff(touch, axis=0)) / np.diff(speeds)[:, np.newaxis])
             steepest = maximum_filter1d(steps, 2 * _NEAR, axis=0, mode="constant")
             around = np.vstack([steepest, steepest[-1:]])
-            # At the end of the admissible range a slope may be missing on both sides.
+            # At the ends of the admissible range a slope may be missing on both sides.
             slope = np.nan_to_num(np.maximum(slope, around), nan=_STEEPEST)
             doubts[rows] = np.square(slope * _SPEED_DOUBT / self.limits.arrival)
         return doubts
@@ -307,9 +307,10 @@ class Choice:
         self.next_speed = self.of("next_speed")
 
     def settle(self, force: FloatArray) -> None:
-        """Replace the outcomes by the outcomes after M dots with known forces, relative to the single pulse.
+        """Condition the outcomes on M dots with known forces, relative to the single pulse.
 
-        Outcomes of the middle force of the maps are shifted linearly; the other forces become inadmissible.
+        Outcomes of actions for the middle force are interpolated linearly in force; actions for the other
+        forces become inadmissible.
         """
         middle = len(FORCES) // 2
         shape = len(self.below), len(np.unique(self._fronts.table.back)), len(FORCES), -1

@@ -40,7 +40,7 @@ class Samples(NamedTuple):
     error: float
 
     def take(self, which: Any) -> Samples:
-        """Select rows (runs) or columns (samples)."""
+        """Return a copy with the selected rows (runs) or columns (samples)."""
         return Samples(self.times[which], self.shown[which], self.used[which], self.error)
 
 
@@ -116,7 +116,7 @@ def normal(seed: int, runs: Words, numbers: IntArray) -> FloatArray:
 
 
 def run_key(slots: tuple[int, ...], rate: float) -> int:
-    """Return the noise key of a dot pattern at a slot rate: a hash of both."""
+    """Return the noise key of a run: a hash of its dot pattern and slot rate."""
     import hashlib
 
     text = f"{rate!r} {slots!r}".encode()

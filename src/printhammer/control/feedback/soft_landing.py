@@ -24,11 +24,11 @@ from printhammer.support.arrays import FloatArray, IntArray
 # Start times and widths of the brake pulses in the first grid, in single-pulse flight times
 _STARTS: Final = np.linspace(0.85, 1.75, 28)
 _WIDTHS: Final = np.linspace(0.1, 0.75, 20)
-# Half-widths of finer grids about the best pulse, in single-pulse flight times: each grid covers one step of
-# the previous grid
+# Half-widths of the finer grids around the best pulse, in single-pulse flight times: a grid spans one step of
+# # the preceding grid to either side
 _NEAR: Final = np.linspace(-1.0, 1.0, 7)
 _FINER: Final = (0.034, 0.01, 0.003)
-# Time that converts a distance from rest to an equivalent speed, in single-pulse flight times
+# Distances from rest are divided by this time, in single-pulse flight times, to give an equivalent speed
 _FALL: Final = 1.0 / 3.0
 # Times after the touch at which the residual motion is evaluated, in single-pulse flight times
 _WATCHED: Final = np.linspace(2.2, 3.4, 16)
@@ -51,7 +51,7 @@ class Landing:
 
 
 def soft_landing(plant: Plant, forces: ForceMap) -> Landing:
-    """Find the brake pulses of least residual motion by grid search with successive refinement."""
+    """Optimise the brake pulse after each touch for least residual motion, by successively refined grids."""
     scale = plant.single.flight_time
     release = forces.release_for(1.0)[:, forces.off]
     force = np.full(len(release), np.nan)
@@ -119,7 +119,7 @@ class Launch:
 
 
 def launch(plant: Plant, forces: ForceMap) -> Launch:
-    """Find the launch from rest that alone prints with `_ALMOST` times the single-pulse force.
+    """Compute the launch from rest that prints with `_ALMOST` times the single-pulse force without a push.
 
     A short push into the pack adds the rest of the force; the length of the push is chosen when the impact
     speed is known.
@@ -147,8 +147,8 @@ def launch(plant: Plant, forces: ForceMap) -> Launch:
     width, time = (
         float(np.interp(wanted, speed[struck][order], values[struck][order])) for values in (widths, flight)
     )
-    # Sensitivity to the current scale by a backward difference: with less current the armature has not
-    # reached the pack by then.
+    # Sensitivity to the current scale by a backward difference: with less current the armature is still in
+    # flight at the nominal touch time.
     pulse, before = driver.push(width), time - AHEAD
     drives = [PulseSequence([pulse.scaled(factor)], at=[0.0]) for factor in (1.0, 1.0 - _WEAKER)]
     _, _, states = plant.run(drives, before, strobes=[np.array([before])] * 2)

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 LEVELS: Final = (1.0, 0.3, 0.1, 0.03, 0.0)  # Fraction of the surrogate's residual that counts as noise
 _NEAR: Final = (0.1, 0.0)  # Levels of a search that begins at a mode of the stage before
 _MODES: Final = 4  # Maximum number of modes of a belief
-_SHARE: Final = 0.01  # Modes below this probability, relative to the most probable mode, are dropped
+_SHARE: Final = 0.01  # Smallest probability of a mode, relative to the most probable mode
 _CARE: Final = 1.3  # Factor by which standard deviations are widened in `Belief.draw`
 _FREEDOM: Final = 4.0  # Degrees of freedom of Student's t distribution of the errors
 _LOST: Final = 12.0  # Penalty, in 2 × negative log-likelihood, for an observed dot that is not predicted
@@ -137,7 +137,7 @@ class _Iterate(NamedTuple):
     """Current iterate of a Levenberg-Marquardt search."""
 
     constants: FloatArray  # Constants, in prior standard deviations, (constants,)
-    shown: FloatArray  # Predicted readings, (readings,)
+    shown: FloatArray  # Predicted readings at these constants, (readings,)
     slopes: FloatArray  # Jacobian of the readings, (readings, constants); NaN where a dot is lost
     fresh: bool  # Whether the Jacobian is by finite differences at this iterate, without Broyden updates
 

@@ -166,7 +166,7 @@ _STEEP: Final = 2.0  # Weight of the quartic term of the objective relative to t
 _SIZES: Final = (1.0, 0.5, 0.2)  # Step fractions of the line search
 _NEWTON: Final = 10  # Iteration limit of the law on simulated hammers after a stage
 BAD: Final = 10.0
-"""Remaining objective (`Update.left`) above which the learner tries another starting table."""
+"""Final objective of a stage (`Update.left`) above which the learner tries another starting table."""
 
 _SLOW: Final = 0.85  # The iteration stops if the objective exceeds this fraction of the value before
 _LEAST_LAW: Final = 1e-2  # Lower bound of the fraction a of the model error that is corrected
@@ -373,7 +373,7 @@ class LearningLaw:
         growth = press.multipliers(settings)
         steady = bool(np.quantile(np.nan_to_num(growth), 1.0 - self.doubt) <= 1.0)
         gains = steady and self._leads(table.mean(axis=1), shares)
-        # The open-loop drive that is better over the production, unless the other leads on the posterior.
+        # Open-loop drive that is better over the production, unless the other is better on the posterior.
         loops = self.entries.loops
         chosen = next(k for k, loop in enumerate(loops) if loop.pulse is self.first.pulse)
         chosen = next((k for k in range(len(loops)) if self._leads(shares[k], shares[[chosen]])), chosen)
@@ -382,7 +382,7 @@ class LearningLaw:
         return Verdict(gains, loops[chosen], float(np.fmax.reduce(growth)), float(good.mean()), every)
 
     def _leads(self, share: FloatArray, others: FloatArray) -> bool:
-        """Whether a drive gains `_GAIN` on average, and loses on at most a fraction `doubt` of hammers."""
+        """Whether a drive gains `_GAIN` on average and prints fewer dots on at most `doubt` of the hammers."""
         harmless = np.quantile(share - others.max(axis=0), self.doubt) >= 0.0
         return bool(harmless and share.mean() - others.mean(axis=1).max() >= _GAIN)
 

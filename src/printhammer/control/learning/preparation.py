@@ -26,8 +26,8 @@ from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.support.arrays import FloatArray
 from printhammer.support.threads import together
 
-FORGETTING: Final = 0.02  # Default of `forgetting`
-DOUBT: Final = 0.0  # Default of `doubt`: no posterior sample may lose dots
+FORGETTING: Final = 0.02  # Default of `forgetting`, the fraction of the corrections lost per stage
+DOUBT: Final = 0.0  # Default of `doubt`: no posterior sample may print fewer dots with the table
 MEMBERS: Final = 400
 """Default number of simulated hammers on which the sequence of test pulses is chosen."""
 _FEW: Final = 24  # Number of simulated hammers on which the open loops are compared

@@ -52,7 +52,7 @@ class Bound(Declared):
 
 
 def bound(hammer: Hammer, single: Nominal, force: float, largest: float) -> Bound:
-    """Compute the lower bounds for dots whose peak force is `force` times the single-pulse force.
+    """Compute lower bounds on the coil work of dots with `force` times the single-pulse force.
 
     The hammer needs magnet, pack and backstop; `largest` is the current limit of either sign, A.
     """
@@ -92,7 +92,7 @@ def _strongest(static: StaticForce, x: FloatArray, largest: float) -> FloatArray
 
 
 def _given_back(hammer: Hammer, most: float) -> float:
-    """Return the largest energy, J, with which an undriven armature rebounds from the backstop.
+    """Return the largest rebound energy, J, of an undriven armature at the backstop.
 
     The maximum is over incident energies up to `most`, J.
     """

@@ -71,7 +71,7 @@ LEASTS: Final = get_args(Least)
 # Default relative changes of the current in `LeastWork.under_supply`
 SUPPLY: Final = (-0.03, -0.01, -0.003, -0.001, 0.0, 0.001, 0.003, 0.01, 0.03)
 Shape = Literal["free", "pulses"]
-# Allowed currents: any current within the limits, or the hammer's pulses at any times and widths
+# Allowed currents: any current within the limits, or the hammer's pulses with free times and widths
 SHAPES: Final = get_args(Shape)
 # Time from the touch to the end of a slot, as a fraction of the time in which a single pulse indents the pack
 _PAST_PEAK: Final = 1.2
@@ -81,11 +81,11 @@ _SETTLED: Final = 1e-2
 
 
 class NoBurstError(PrinthammerError):
-    """Raised when no current within the limits is found that prints the burst."""
+    """Raised when the search finds no current within the limits that prints the burst."""
 
 
 class SupplyCheck(Declared):
-    """Outcome of a burst at supply levels other than the planned level: arrays of shape (n,)."""
+    """Dots of a burst when all currents are scaled by a wrong supply: arrays of shape (n,)."""
 
     changes: FloatArray = part("relative change of every current: 0.03 for 3 % more")
     adequate: IntArray = part(
@@ -96,7 +96,7 @@ class SupplyCheck(Declared):
     status: TextArray = part("status of each simulation")
 
     def summary(self, count: int) -> Summary:
-        """Tabulate the outcome for a burst of `count` dots, one row per change of the current."""
+        """Tabulate the dots of a burst of `count` dots, one row per change of the current."""
         columns = [
             Cells("current", [f"{100.0 * change:+.1f} %" for change in self.changes]),
             Cells("adequate dots", [f"{adequate} of {count}" for adequate in self.adequate]),
@@ -205,7 +205,7 @@ class LeastWork(Result, rows="node"):
 
     @property
     def single_ratio(self) -> float:
-        """Ratio of the net coil work to the pack loss for one single pulse, from rest to rest."""
+        """Ratio of net coil work to pack loss, for a single pulse from rest to rest."""
         return self.single_work.net / self.single.pack_loss
 
     def _over(self, work: float) -> float:
@@ -214,7 +214,7 @@ class LeastWork(Result, rows="node"):
 
     @cached_property
     def rest_time(self) -> float:
-        """Time, s, from which the motional energy stays below a hundredth of a dot's pack loss."""
+        """Time after which the motional energy stays below 1 % of the pack loss of a dot, s."""
         motion, hammer = self.motion, self.hammer
         rest = stored_energy(hammer, rest_state(hammer))
         stored = np.array([stored_energy(hammer, x) for x in motion.x.tolist()])
@@ -223,7 +223,7 @@ class LeastWork(Result, rows="node"):
         return float(motion.t[min(place, motion.t.size - 1)])
 
     def under_supply(self, changes: npt.ArrayLike = SUPPLY) -> SupplyCheck:
-        """Simulate the drive of the burst with all currents scaled by 1 + `changes`, as one ensemble."""
+        """Simulate the burst with all currents scaled by 1 + c, for each c in `changes`, as one ensemble."""
         factors = 1.0 + np.atleast_1d(np.asarray(changes, dtype=np.float64))
         if factors.ndim != 1 or not (np.isfinite(factors) & (factors > 0.0)).all():
             raise InputError.of("changes", changes, "relative changes of the current above -1")
@@ -233,7 +233,8 @@ class LeastWork(Result, rows="node"):
         assert dots is not None
         touched = np.where(dots.struck, dots.fired_at + dots.flight_time, np.inf)
         away = np.abs(touched[:, :, np.newaxis] - self.slots)
-        # A slot's dot is the touch nearest to the slot, whichever pulse made the dot.
+        # The dot of a slot is the pack contact nearest to the slot in time, whichever pulse caused the
+        # contact.
         which = away.argmin(axis=1)
         late = away.min(axis=1)
         rows = np.arange(len(drives))[:, np.newaxis]

@@ -1,8 +1,8 @@
 """Bursts of least work that consist of the hammer's own pulses, with optimised times and widths.
 
 In each slot two pulses are fired: the first brakes the returning armature, the second throws it. From rest
-one pulse is enough. This suits a driver that can only be switched on and off, and whose current follows its
-own course. Pulses do not overlap: a pulse is fired only after the current of the preceding pulse has decayed.
+one pulse is enough. Such bursts suit a driver that can only be switched on and off. Pulses do not overlap: a
+pulse is fired only after the current of the preceding pulse has decayed.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ _TRIES, _MOST_TRIES = 4, 10  # Number of starts, and maximum number while no sta
 _ROUNDS: Final = 40  # Iteration limit of SLSQP
 _SHORTEST: Final = 0.02  # Smallest width, as a fraction of the largest
 _SAMPLES: Final = 301  # Samples of the power per slot
-_HALVINGS: Final = 60  # Bisections of a width: more than a double has bits
+_HALVINGS: Final = 60  # Bisections of a width: more than the bits of a double's mantissa
 _NONE: Final = 1e-9  # Fraction of a slot below which a width counts as zero
 _WRONG: Final = 10.0  # Penalty for an extra contact or a failed simulation, in units of the loading work
 
 
 class PulsePlan:
-    """Plan of a burst of pulses: the planned firings, and the resulting state of the armature.
+    """Plan of a burst of pulses: firings so far, and the armature's state at the end of the last slot.
 
     The widths of `waveform` are optimised; the slope limit of the task is ignored. `period`, `past` (from a
     touch to the end of its slot), `lead` (length of the first slot) and `landing` (length of the landing) are

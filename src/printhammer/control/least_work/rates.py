@@ -24,7 +24,7 @@ NOT_FOUND = "no current found"
 
 
 class LeastWorkRates(Result):
-    """Bursts of least work at several rates; NaN where no current was found."""
+    """Coil work of bursts of least work at several dot rates; NaN where the search for a current failed."""
 
     hammer: Hammer = part("driven hammer")
     rates: FloatArray = coordinate("Hz", "dot rate", "rate", name="rate")
@@ -64,7 +64,7 @@ def least_work_rates(
     progress: Callable[[int, int], None] | None = None,
     **options: Any,
 ) -> LeastWorkRates:
-    """Find bursts of least work at several rates.
+    """Optimise a burst of least coil work at each of several dot rates.
 
     Parameters
     ----------
@@ -82,7 +82,8 @@ def least_work_rates(
     Returns
     -------
     LeastWorkRates
-        The ratios, with a status for each rate; a failed search raises no exception.
+        Coil work as a fraction of the energy absorbed by the pack, at each rate; a failed search raises no
+        exception.
     """
     if isinstance(rates, str) or not len(rates):
         raise InputError.of("rates", rates, "at least one rate in a sequence")

@@ -27,7 +27,7 @@ from printhammer.drive.waveforms.shapes import Sampled
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.support.arrays import FloatArray
 
-LOST: Final = 25.0  # Deviation assigned to a failed simulation, in tolerances
+LOST: Final = 25.0  # Normalised deviation assigned to a failed simulation; arbitrary, but well above 1
 _MISSED: Final = 0.05  # Accepted deviation from the arrival time, in units of `ARRIVAL`
 _SLACK: Final = 8e-3  # Accepted shortfall of the force, in units of `_FORCE`
 ARRIVAL: Final = 20e-6  # Scale of arrival deviations, s
@@ -107,11 +107,11 @@ def best_of(
     tries: int,
     most: int | None = None,
 ) -> FloatArray | None:
-    """Run a multi-start search; return the outcome of least cost among the most promising starts.
+    """Run a multi-start search from the most promising starts; return the outcome of least cost.
 
-    Starts are ordered by `badness`. `attempt` maps the index of a start to cost and outcome, or to None if it
-    fails. The first `tries` starts are always run; further starts, up to `most` (by default `tries`), only
-    until one succeeds.
+    Starts are ordered by `badness`, lowest first. `attempt` maps the index of a start to its cost and
+    outcome, or to None if the search fails. The first `tries` starts are always run; if all fail, further
+    starts, up to `most` (by default `tries`), are run until one succeeds.
     """
     best: tuple[float, FloatArray] | None = None
     for number, start in enumerate(np.argsort(badness, kind="stable")[: most or tries].tolist()):
@@ -154,7 +154,7 @@ def printing_profile(
 
 
 def landing_profile(shares: FloatArray, largest: float, duration: float, nodes: int) -> FloatArray:
-    """Return currents (n, nodes - 1), A, that brake the armature and lower it onto the backstop.
+    """Return currents, A, shape (n, nodes - 1), that brake the armature and lower it onto the backstop.
 
     Like `printing_profile`, for shares (n, `LANDING_SHARES`), without the last node, where the current is
     zero.
@@ -190,30 +190,30 @@ def refined(
 
 
 def _in_steps(levels: FloatArray, edges: FloatArray, duration: float, nodes: int) -> FloatArray:
-    """Average n piecewise constant currents of k levels, with edges, s, over the steps between nodes."""
+    """Average piecewise constant currents over the steps between nodes; switching times `edges`, s."""
     ends = np.pad(edges, ((0, 0), (1, 1)), constant_values=((0.0, 0.0), (0.0, duration)))
     times = node_times(duration, nodes)
     past = np.clip(times, ends[:, :-1, np.newaxis], ends[:, 1:, np.newaxis]) - ends[:, :-1, np.newaxis]
     return np.asarray(np.diff((levels[:, :, np.newaxis] * past).sum(axis=1), axis=1) / np.diff(times))
 
 
-LEAD: Final = 2.0  # Length of the first slot, from rest to the touch, in flight times of the single pulse
+LEAD: Final = 2.0  # Time from the start, at rest, to the first touch, in flight times of the single pulse
 LANDING: Final = 5.0  # Length of the landing, in flight times of the single pulse
 _FEWEST, _MOST = 8, 96  # Smallest and largest number of nodes per slot
 # Fraction of a step by which a slot's current overlaps the next slot, whose current replaces it
 _OVERLAP: Final = 0.01
-_LAGS: Final = 1e-3  # Largest lag in the pack accepted, in units of `RELOADING`
+_LAGS: Final = 1e-3  # Largest accepted lag in the pack (see `Outcomes`), in units of `RELOADING`
 _WRONG: Final = 10.0  # Penalty for an extra contact or a failed simulation, in units of the loading work
 _WEAK: Final = 3.0  # Weight of a force shortfall in the comparison of profiles
 _TRIES, _MOST_TRIES = 3, 12  # Number of starts, and maximum number while no start succeeds
-_LEGS: Final = 2  # Maximum number of consecutive SLSQP runs, each from the end of the previous one
+_LEGS: Final = 2  # Maximum number of consecutive SLSQP runs, each restarted from the previous result
 _ROUNDS, _ROUNDS_AGAIN = 30, 20  # SLSQP iteration limits, from a profile and from the preceding current
 _SEARCH_TOLERANCE: Final = 5e-7  # Integration tolerance of the comparison of profiles
-_INSIDE: Final = 1.0 - 1e-9  # Factor on a limit that keeps rounding errors within it
+_INSIDE: Final = 1.0 - 1e-9  # Factor on current and slope limits: rounding errors stay within the limits
 
 
 class NodePlan:
-    """Plan of a burst with piecewise linear current: the planned currents, and the resulting state.
+    """Plan of a burst with piecewise linear current: nodal currents so far, and the state they lead to.
 
     `period`, `past` (from a touch to the end of its slot), `spacing` (between nodes) and `flight` (of the
     single pulse) are times, s.
@@ -272,7 +272,7 @@ def printing_current(
     nodes: int,
     before: FloatArray | None = None,
 ) -> FloatArray | None:
-    """Find the current of a slot that prints its dot at least cost.
+    """Optimise the current of a slot: print the dot of the slot at least cost.
 
     The slot lasts `duration`, and the dot is due at `arrival`, s after its beginning. The current has `nodes`
     nodes after the first; `before` is the current of the preceding slot, the first start. Returns the
@@ -321,7 +321,7 @@ def printing_current(
 
 
 def landing_current(task: Task, begin: SlotState, duration: float, nodes: int) -> FloatArray:
-    """Find the nodal currents, A, after the last dot of a burst that minimise the landing cost."""
+    """Optimise the nodal currents, A, that land the armature softly after the last dot of a burst."""
 
     def rated(currents: FloatArray, tolerance: float) -> FloatArray:
         outcomes = task.run(begin, np.pad(currents, ((0, 0), (0, 1))), duration, tolerance)
@@ -378,7 +378,7 @@ def _descend(
 
 
 def _within(task: Task, wanted: FloatArray, begin: float, reach: float, to_zero: bool) -> FloatArray:
-    """Clip nodal currents so that they satisfy the limits on value and slope exactly."""
+    """Clip nodal currents, A, to the limits on value and slope."""
     result = np.empty(wanted.size)
     current = begin
     for node, value in enumerate(wanted.tolist()):

@@ -33,7 +33,7 @@ _IN_PACK: Final = {
 }
 """Pack branch code for `Ensemble`, by the name of the mode."""
 
-_MANY: Final = 64  # Number of simulations from which threads pay off
+_MANY: Final = 64  # Smallest number of simulations that is distributed over threads
 _LEAST_SPEED: Final = 0.03  # Least speed at which the armature should leave the pack, m/s
 _CLEAR: Final = 2e-6  # Distance from the turning point beyond which the armature counts as leaving, m
 # Weight of the squared current relative to the positive work, a regularisation
@@ -54,7 +54,7 @@ class SlotState:
 
     @property
     def row(self) -> list[float]:
-        """State in the form that `Ensemble` accepts; outside the pack, displacement and velocity only."""
+        """Initial state for `Ensemble`; outside the pack, displacement and velocity only."""
         branch = _IN_PACK.get(MODE_NAMES[self.branch] if self.branch >= 0 else "", 0)
         return [self.x, self.v, float(branch), self.memory] if branch else [self.x, self.v]
 
@@ -124,7 +124,7 @@ class Task:
     largest: float  # Current limit of either sign, A
     slew: float  # Slope limit of either sign, A/s
     force: float  # Least force of a dot, N
-    loading: float  # Loading work of such a dot, J; the unit of the cost
+    loading: float  # Loading work of a dot with that force, J; the unit of the cost
     heat: bool  # Whether to minimise the squared current instead of the positive work
     tolerance: float  # As for `printhammer.simulate`
 
@@ -168,8 +168,8 @@ class Task:
         """Compute the objective of currents, normalised by the loading work of a dot.
 
         The net work is included since it grows with the backstop loss. Lag in the pack is penalised: if the
-        armature goes back into the pack, the law as printed jumps to the loading branch, and the pack returns
-        more energy than a pack that was unloaded.
+        armature re-enters the pack during unloading, the pack law of the paper jumps to the loading branch,
+        and the pack returns more energy than after an uninterrupted unloading.
         """
         heat = outcomes.squared_current / (self.largest**2 * duration)
         spent = heat if self.heat else outcomes.positive / self.loading + _SMOOTHING * heat
@@ -186,14 +186,14 @@ class Task:
 
 
 def end_of(ensemble: Ensemble, end: float, current: float) -> SlotState:
-    """Return the state at the end of a simulation, `end` in s, with the known final current, A."""
+    """Return the final state of a simulation that ends at `end`, s, with a known final current, A."""
     strobes = ensemble.run(strobes=[[end]], threads=1, engine="plain").strobes
     assert strobes is not None
     x, v, memory = (float(column[0, 0]) for column in (strobes.x, strobes.v, strobes.memory))
     return SlotState(x, v, int(strobes.branch[0, 0]), memory, current)
 
 
-_PLACES, _CURRENTS = 161, 33  # Numbers of spline nodes
+_PLACES, _CURRENTS = 161, 33  # Numbers of spline nodes over displacement and current; arbitrary
 _BEHIND: Final = 0.2  # Range of the spline behind the backstop, as a fraction of the stroke
 
 

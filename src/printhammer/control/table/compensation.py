@@ -1,4 +1,4 @@
-"""Compensation tables: feedforward for dots fired before the hammer has settled after earlier dots."""
+"""Compensation tables: feedforward of dots that are fired before the hammer has come to rest."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ from printhammer.support.files import read_text, write_file
 if TYPE_CHECKING:
     import pandas as pd
 
-_NEAR: Final = 1e-9  # Rounding tolerance of a rate, relative, and of a time, s
+_NEAR: Final = 1e-9  # Rounding tolerance: relative for a rate, in s for a time
 _CELLS: Final = "rate history"
 ANY_UNIT: Final = "any"
 """Serial number that matches every unit, so that a table learned on one unit can drive other units."""
@@ -73,9 +73,9 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
     """Pulse width and advance as a function of the last gaps between dots: rows by rate, columns by history.
 
     A dot with history h is fired `advance` before its slot, with a pulse of `width`. In the gap before the
-    dot, `brake_delay` after the slot of the preceding dot, a brake pulse of `brake_width` catches the
-    returning armature so that it does not rebound. After the last dot comes the brake pulse of a dot from
-    rest. Arrays have one column for each of the (reach + 1)**gaps history numbers, see
+    dot, `brake_delay` after the slot of the preceding dot, a brake pulse of `brake_width` stops the
+    returning armature so that it does not rebound. The last dot is followed by the brake pulse of the entry
+    "rest". Arrays have one column for each of the (reach + 1)**gaps history numbers, see
     `printhammer.control.table.drive`; the Dataset has one column for each distinct history.
 
     Raises
@@ -134,7 +134,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
                 self._check(row, rate, history)
 
     def _check(self, row: int, rate: float, history: Sequence[int]) -> None:
-        """Check that an entry can be fired: values in range, and no firing during an earlier pulse."""
+        """Check an entry: values in range, and no pulse before the end of the previous pulse."""
         number = number_of(history, self.reach)
         values = {name: float(getattr(self, name)[row, number]) for name in COLUMNS}
         where = f"rate {rate:g} Hz, history {'-'.join(map(str, history))}"
@@ -204,9 +204,9 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return mixed(low_row, high_row, share)
 
     def fired_by(self, driver: str, hammer: Hammer) -> CompensationTable:
-        """Convert a table that was tuned on a hammer with a driver's pulse to a table for the hammer itself.
+        """Relabel a table tuned on `driven_by(hammer, driver, ...)` as a table for `hammer` with that driver.
 
-        The flight time from rest depends on the driver; all pulses are shifted by the difference.
+        All pulses are shifted by the difference of the flight times from rest.
         """
         if driver == self.driver:
             return self
@@ -215,7 +215,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return self.delayed(own - nominal(driven, tolerance=DISPLAY_TOLERANCE).flight_time, driver, hammer)
 
     def delayed(self, later: float, driver: str, hammer: Hammer) -> CompensationTable:
-        """Return a copy for a hammer and its driver, with all pulses delayed by `later`, s."""
+        """Return a copy with all pulses delayed by `later`, s, labelled with a hammer and its driver."""
         delay = np.where(self.brake_width > 0.0, self.brake_delay + later, self.brake_delay)
         return replace(
             self,
@@ -306,7 +306,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
 
     @property
     def look_ahead(self) -> IntArray:
-        """Number of slots by which a dot must be known in advance, shape (rates, entries)."""
+        """Number of slots in advance at which a dot must be known, shape (rates, entries)."""
         times = {name: getattr(self, name) for name in COLUMNS}
         return look_ahead(times, self.rates, self.gaps, self.reach)
 
@@ -328,7 +328,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return {**arrays, "history": (note, np.array([history_text(history) for history in every]))}
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return one row per rate and history, with a column for each gap of the history."""
+        """Return a data frame with one row per rate and history, and a column for each gap."""
         entries = self.entries()
         texts = np.array([text.split("-") for text in entries.pop("history")[1]])
         arrays: list[Any] = [(("rate",), self.rates), *((("history",), gap) for gap in texts.T)]
@@ -339,7 +339,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
     def to_csv(self) -> str:
         """Render the table as CSV text."""
         table = self.to_dataframe()
-        # Shortest digits that restore the same floats, below the comment lines of metadata.
+        # Metadata as comment lines, then numbers with the fewest digits that restore the same floats.
         rows = str(table.to_csv(index=False, header=False, lineterminator="\n"))
         return csv_head(self._head) + csv_text(table.iloc[:0]) + rows
 
@@ -418,7 +418,7 @@ def mixed(first: Settings, second: Settings, share: float) -> Settings:
     part = np.where(apart, float(share > 0.5), share)
 
     def between(low: FloatArray, high: FloatArray) -> FloatArray:
-        # Reproduces the end points to the last bit.
+        # This form reproduces both end points to the last bit.
         upper = np.where(part == 1.0, high, (1.0 - part) * low + part * high)
         return np.asarray(np.where(part == 0.0, low, upper))
 

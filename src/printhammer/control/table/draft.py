@@ -1,6 +1,6 @@
 """Draft of a compensation table, whose entries are evaluated and improved history by history.
 
-Entries of short histories are solved first, since the dots they describe precede the others in a pattern.
+Entries of short histories are solved first: in a pattern, their dots precede dots with longer histories.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class Draft:
         )
 
     def places(self, cells: Cells) -> tuple[IntArray, IntArray]:
-        """Return the row and column indices of the entries of several histories at all rates."""
+        """Return the row (rate) and column (history) indices of table entries."""
         columns = [number_of(history, self.task.reach) for _row, history in cells]
         return np.array([row for row, _history in cells], np.int64), np.array(columns, np.int64)
 
@@ -122,7 +122,7 @@ class Draft:
             if gap / rate <= task.single.settled
         ]
         drives = []
-        first = task.gaps + 1  # The preceding firing is the first with the full history of the row.
+        first = task.gaps + 1  # Index of the dot after the first dot with the full history of the row
         for row, history in cells:
             settings, gap = Settings(*self.values[:4, row]), history[0]
             slots = range(0, gap * (first + MORE), gap)
@@ -142,13 +142,14 @@ class Draft:
         dense: bool = True,
         whole: bool = False,
     ) -> FloatArray:
-        """Return deviations of force and arrival of patterns' last dots, as fractions of the limits.
+        """Simulate patterns; return the normalised force and arrival deviations of their last dots.
 
         `values`, shape (cells, 2), are advance and width of the last dots, s, and `shifts`, shape (shifts,
         2), are trial changes of both. With `dense`, each entry is evaluated in several patterns, see
         `gaps_before`. With `whole`, the result is the largest deviation of all dots of a pattern that share
-        the history of the last one. The shape is (cells, shifts, deviations), over hammers, patterns, force
-        and arrival; NaN for a lost dot or a pattern with extra contacts. An entry with fewer patterns than
+        the history of the last dot. The shape is (cells, shifts, deviations), over hammers, patterns, force
+                and arrival, as fractions of the limits; NaN for a lost dot or a pattern with extra contacts.
+                An entry with fewer patterns than
         the others repeats its first pattern.
         """
         task = self.task
@@ -200,7 +201,7 @@ def histories_of_length(task: Task, known: int) -> list[History]:
 
 
 def gaps_before(history: History, reach: int) -> list[tuple[int, ...]]:
-    """Return the sequences of gaps that precede a history in test patterns: empty, and several long ones."""
+    """Return the gap sequences that precede a history in its test patterns: none, and several long ones."""
     late = (reach + 1,)
     if REST in history:
         return [(), late]
@@ -236,9 +237,9 @@ def polish(draft: Draft) -> None:
 def _polish_level(draft: Draft, level: Sequence[History]) -> None:
     """Improve the entries of several histories at all rates, by two least-squares fits.
 
-    The first fit makes each entry right in the shortest pattern that ends with its history; if all earlier
-    dots are right, the entry is then right in every pattern. Entries that remain rough are fitted to all
-    their patterns, and the new fit is kept only where it is better.
+    The first fit is to the shortest pattern that ends with the history of the entry; if all earlier dots are
+    right, the entry then fits every pattern. Entries with a large remaining deviation are fitted to all their
+    patterns, and the new fit is kept only where it is better.
     """
     settled = draft.task.single.settled
     cells = [

@@ -1,9 +1,8 @@
 """Drives from compensation tables: a print pulse per dot, and an optional brake pulse after it.
 
-The history of a dot lists the gaps, in slots, back to the dots before it: from the dot to the preceding one,
-from that one to its predecessor, and so on, n gaps in all. A gap longer than the reach G means that the
-hammer is at rest by then, whatever was printed before; such a gap is written as 0, "rest", and so are all
-earlier gaps.
+The history of a dot lists the last n gaps between dots, in slots, latest first: from the preceding dot to
+this dot, from the dot before to the preceding dot, and so on. After a gap longer than the reach G the hammer
+is at rest, whatever was printed before; such a gap is written as 0, "rest", and so are all earlier gaps.
 
 Histories are numbered as n digits to the base G + 1 with the latest gap as the most significant digit, which
 is the index that the firmware computes. Numbers with a nonzero digit after a rest are aliases of the number
@@ -52,7 +51,7 @@ def entries_of(gaps: int, reach: int) -> int:
 
 
 def plain(history: Sequence[int]) -> History:
-    """Normalise a history: every gap after a rest is replaced by rest."""
+    """Normalise a history: replace every gap that precedes a rest in time by rest."""
     known = list(itertools.takewhile(lambda gap: gap != REST, history))
     return (*known, *[REST] * (len(history) - len(known)))
 
@@ -66,13 +65,13 @@ def number_of(history: Sequence[int], reach: int) -> int:
 
 
 def histories(gaps: int, reach: int) -> list[History]:
-    """List all distinct histories, shortest first, so that preceding entries are known."""
+    """List all distinct histories, those with the fewest gaps before a rest first."""
     every = itertools.product(range(reach + 1), repeat=gaps)
     return sorted((row for row in every if row == plain(row)), key=lambda row: (gaps - row.count(REST), row))
 
 
 def numbers_before(history: Sequence[int], reach: int) -> list[int]:
-    """List the possible history numbers of the preceding dot; after a rest, the number of `history`."""
+    """List the possible history numbers of the preceding dot; for a dot from rest, its own number."""
     if not history[0]:
         return [number_of(history, reach)]
     return [number_of((*history[1:], gap), reach) for gap in range(reach + 1)]
@@ -85,7 +84,7 @@ def shared_numbers(gaps: int, reach: int) -> IntArray:
 
 
 def histories_of(slots: Sequence[int], gaps: int, reach: int) -> IntArray:
-    """Return the history number of each dot of a pattern that begins at rest.
+    """Return the history numbers of the dots of a pattern that begins at rest, and of a later dot from rest.
 
     `slots` are the ascending slot indices of the dots. The array has one more element than dots: the last is
     the number of a dot printed from rest, long after the pattern.
@@ -124,7 +123,7 @@ ROUNDING: Final = 1e-9  # Relative rounding tolerance of a bound
 # Largest width of a pulse whose current saturates at the limit, as a multiple of the hammer's own; rows of
 # the shipped hammer need 1.36, and a wider range makes the grid of starts coarser
 _SATURATED: Final = 1.5
-_HALVINGS: Final = 50  # Bisections of a width: about the number of bits in a double
+_HALVINGS: Final = 50  # Bisections of a width: about the bits of a double's mantissa
 _FEWER: Final = 12  # Bisections of a width for a driver, each of which needs a simulation
 _SAMPLES: Final = 4001  # Samples of a decaying pulse; arbitrary
 _WAIT: Final = 1e-6  # Step of the search for the wait after a brake pulse, s
@@ -149,7 +148,7 @@ COLUMNS: Final = Settings._fields  # Names of the times of an entry
 
 
 def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
-    """Return the pulse of a hammer, and the largest width, s, at which its current stays within a limit, A.
+    """Return the pulse of a hammer, and its largest width, s, within a current limit, A.
 
     The width is at most `WIDEST` times the hammer's own, or `_SATURATED` times if the current has reached the
     limit at its own width already.
@@ -191,8 +190,8 @@ def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
     halvings = _HALVINGS if pulse.quantity == "current" else _FEWER
     found = widest(pulse, bound, width, WIDEST * width, halvings, peak_of)
     if pulse.quantity == "current" and peak == bound:
-        # A current that saturates at the limit has no margin at any width. The pulse may be wider if the next
-        # pulse need not wait longer for its tail.
+        # A current that saturates at the limit has no margin at any width. The pulse may be wider as long as
+        # its tail does not delay the next pulse.
         longer = _SATURATED * width
         waits = (clearance(hammer, pulse, each, largest) for each in (found, longer))
         if peak_of(of_width(pulse, longer)) <= largest * (1.0 + ROUNDING) and len(set(waits)) == 1:
@@ -201,7 +200,7 @@ def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
 
 
 def fading(hammer: Hammer, pulse: Waveform, share: float) -> float:
-    """Return the time, s, from the end of a pulse until its value stays below `share` times its peak.
+    """Return the decay time of a pulse, s: from its end until it stays below `share` times its peak.
 
     For a driver this is the first time at which the current has decayed; later induced currents are ignored.
     """
@@ -233,7 +232,7 @@ def clearance(hammer: Hammer, pulse: Waveform, width: float, largest: float) -> 
 
 
 def brake_of(pulse: Waveform, width: float) -> Waveform:
-    """Return a brake pulse of a width, s, with full supply up to the peak time of the driver."""
+    """Return the brake pulse of a width, s; a driver with a peak phase applies full supply up to its end."""
     if isinstance(pulse, PeakAndHold) and width <= pulse.peak_time:
         shared = {name: value for name, value in dict(pulse).items() if name in Rail.model_fields}
         return Rail(**{**shared, "width": width})
@@ -332,7 +331,7 @@ def driven_by(hammer: Hammer, driver: str, largest: float) -> Hammer:
 
 
 def of_force(hammer: Hammer, pulse: Waveform, force: float, low: float, high: float) -> Hammer:
-    """Return the hammer with the pulse width, between `low` and `high` [s], that prints with `force` [N]."""
+    """Return the hammer with the pulse width, from `low` to `high`, s, that prints with `force`, N."""
     for _ in range(_ROUNDS):
         widths = np.linspace(low, high, _GRID).tolist()
         pulses = [of_width(pulse, width) for width in widths]

@@ -1,7 +1,7 @@
-"""Compensation tables as CSV and JSON text, written and read back.
+"""Compensation tables as CSV and JSON text: writer of the metadata, and parsers.
 
-The formats are described in docs/howto/tables.md. Times are in seconds with all their digits, so that reading
-restores the table to the last bit.
+The formats are described in docs/howto/tables.md. Times are in seconds with all significant digits, so that
+reading restores the table to the last bit.
 """
 
 from __future__ import annotations
@@ -144,7 +144,7 @@ def _of_json(text: str) -> tuple[Head, Rows]:
 
 
 def _entries(arrays: Mapping[str, Any]) -> Rows:
-    """Return the entries of a JSON file, whose arrays run over rates and histories."""
+    """Return the table entries of a JSON file, whose arrays have the dimensions rate and history."""
     wanted = ("rate", "history", *COLUMNS, DEVIATION)
     _check_keys(arrays, wanted, "columns: ")
     for name in wanted:

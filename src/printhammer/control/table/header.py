@@ -36,7 +36,7 @@ _ADVANCE, _, _DELAY, _BRAKE = range(len(COLUMNS))
 
 
 def bits_of(times: Mapping[str, FloatArray], tick: float) -> int:
-    """Return the integer size of a header's times in bits: 32 for nanoseconds, else 16 if all times fit."""
+    """Return the integer width of a header's times, bits: 32 for nanoseconds, else 16 if all times fit."""
     largest = max(float(np.abs(np.rint(values / tick)).max()) for values in times.values())
     return 32 if tick == NANOSECOND or largest > np.iinfo(np.int16).max else 16
 
@@ -50,7 +50,7 @@ def size_of(rates: int, entries: int, bits: int, values: int = 0) -> int:
 def whole_ticks(
     times: Mapping[str, FloatArray], rates: FloatArray, gaps: int, reach: int, tick: float
 ) -> dict[str, FloatArray]:
-    """Round the times of a table to whole ticks, such that no pulse begins before the previous pulse ends.
+    """Round the times of a table to whole ticks, s, without overlap of pulses.
 
     Where rounding to the nearest tick makes two pulses overlap, the brake pulse begins later or is shorter,
     or the dot is fired later, by a tick or two. Arguments as for `look_ahead`, with arrays of shape (rates,
@@ -110,7 +110,7 @@ def look_ahead(times: Mapping[str, FloatArray], rates: FloatArray, gaps: int, re
 
 
 def prefix_of(head: Mapping[str, Any], rates: FloatArray, axis: str = "") -> str:
-    """Return the prefix of all names in a header, made of hammer, unit, driver, rates and axis.
+    """Return the prefix of all C names in a header: hammer, unit, driver, rates and axis.
 
     The driver is omitted if it is the hammer's own, the unit if the table is valid for every unit.
     """
@@ -241,7 +241,7 @@ def _most(prefix: str, values: int, entries: int) -> str:
 
 
 class _Between(NamedTuple):
-    """C code fragments of an interpolation, over the slot period or along an axis."""
+    """C code fragments of an interpolating function, over the slot period or along an axis."""
 
     said: str
     call: str

@@ -97,8 +97,8 @@ class TableReport(Result, rows=_AXES):
     def passed(self) -> Any:
         """Whether all dots are within limits, boolean array of shape (strategies, hammers, rates).
 
-        A table with a row in which errors grow does not pass, even if the row keeps to the limits: the
-        length at which such a row exceeds the limits depends on the last digits of its first dots.
+        A table with a row in which errors grow from dot to dot does not pass, even if the row is within
+        limits: the number of dots after which it exceeds the limits depends on rounding errors.
         """
         held = (self.good == 1.0).all(axis=3)
         held[1] &= ~(np.abs(self.multiplier[1]) > 1.0)
@@ -258,7 +258,7 @@ def _is_applicable(hammer: Hammer, by: Perturbation) -> bool:
 
 
 def _growth(driven: Sequence[Hammer], rate: float, strategy: Strategy, effort: Effort) -> FloatArray:
-    """Compute the largest multiplier of rows of dots in every or every second slot, shape (hammers,)."""
+    """Compute the multipliers of rows with a dot in every or every second slot; the larger, per hammer."""
     rates = [rate] * len(driven)
     each = np.array([multipliers(driven, rates, strategy, effort, step) for step in (1, 2)])
     largest = np.nan_to_num(np.abs(each), nan=-1.0).argmax(axis=0)
@@ -266,7 +266,7 @@ def _growth(driven: Sequence[Hammer], rate: float, strategy: Strategy, effort: E
 
 
 def _sets(seed: int) -> dict[str, tuple[Sequence[tuple[int, ...]], int | Sequence[int]]]:
-    """Return the patterns of each set in `SETS`, with the index of the first evaluated slot."""
+    """Return the pattern sets by name, each with its patterns and the index of the first evaluated slot."""
     long = {kind: [each for each in long_patterns() if each.kind == kind] for kind in KINDS}
     judged = {
         kind: ([each.slots for each in some], [each.judged_from for each in some])
@@ -282,7 +282,7 @@ def _largest(values: FloatArray) -> float:
 
 
 def between(table: CompensationTable) -> list[float]:
-    """Return rates for validating a table: the table's own rates or, for a long table, five midpoints."""
+    """Return the rates, Hz, at which to validate a table: its own or, for a long table, five midpoints."""
     rates = table.rates
     if rates.size < _LONG:
         return [float(rate) for rate in rates]

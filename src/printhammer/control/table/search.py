@@ -44,8 +44,8 @@ from printhammer.control.table.ways import (
 )
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
-# Distance of the periods at which a full search is run; other periods use the solutions of their neighbours,
-# s
+# Spacing of the periods at which a full search is run, s; other periods re-solve the solutions of their
+# # neighbours
 SPACING: Final = 30e-6
 _ROOM: Final = 100e-6  # Half-width of the range of firing times about the slot, s
 _GRID: Final = (12, 8)  # Numbers of firing times and widths of the starting grid
@@ -62,12 +62,12 @@ _HOPELESS: Final = 20.0  # Cost at which candidates are cut off
 _CLOSE: Final = 8e-6  # Spacing of the periods of the close search, s
 # Delay offsets of the close search, s: at most half of `_DELAY`
 _LATER: Final = (-22e-6, -8e-6, 8e-6, 22e-6)
-_WIDER: Final = (0.75, 0.9, 1.0, 1.15, 1.35)  # Width factors of the close search: between values of `_BRAKES`
+_WIDER: Final = (0.75, 0.9, 1.0, 1.15, 1.35)  # Brake width factors of the close search
 _LEAST_BRAKE: Final = 0.05  # Smallest width of a brake pulse, as a fraction of the hammer's own width
 # Penalty for a change of branch between neighbouring periods, where the table is not interpolated
 _SWITCH: Final = 0.15
 _SAME: Final = 1e-6  # Firing-time difference below which two candidates are duplicates, s
-_ROUNDING: Final = 1e-12  # Tolerance that includes the end of a range of delays, s
+_ROUNDING: Final = 1e-12  # Tolerance by which ranges of delays are extended to include their ends, s
 
 
 def chosen(task: Task, periods: FloatArray) -> tuple[FloatArray, Ways]:
@@ -117,7 +117,7 @@ def spaced(periods: FloatArray, spacing: float) -> list[float]:
 
 
 def _refine_groups(task: Task, tried: Sequence[Ways]) -> list[Ways]:
-    """Refine the candidates of several groups as one batch; return the groups without infinite costs."""
+    """Solve the candidates of several groups as one batch; return the groups of feasible candidates."""
     every = solved(task, joined(tried))
     every = every._replace(cost=costs(task, every))
     ends = np.cumsum([group.size for group in tried])
@@ -126,9 +126,9 @@ def _refine_groups(task: Task, tried: Sequence[Ways]) -> list[Ways]:
 
 
 def _look_closely(task: Task, periods: FloatArray, groups: list[Ways]) -> None:
-    """Search for brake pulses between the grid values at the periods whose best candidate is poor.
+    """Search brake pulses between the grid values, at periods whose best candidate is poor (in place).
 
-    Extends the groups of candidates of the periods in place.
+    New candidates are added to the groups of the periods.
     """
     least = [group.cost.min(initial=np.inf) for group in groups]
     # Where even the re-solved neighbours cost more than `_FAR`, no candidate is expected; an unstable one may

@@ -27,9 +27,9 @@ from printhammer.support.arrays import BoolArray, FloatArray
 
 # Distance from rest below which the hammer counts as settled, as a fraction of the distance to the pack
 QUIET: Final = 2e-4
-_LONGEST: Final = 20e-3  # Shortest time allowed for settling after a single pulse, s
-_WINDOWS: Final = 2.0  # Shortest time allowed for settling, in windows (`printhammer.run.window`)
-_SAMPLE: Final = 2e-6  # Sampling interval for settling, s
+_LONGEST: Final = 20e-3  # Lower bound of the time limit for settling after a single pulse, s
+_WINDOWS: Final = 2.0  # Lower bound of that time limit, in windows of the hammer (`printhammer.run.window`)
+_SAMPLE: Final = 2e-6  # Sampling interval of the motion that is tested for settling, s
 # Allowance for a late or wide print pulse before a brake pulse, s; arbitrary
 _WIDE: Final = 50e-6
 _TAIL: Final = 1e-3  # Shortest simulation time after the last slot, s: until the last contact is over
@@ -100,7 +100,7 @@ class Task:
     barred: tuple[tuple[float, float, float], ...] = ()
     """Period, delay and width of brake pulses, s, of candidates that failed in a tuned table."""
     located: bool = False
-    """Whether to locate the fixed points of all rows of dots, even of rows that look good after two dots."""
+    """Whether to locate the periodic orbits of all rows of dots, even of rows whose second dot is good."""
     mean_square: bool = False
     """Whether the cost of a candidate is the RMS over all hammers instead of the worst case."""
 
@@ -148,7 +148,7 @@ class Task:
         return np.asarray(np.where(brake > 0.0, delay + brake + self.wait, self.single.left))
 
     def latest(self, width: FloatArray) -> FloatArray:
-        """Return the latest firing time after the slot, s, at which a dot of a width can still be braked."""
+        """Return the latest firing time after the slot, s, that leaves time for the next brake pulse."""
         return np.asarray(self.brake_from - self.faded - width)
 
     def deviations(

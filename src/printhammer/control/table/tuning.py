@@ -1,4 +1,4 @@
-"""Tuning of compensation tables, such that every dot equals a dot from rest, whatever dots precede it.
+"""Tuning of compensation tables: every dot equals a dot from rest, whatever dots precede it.
 
 Where interpolation between two rates is poor, the grid of rates is refined.
 """
@@ -46,7 +46,7 @@ def refined(draft: Draft) -> Draft:
     Interpolation is poor where the solution branch changes. A new entry follows the branch of the rate below
     or above, whichever costs less; if both are poor, a new search is run.
     """
-    # At lower rates every dot is printed from rest.
+    # Below the first of these rates every dot is printed from rest.
     lower = np.flatnonzero(1.0 / draft.rates[1:] <= draft.task.single.settled)
     wanted = set(draft.rates[lower].tolist())
     for _ in range(HALVINGS):
@@ -192,7 +192,7 @@ def tune(
     Returns
     -------
     CompensationTable
-        The table, with the worst deviation of each entry; an entry may exceed the limits.
+        The table, with the largest deviation of each entry, which may exceed the limits.
     """
     gaps, far = checked_size(read_count(history, "history"), read_count(reach, "reach"))
     bounds = Limits() if limits is None else limits
@@ -276,7 +276,7 @@ def _counter(effort: Effort, total: int) -> Callable[[], None]:
 
 
 def _all_rates(single: Single, scale: float) -> FloatArray:
-    """Return the default rates of a table, Hz: from independent dots up to overlapping pack contacts."""
+    """Return the default rates of a table, Hz: from dots at rest to nearly overlapping pack contacts."""
     first, step = FIRST / scale, STEP / scale
     lowest = step * np.floor(1.0 / (single.settled * step))
     rates = np.arange(lowest, 1.0 / single.left, step)
@@ -293,10 +293,9 @@ def _given_rates(asked: Sequence[float | str]) -> FloatArray:
 
 
 def _bridge(draft: Draft) -> None:
-    """Tune short gaps of unusable rates again, in place, from the lowest upward, until a gap stays unusable.
+    """Retune short runs of unusable rates, in place and from the lowest rate up, until a run stays unusable.
 
-    The table ends below the first rate that stays poor, so a gap of a few rates would cost all rates above
-    the gap.
+    A table ends below its first unusable rate, so a run of a few unusable rates would cost all higher rates.
     """
     while (bad := np.flatnonzero(~(draft.worst <= _USABLE))).size:
         first = bad[: _GAP + 1]
@@ -309,7 +308,7 @@ def _bridge(draft: Draft) -> None:
 
 
 def _tune_again(draft: Draft, poor: IntArray) -> None:
-    """Tune poor rates again, in place, with additional candidates from neighbouring periods."""
+    """Retune poor rates, in place, with additional candidates from neighbouring periods."""
     if not poor.size:
         return
     task = draft.task
@@ -374,7 +373,7 @@ def _tune_rows(
 
 
 def _periods(rates: FloatArray, reach: int, single: Single) -> FloatArray:
-    """Return all periods, s, between dots within which the hammer does not settle, ascending."""
+    """Return all times between two dots in which the hammer does not come to rest, s, ascending."""
     every = np.arange(1, reach + 1) / rates[:, np.newaxis]
     return np.unique(every[every <= single.settled])
 

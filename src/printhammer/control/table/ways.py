@@ -1,4 +1,4 @@
-"""Candidate pulses for a dot that follows another dot: their solution, and the cost of rows of such dots.
+"""Candidate pulses for a dot that follows another dot: solver for the pulses, and cost of rows of dots.
 
 The solver is a damped Gauss-Newton iteration (Levenberg-Marquardt) for firing time and width, vectorised over
 dots.
@@ -114,19 +114,19 @@ UNSTABLE: Final = 1e3
 
 ROW: Final = 8  # Number of dots in the row that rates a candidate
 NOMINAL: Final = 8.0  # Weight of the design hammer relative to the perturbed hammers
-LEAST_OF_OWN: Final = 0.5  # Smallest width, as a fraction of the hammer's own
+LEAST_OF_OWN: Final = 0.5  # Smallest pulse width, as a fraction of the width of the hammer's own pulse
 # Deviation of the second dot, as a fraction of the limits, at which a candidate is solved
 _SOLVED: Final = 1e-3
 _STEPS: Final = (1e-6, 0.5e-6)  # Finite-difference steps of firing time and width, s
 # Deviation of the second dot, as a fraction of the limits, above which a candidate is not a solution
 _RIGHT: Final = 0.02
-_WRONG: Final = 1.0  # Additional cost of a candidate that is not a solution, so that solutions rank first
+_WRONG: Final = 1.0  # Cost added to a candidate that is not a solution, so that solutions rank first
 STABLE: Final = 0.97
 """Largest absolute multiplier, from dot to dot, of an admissible row of dots: inside the unit circle,
 with a margin for interpolation and timer ticks."""
 
 _FAR_OFF: Final = 5.0  # Deviation, as a fraction of the limits, at which an RMS term is cut off
-_ROUNDING: Final = 1e-12  # Tolerance that includes the ends of a range of firing times, s
+_ROUNDING: Final = 1e-12  # Tolerance by which ranges of firing times are extended to include their ends, s
 
 
 class Ways(NamedTuple):
@@ -181,9 +181,9 @@ def fits(task: Task, ways: Ways) -> BoolArray:
 
 
 def solved(task: Task, ways: Ways) -> Ways:
-    """Solve for firing times and widths with which the second dot meets its target; see `solve`.
+    """Solve for the firing times and widths with which the second dot equals the single-pulse dot.
 
-    A candidate that does not converge keeps its best iterate.
+    See `solve`. A candidate that does not converge keeps its best iterate.
     """
     if not ways.size:
         return ways
@@ -260,7 +260,7 @@ def growths(task: Task, ways: Ways) -> FloatArray:
 
 
 def seconds(task: Task, ways: Ways) -> FloatArray:
-    """Return normalised deviations of force and arrival of the second dots, shape (ways, 2)."""
+    """Simulate the second dots; return normalised deviations of force and arrival, shape (ways, 2)."""
     return _deviations(task, task.hammers[0], ways, rows_of(task, ways, 2))[:, 1]
 
 
@@ -279,9 +279,9 @@ def rows_of(task: Task, ways: Ways, dots: int) -> list[Drive]:
 
 
 def _deviations(task: Task, hammer: Hammer, ways: Ways, drives: Sequence[Drive]) -> FloatArray:
-    """Return deviations of force and arrival, as fractions of the limits, shape (ways, dots, 2).
+    """Simulate drives; return deviations of force and arrival, as fractions of the limits (ways, dots, 2).
 
-    NaN for a lost dot and for a dot with extra contacts.
+    A lost dot, and a dot with extra contacts, is NaN.
     """
     count = len(drives[0].times) if drives else 2
     slots = np.arange(count) * ways.period[:, np.newaxis]
