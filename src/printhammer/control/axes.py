@@ -216,7 +216,7 @@ def tune_along(
     progress: Callable[[int, int], None] | None = None,
     **options: Any,
 ) -> AxisTables:
-    """Tune a table for each axis value; the target is always the single-pulse dot of the nominal hammer.
+    """Tune a table for each axis value, always to the single-pulse dot of the nominal hammer.
 
     Parameters
     ----------

@@ -54,11 +54,11 @@ _LEAST: Final = 8  # Smallest number of samples in the window
 _MOST: Final = 200_000  # Largest number of samples in a record; arbitrary
 _SPAN: Final = 1.5  # Range of the converter, relative to the largest value around the touch
 _FLOWING: Final = 0.02  # Current at the touch, over the largest current, that counts as decayed
-_MOST_BEFORE: Final = 0.5  # Largest length of the window before the touch, in flight times
-_AROUND: Final = 0.2  # Largest shift within a window, in contact times
+_MOST_BEFORE: Final = 0.5  # Upper bound on the length of the window before the touch, in flight times
+_AROUND: Final = 0.2  # Largest trial shift of the touch within a window, in contact times
 _STEADY: Final = 1e-9  # Relative change of the coil voltage below which no driver switches
-_FINEST: Final = 400  # Largest number of shifts per contact time
-_MOVES: Final = 3  # Maximum number of window positions tried
+_FINEST: Final = 400  # Largest number of trial shifts per contact time
+_MOVES: Final = 3  # Iteration limit: the window is re-centred on the estimate
 _FIRM: Final = ("pack.stiffness", "pack.damping")
 _SOFT: Final = 1e-9  # Factor on the pack's constants that makes its force negligible
 
@@ -71,7 +71,7 @@ Units of `impact-wire` reach 0.4 with errors of 2 us; an unstated probe delay of
 """
 
 _TOO_LARGE: Final = 2.5
-"""Amplitude, relative to nominal, above which a match is rejected; units of `impact-wire` reach 1.3."""
+"""Amplitude, over nominal, above which an estimate is rejected; units of `impact-wire` reach 1.3."""
 
 UNSEEN, EDGE, UNLIKE, END = "unseen", "edge", "unlike", "end"
 """Flags of an estimate: no impact detected; samples unlike an impact, near an edge of the driver or
@@ -153,7 +153,7 @@ class ImpactEstimator:
         touch = round(self._shown_at / self.step * PHASES)
         reach = math.ceil(REACH * self.flight / self.step)
         search = slice(max(touch - PHASES * (before + reach), 0), touch + PHASES * (after + reach))
-        # An early end of clipping resembles an impact, so the range covers the current of the whole search.
+        # The end of clipping resembles an impact, so the range covers the current of the whole search.
         # The open-circuit voltage before the touch may exceed the signature of the impact by far.
         first = search.start if sampling.signal == "current" else touch
         around = slice(first, touch + PHASES * after)
@@ -246,7 +246,7 @@ class ImpactEstimator:
 
     @cached_property
     def _filters(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Shifts of the touch within a window, s, the filter weights of each, and the weights' norms."""
+        """Trial shifts of the touch within a window, s, with filter weights and the norms of the weights."""
         offsets = self.step * (np.arange(self._size) - self._before)
         grid = max(self.step / PHASES, self.contact / _FINEST)
         count = math.ceil(_AROUND * self.contact / grid)
@@ -386,7 +386,7 @@ class Sampling(Declared):
         return math.hypot(self.noise, self.step / math.sqrt(12.0))
 
     def of(self, motion: Motion) -> FloatArray:
-        """Return the noise-free coil current, A, or voltage, V, at the output times of a motion."""
+        """Return the exact coil current, A, or coil voltage, V, at the output times of a motion."""
         values = motion.current if self.signal == "current" else motion.voltage
         return np.asarray(values, np.float64)
 

@@ -382,7 +382,7 @@ class LearningLaw:
         return Verdict(gains, loops[chosen], float(np.fmax.reduce(growth)), float(good.mean()), every)
 
     def _leads(self, share: FloatArray, others: FloatArray) -> bool:
-        """Whether a drive gains `_GAIN` on average and prints fewer dots on at most `doubt` of the hammers."""
+        """Whether a drive gains `_GAIN` on average, and loses dots on at most `doubt` of the hammers."""
         harmless = np.quantile(share - others.max(axis=0), self.doubt) >= 0.0
         return bool(harmless and share.mean() - others.mean(axis=1).max() >= _GAIN)
 

@@ -102,7 +102,7 @@ def calibrate(
 
 
 def table_of(learner: Learner, base: CompensationTable, driver: str, hammer: Hammer) -> CompensationTable:
-    """Convert the drive that a learner has chosen, a table or an open loop, to a table for a hammer.
+    """Convert the drive selected by a learner, table or open loop, to a table for a hammer.
 
     `base` is the starting table, tuned for the hammer as switched by `driver`.
     """

@@ -30,7 +30,7 @@ Arbitrary; units of the production leave 0.7 to 1.6, whatever the offset of the 
 
 _STARTED: Final = 3  # Maximum number of tables tuned for the most probable hammer
 _LATE: Final = (
-    2  # Stages before an unstable row causes another table to be tuned; early posteriors are wide; arbitrary
+    2  # Stages before an unstable row leads to a new table; arbitrary, since early posteriors are wide
 )
 
 
@@ -44,10 +44,10 @@ class Mean(NamedTuple):
 class Learner:
     """Run-to-run calibration of the compensation table of one unit by a learning law.
 
-    The better open loop is used during the first stage, and afterwards in each of three cases: no hammer of
-    the production explains the readings; more posterior samples than the doubt allows would print fewer dots
-    within limits with the table than in an open loop, or a row in which errors grow; the mean gain is below
-    2 % of the dots.
+    The better open loop is used during the first stage. Later stages use it in three cases: no hammer of the
+    production explains the readings; more posterior samples than the doubt allows would print fewer dots
+    within limits with the table than in open loop, or a row in which errors grow; or the mean gain is below 2
+    % of the dots.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ class Learner:
         )
 
     def learn(self) -> Printing[None]:
-        """Estimate the constants and update the table after a stage; yield the lines to simulate."""
+        """Estimate the constants and update the table after a stage; yield the print jobs to simulate."""
         law = self.law
         noise = law.production.noise[:, None]
         line = mean(self._line, noise)
@@ -130,7 +130,7 @@ class Learner:
                 line.value - shown, noise / np.sqrt(np.maximum(line.seen, 1.0))
             )
         update = yield from law.update(self.belief, self.corrections, unexplained)
-        # If rows of the unit are unstable with these pulses, a table tuned for it may choose other pulses.
+        # If rows are unstable with these pulses, a table tuned for the unit may have other pulses.
         grows = update.verdict.multiplier > 1.0 and self.stage >= _LATE
         if (update.left > BAD or grows) and self._started < _STARTED:
             self._started += 1
@@ -155,7 +155,7 @@ class Learner:
         count = np.concatenate([each.seen for each in means], axis=1)
         noise = np.hypot(law.production.noise[:, None] / np.sqrt(np.maximum(count, 1.0)), _FLOOR)
         rough = np.array([each.rest for each in law.shown]).reshape(measured, -1)
-        # A later line has the surrogate residual of the line in open loop.
+        # All later lines are assigned the surrogate residual of the open-loop line.
         rough = np.concatenate([rough, rough[:, -len(LINE) :]], axis=1)[:, : value.shape[1]]
         evidence = Evidence(value.ravel(), noise.ravel(), rough.ravel())
 
@@ -192,7 +192,7 @@ def _unknown(law: LearningLaw) -> Verdict:
 
 
 def _model_error(rest: FloatArray, noise: FloatArray) -> FloatArray:
-    """Estimate the model error from residuals (measured, dots), shrunk by the noise; 0 without a reading."""
+    """Estimate the model error: residuals (measured, dots), shrunk by the noise; 0 without a reading."""
     known = np.isfinite(rest).any(axis=1, keepdims=True)
     size = 1.4826 * np.nanmedian(np.where(known, np.abs(rest), 0.0), axis=1, keepdims=True)
     more = np.maximum(size**2 - noise**2, 0.0)

@@ -3,10 +3,11 @@
 The *ladder* is a set of pulses from rest, each called a rung: a single pulse or a pair. The impact times of
 single pulses of different widths separate the strength of the coil from the distance of the pack. They do not
 depend on the stiffness of the paper, since the armature touches before the paper resists. The time of a
-second impact does: the second pulse of a pair catches the rebounding armature and returns it to the paper
-(pump and probe). Rungs are added one at a time; each step takes the rung that most reduces the variance of
-the estimated single-pulse force, averaged over the production (greedy A-optimal design; Pukelsheim, *Optimal
-Design of Experiments*, 2006, chapter 6). A greedy choice can miss a better combination of rungs.
+second impact depends on the stiffness: the second pulse of a pair catches the rebounding armature and returns
+it to the paper (pump and probe). Rungs are added one at a time; each step adds the rung that most reduces the
+variance of the estimated single-pulse force, averaged over the production (greedy A-optimal design;
+Pukelsheim, *Optimal Design of Experiments*, 2006, chapter 6). A greedy choice can miss a better combination
+of rungs.
 
 `Surrogate` approximates a reading by a quadratic function of the constants, to plan the ladder and to start
 searches. Learners are coroutines that yield print jobs; `printed` runs pending jobs in few ensembles. The
@@ -96,8 +97,8 @@ _SECOND: Final = (1.0, 1.3, 1.5)
 # Times of the second pulse after the armature has left the pack, as fractions of the flight time
 _LATER: Final = (0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0, 1.2, 1.6, 2.0, 2.4)
 _CLEAR: Final = 20e-6  # Allowance for a unit that leaves the pack later than the nominal hammer, s
-_SEEN: Final = 0.97  # Smallest fraction of the simulated hammers that have to print all dots of a rung
-_RUNS: Final = 8.0  # Number of runs after which the design is optimal
+_SEEN: Final = 0.97  # Smallest fraction of simulated hammers that must print all dots of a candidate rung
+_RUNS: Final = 8.0  # Number of averaged runs for which the choice of rungs is optimised
 _POINTS: Final = 24  # Number of simulated hammers over which the design is averaged
 
 
@@ -166,7 +167,7 @@ def choose(
     same = np.full((len(points), 1), offset)
 
     def information(readings: Sequence[Surrogate]) -> FloatArray:
-        # The surrogate's residual counts as noise, since a search cannot use it from far away.
+        # The surrogate's residual counts as noise: far from a solution, a search cannot resolve it.
         slopes = [
             np.hstack([each.gradient(points), same]) / np.sqrt(variance + each.rest**2) for each in readings
         ]
@@ -197,14 +198,14 @@ def choose(
 
 
 _MOST: Final = 4096  # Maximum number of hammers in an ensemble; bounds the memory
-_STEPS: Final = (1, 2)  # Slots from dot to dot of the rows of which multipliers are computed
+_STEPS: Final = (1, 2)  # Slots from dot to dot in the rows whose multipliers are computed
 
 LINE: Final = slots_of(cycle_with_lead_in(5, 0))
 """Slots of the test line: the de Bruijn cycle of order 5, in which every history of two gaps occurs."""
 
 
 class Order(NamedTuple):
-    """Print job: hammers, a drive for each hammer, and the end time of the simulation, s."""
+    """Print job to simulate: hammers, a drive for each hammer, and the end time."""
 
     hammers: Sequence[Hammer]  # Hammers to simulate, (M,)
     drives: Sequence[PulseSequence]  # One drive per hammer, (M,)
@@ -244,7 +245,9 @@ class Press:
         return printed(self.order_line(settings, slots, pulses), self.task)
 
     def multipliers(self, settings: FloatArray) -> FloatArray:
-        """Compute each hammer's multiplier of rows of dots printed with settings, shape (4, entries).
+        """Compute the multipliers of rows of dots printed with table settings, shape (hammers,).
+
+        `settings` has the shape (4, entries).
 
         A multiplier is the largest absolute Floquet multiplier of two rows, with a dot in every slot and in
         every second slot; see `printhammer.derivatives.rows.row_multipliers`. The result is NaN if neither
@@ -303,7 +306,7 @@ class Press:
 
 
 def printed(work: Printing[T], task: Task) -> T:
-    """Run a coroutine to its end: simulate the print jobs that it yields, and return the result."""
+    """Run a learner's coroutine to its end: simulate the yielded print jobs, and return the result."""
     return answered(work, partial(_run, effort=task.effort))
 
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from printhammer.control.learning.lines import Printing
 
 SCALE: Final = 0.01
-"""Prior standard deviation of the relative gain error of a sensor."""
+"""Prior standard deviation of the relative gain error of a sensor; arbitrary."""
 
 OFFSET: Final = 25e-6
 """Prior standard deviation of the offset of a sensor's times, s, used if the sensor has no `offset`.
@@ -35,8 +35,8 @@ Sound takes 20 us for 7 mm of air before a microphone."""
 class Production:
     """Model of a production: maps rows of varying constants to hammers and to their sensor readings.
 
-    A row holds the constants in prior standard deviations, followed by the errors of the sensor in prior
-    standard deviations: gain of its times, gain of its forces if it measures forces, offset of its times.
+    A row holds, in prior standard deviations, the deviations of the constants, followed by the errors of the
+    sensor: gain of the times, gain of the forces if forces are measured, offset of the times.
     """
 
     task: Task
@@ -116,6 +116,6 @@ class Production:
 def _readings_of(
     line: Printing[tuple[DotTable, Judgement]], force: float
 ) -> Printing[tuple[FloatArray, FloatArray]]:
-    """Extract flight times, s, and forces, normalised by `force`, from the dots of a test line."""
+    """Extract flight times, s, and forces, as fractions of `force`, from the dots of a print job."""
     dots, _judgement = yield from line
     return dots.flight_time, dots.peak_force / force

@@ -34,7 +34,7 @@ ADVANCE: Final = 6
 """Character pitch: number of columns from the start of a character to the start of the next character."""
 
 _COLUMNS: Final = 5  # Number of columns of a character
-_STEP: Final = 7  # Columns from character to character in the font file
+_STEP: Final = 7  # Number of columns from character to character in the text of the font file
 _DOT: Final = "#"
 
 
@@ -59,7 +59,7 @@ def glyphs() -> Mapping[str, BoolArray]:
 _STANDARD: Final = "mpl-data/fonts/ttf/DejaVuSansMono.ttf"
 _ASCII: Final = string.digits + string.ascii_letters + string.punctuation
 _LARGER: Final = 2
-"""Largest font size to try, in multiples of the number of wires."""
+"""Largest font size to try, as a multiple of the number of wires; arbitrary."""
 
 
 def standard_font() -> Path:

@@ -30,8 +30,8 @@ CYCLE: Final = 20e-3  # Shortest duration of the simulation, s
 
 _WINDOWS: Final = 2.0  # Shortest duration of the simulation, in windows (`printhammer.run.window`)
 _SPACING: Final = 1e-6  # Spacing of the samples, s
-_BISECTIONS: Final = 40  # Bisections of the settling time: they exhaust the digits
-_SAMPLES: Final = 4001  # Number of samples of a pulse, from which the time of exact rest is read; arbitrary
+_BISECTIONS: Final = 40  # Bisections of the settling time, down to rounding error
+_SAMPLES: Final = 4001  # Number of samples of a motion from which the time of exact rest is found; arbitrary
 _MARGIN: Final = 0.99  # Reduction of the undisturbed rate, since integration errors shift the rest; arbitrary
 
 
@@ -111,10 +111,10 @@ def settle(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float
 
 
 def undisturbed_rate(hammer: Hammer) -> float:
-    """Return a rate, Hz, up to which the armature is exactly at rest at each pulse; 0 without such a rate.
+    """Return a rate, Hz, up to which the armature is exactly at rest at each pulse; 0 if there is none.
 
     A device with a rigid backstop and a driver that ends its current is at rest to the last bit some time
-    after a pulse. A pattern of pulses further apart is a sequence of equal dots.
+    after a pulse. Pulses further apart than that time give equal dots.
     """
     pulse = pulse_of(hammer, None)
     motion = simulate(hammer, PulseTrain(pulse), duration=2.0 * wait_of(hammer, pulse), points=_SAMPLES)
@@ -157,7 +157,7 @@ def rebounds(motion: Motion, position: float) -> list[Rebound]:
 
 
 def settled_from(away: BoolArray) -> int:
-    """Return the index from which on all samples are at rest, from the mask of samples away from rest."""
+    """Return the index after the last True of a mask of samples away from rest."""
     places = np.flatnonzero(away)
     return int(places[-1]) + 1 if places.size else 0
 

@@ -1,12 +1,12 @@
-"""Drive strategies, which map a requested dot pattern to a drive, and long test patterns for drives.
+"""Drive strategies, which map dot patterns to drives, and the long test patterns.
 
 The open loop is defined here; compensation tables and feedback are strategies too. A pattern is a row of
 slots, one period apart in time, each with or without a requested dot.
 
 The long test patterns are the de Bruijn cycle, rows of dots, and a line of text. The cycle holds every word
-of eight slots, but at most eight dots in a row. An error may grow from dot to dot and show only in a longer
-row, so rows have 200 slots, with a dot in every slot, every second or every third. The text holds all letters
-and digits in the built-in font, one pattern per wire of the head.
+of eight slots, but at most eight dots in a row. An error that grows from dot to dot may exceed the limits
+only in a longer row, so rows have 200 slots, with a dot in every slot, every second or every third. The text
+holds all letters and digits in the built-in font, one pattern per wire of the head.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ SLOTS: Final = 8  # Number of slots of a pattern from rest, and order of the de 
 LEAD_IN: Final = 64  # Slots simulated before the first judged slot of the cycle
 
 FIRST_SLOT: Final = 1e-3
-"""Time of slot 0, s: a drive may fire ahead of a slot, but not before time 0."""
+"""Time of slot 0, s, so that a drive may fire ahead of slot 0, but not before time 0; arbitrary."""
 
 
 @cache
@@ -96,7 +96,7 @@ def slot_times(slots: Sequence[int] | IntArray, rate: float, first: float = FIRS
 
 
 class Strategy(Protocol):
-    """A drive strategy: a function that returns a drive for each dot pattern.
+    """Interface of drive strategies: callables that return a drive for each dot pattern.
 
     A strategy is called with the hammer to drive, which may differ from the hammer that the strategy was
     designed for, the patterns as indices of the slots with a dot, and the slot rate, Hz. Each drive has one
@@ -189,7 +189,7 @@ class LongPattern(NamedTuple):
 
 
 def row_of_dots(step: int = 1) -> tuple[int, ...]:
-    """Return the slots with a dot in a row of `ROW` slots, of which every `step`-th slot has a dot."""
+    """Return the indices 0, `step`, 2 `step`, ... of the slots with a dot in a row of `ROW` slots."""
     return tuple(range(0, ROW, step))
 
 

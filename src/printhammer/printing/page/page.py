@@ -3,11 +3,11 @@
 Each wire of each print line is a separate simulation from rest; all of them form one ensemble. The carriage
 passes slot n at n / rate after slot 0, at the speed rate x pitch. A dot lands where the carriage is at touch;
 all dots are shifted together by the carriage travel during the flight time of the single pulse, which a
-printer allows for. The remaining offset is the placement error: arrival deviation x carriage speed.
+printer corrects. The remaining offset is the placement error: arrival deviation x carriage speed.
 
 Darkness: the optical density of a dot is that of the single-pulse dot times the ratio of the peak forces, and
-its darkness, the fraction of light absorbed, is 1 - 10^-density. This is an assumption: ink in proportion to
-force, density in proportion to ink. Dots are as wide as the wire.
+its darkness, the fraction of light absorbed, is 1 - 10^-density. The relation assumes that ink is
+proportional to force, and density to ink. Dots are as wide as the wire.
 
 Print heads: positions and diameter of the wires, and the darkness of a dot. The paper says of the head only
 that its wires are arranged in columns and that the carriage moves a fraction of a metre per second. The
@@ -332,7 +332,7 @@ class Page(Result, rows="dot"):
         many = min(slots, self.pattern.slots)
         total = np.cumsum(np.pad(sums, ((0, 0), (1, 0))), axis=1)
         windows = total[:, many:] - total[:, :-many]
-        # Rounded, so that floating-point noise does not decide between equal windows.
+        # Rounded, so that rounding errors do not decide between equal windows.
         line, first = np.unravel_index(int(np.argmax(np.round(windows, 9))), windows.shape)
         return int(line), int(first)
 
@@ -430,7 +430,7 @@ def print_page(
 
 
 def _dots_of(trial: Trial) -> dict[str, Any]:
-    """Assemble the columns of a page from the dots and extra contacts of a trial, wire by wire."""
+    """Collect the columns of `Page` from the dots and extra contacts of a trial, wire by wire."""
     ((_hammer, single, _rate),) = trial.cases
     dots, extra, judged, wanted = trial.dots, trial.extra, trial.judgement, trial.slots >= 0
     assert extra is not None

@@ -50,7 +50,7 @@ _MOST_PIXELS: Final = 50_000_000  # Largest number of pixels of a bitmap; arbitr
 
 
 def read_pattern(path: str | Path, wires: int | None = None) -> tuple[str, BoolArray]:
-    """Read the name and the dots, shape (lines, wires, slots), of a pattern file; see `Pattern.load`.
+    """Read a pattern file; return its name and its dots, shape (lines, wires, slots).
 
     The name of a bitmap is the file name without its suffix.
     """

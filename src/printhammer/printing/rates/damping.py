@@ -1,4 +1,4 @@
-"""The damping study: safe rate and settling with replaced backstop and pack materials.
+"""Damping study: safe rate and settling with other backstop and pack materials.
 
 "Passive damping methods should be improved, probably requiring a breakthrough in materials", F. Hendriks, IBM
 J. Res. Develop. 27 (1983), discussion. The study replaces one material at a time at constant print force: the
@@ -45,8 +45,7 @@ DAMPINGS: Final = (0.25, 0.5, 2.0, 4.0, 16.0)
 """Factors on stiffness and damping of a hard backstop; arbitrary."""
 
 ELASTOMERS: Final = (8e7, 8e8)
-"""Stiffness of the elastomers, N/m^1.5: 10 N at 25 um, about the value that the paper states, and ten times
-that value."""
+"""Stiffness of the elastomers, N/m^1.5: 10 N at 25 um, about the paper's value, and ten times as much."""
 
 RELAXATIONS: Final = (0.0, 10e-6, 30e-6, 100e-6, 300e-6)  # Relaxation times of the elastomers, s; arbitrary
 
@@ -56,7 +55,7 @@ PACK_DAMPINGS: Final = (0.1, 0.4)  # Damping ratios of spring-and-dashpot packs;
 
 
 class Material(Declared):
-    """Replacement of the backstop or pack material of the studied hammer."""
+    """Replacement material for the backstop or the pack of the studied hammer."""
 
     kind: str = part("one of `KINDS`")
     label: str = part("short description")
@@ -76,8 +75,8 @@ def materials(hammer: Hammer, single: Nominal) -> list[Material]:
     """List the default replacement materials for a hammer and its single-pulse dot.
 
     Hard backstops have other constants of equations (6) and (7); elastomers follow the law of Kuwabara and
-    Kono; packs are softer or harder by equation (5), or a spring with a dashpot. The stiffness of such a
-    spring is chosen so that the loading work of the single-pulse dot compresses it to the force of that dot.
+    Kono; packs follow equation (5) with another stiffness, or are a spring with a dashpot. The stiffness of
+    that spring is such that the loading work of the single-pulse dot compresses it to the force of that dot.
     """
     listed = [Material("as it is", "as it is", {})]
     backstop, pack = hammer.backstop, hammer.pack

@@ -244,7 +244,7 @@ class Quality(Result):
         return self._within(ENGRAVED_SPREAD)
 
     def _within(self, peak_to_peak: float) -> bool:
-        # Lost dots and dots not run are NaN, which the spread would ignore.
+        # Lost dots and dots not simulated are NaN, which the spread would ignore.
         known = not np.isnan(self.arrival_deviation).any()
         return bool(known and self.arrival_spread.peak_to_peak <= peak_to_peak)
 
@@ -310,7 +310,8 @@ def quality(
         Distance between neighbouring slots on the paper, m, or text with a unit.
     paper : Paper, optional
         Variation of pack stiffness and front along the line; by default none. Each dot meets the pack at its
-        slot, from its firing until the next one. A strategy knows of the variation only through its sensor.
+        slot, from its firing until the next firing. A strategy observes the variation only through its
+        sensor.
 
     Returns
     -------

@@ -7,8 +7,8 @@ after a lead-in of 64 slots; rows of 200 slots; and a line of text.
 
 By default the grid of the paper's hammer begins at 100 Hz: 10 ms is several times the settle-out time of such
 a hammer, so below 100 Hz every dot is a single pulse from rest. The grid of a slower device is scaled down,
-see `printhammer.run.window.time_scale`. In open loop the grid of a device that returns exactly to rest begins
-with the last rate at which each pulse finds it there.
+see `printhammer.run.window.time_scale`. For a device that returns exactly to rest, the grid of the open loop
+begins with the last rate at which the device is at rest at each pulse.
 """
 
 from __future__ import annotations
@@ -222,9 +222,9 @@ def safe_rate(
         Single-pulse dot with which all dots are compared; by default that of `hammer`. If the drive was
         designed for another hammer, pass the single-pulse dot of that other hammer.
     first, last, step : float or str, optional
-        The grid of rates, Hz, or text with a unit; by default 100 Hz to 4 kHz, every 5 Hz, scaled down
-        for a device slower than the paper's hammer. In open loop the default grid leaves out lower rates at
-        which each pulse finds the device exactly at rest.
+        The grid of rates, Hz, or text with a unit; by default 100 Hz to 4 kHz, every 5 Hz, scaled down for a
+        device slower than the paper's hammer. In open loop the default grid omits lower rates at which the
+        device is exactly at rest at each pulse.
     stop : bool, optional
         Whether to stop at the first rate that does not pass; otherwise all rates of the grid are simulated,
         as a chart needs them.
@@ -241,7 +241,7 @@ def safe_rate(
     grid, apart = grid_of(hammer, first, last, step)
     bounds = Limits() if limits is None else limits
     single = single_pulse(hammer, tolerance=effort.tolerance) if nominal is None else nominal
-    # In a closed loop, and with a table, dots affect each other wherever the armature is.
+    # In a closed loop, and with a table, dots affect each other even if the armature is at rest in between.
     apart_below = undisturbed_rate(hammer) if strategy is open_loop else 0.0
     if first is None and nominal is None:
         below = int(np.searchsorted(grid, apart_below, side="right"))
@@ -259,14 +259,14 @@ def safe_rate(
         cases = [Case(hammer, single, rate) for rate in grid[len(rows) :][:size].tolist()]
         size = min(2 * size, _AT_ONCE)
         if stop:
-            # Most devices fail in the second or third slot: the slots that follow are not simulated.
+            # Most devices fail in the second or third slot, so short patterns are simulated first.
             quick = attempt(cases, [each for each in patterns if each[-1] < _FEW], strategy, **options).passed
             cases = cases[: int(np.argmin(quick)) + 1] if not quick.all() else cases
         brief = attempt_words(cases, every, apart_below, strategy, **options) if long else None
         runs = [] if brief is None else [[(brief[0], k)] for k in range(brief[1])]
         left = cases[len(runs) :]
         if left:
-            # A failed rate is simulated again with the patterns themselves, for the report.
+            # A failed rate is simulated again with the full patterns, for the report.
             left = left[:1] if stop and brief is not None else left
             runs += attempt_patterns(left, patterns, strategy, long=long, stop=stop, **options)
         cases = cases[: len(runs)]
@@ -317,9 +317,10 @@ def grid_of(
     step: float | str | None,
     spacing: float = STEP,
 ) -> tuple[FloatArray, float]:
-    """Return a grid of rates and the grid step, Hz; None stands for the default of the device.
+    """Return a grid of rates and its step, Hz, with default values for arguments that are None.
 
-    `spacing` is the default step for the paper's hammer, Hz.
+    `spacing` is the default step for the paper's hammer, Hz; defaults scale with the time scale of the
+    hammer.
     """
     values = [
         scaled_rate(hammer, default) if value is None else read_positive(value, "Hz", name)
@@ -359,7 +360,7 @@ def from_rest(*, every: bool) -> list[tuple[int, ...]]:
 
 
 def _row(runs: Sequence[tuple[Trial, int]], *, long: bool) -> dict[str, Any]:
-    """Return the columns of `SafeRate` at one slot rate, from the trials at that rate."""
+    """Compute the columns of `SafeRate` at one slot rate from the trials at that rate."""
 
     def joined(name: str) -> npt.NDArray[Any]:
         return np.concatenate(
@@ -448,7 +449,7 @@ def safe_rates(
     limits: Limits,
     effort: Effort,
 ) -> FloatArray:
-    """Compute the safe rates of many hammers on an ascending grid of rates, Hz; arguments as for `all_pass`.
+    """Compute the safe rates, Hz, of many hammers on an ascending grid of rates; arguments as for `all_pass`.
 
     The dots of each hammer are compared with its own entry of `singles`; progress counts the hammers whose
     safe rate is known. The rate is NaN if not even the first rate of the grid passes, and the last rate of

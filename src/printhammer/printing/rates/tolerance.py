@@ -39,15 +39,15 @@ GAP: Final = "pack.front"
 """Position whose spread is relative to the distance from the backstop (the origin of x is arbitrary)."""
 
 FIXED: Final = ("backstop.position", "platen")
-"""Constants without a default spread: the origin of x and the platen; no force depends on either."""
+"""Constants without a default spread, since no force depends on them: the origin of x, and the platen."""
 
 
 _SHARES: Final = (0.95, 0.5)
-"""Fractions of the hammers; a summary reports the largest rate that each of these fractions reaches."""
+"""Fractions of the hammers for which a summary states the largest common safe rate."""
 
 
 class ToleranceYield(Result):
-    """Yield of randomly drawn hammers: their constants, single-pulse dots, and whether each passes."""
+    """Yield of randomly drawn hammers: constants, single-pulse dots and verdicts."""
 
     hammer: Hammer = part("design hammer")
     strategy: str = scalar("", "name of the drive strategy")
@@ -151,9 +151,9 @@ class ToleranceYield(Result):
 
     @property
     def share_error(self) -> float:
-        """Standard error of the fraction for a random sample; an upper estimate for the Sobol sequence."""
+        """Standard error of `share` for independent draws; an upper estimate for the Sobol sequence."""
         count = len(self.passed)
-        # At 0 or 1 the plain binomial formula would report no error at all.
+        # At 0 or 1 the plain binomial formula would give a standard error of 0.
         share = (self.passed.sum() + 0.5) / (count + 1.0)
         return float(math.sqrt(share * (1.0 - share) / count))
 

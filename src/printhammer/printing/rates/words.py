@@ -1,8 +1,8 @@
-"""Words of dots: patterns split where a device comes to rest, so that each group of dots is simulated once.
+"""Words of dots: patterns are split where a device comes to rest, and each word is simulated once.
 
 A slow device with a rigid backstop is exactly at rest some slots after a dot. A pattern is then a sequence of
 *words*, the dots between such gaps, that do not affect each other. The words of all test patterns are few:
-for dots that affect only the next slot they are rows of one to eight dots, and a row of 200.
+if a dot affects only the next slot, the words are rows of one to eight dots, and a row of 200.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ _EQUAL: Final = 1e-6
 
 
 def words_of(patterns: Iterable[Sequence[int]], gap: int) -> list[tuple[int, ...]]:
-    """Split patterns into words of dots less than `gap` slots apart; list the distinct words, from slot 0.
+    """Split patterns into words of dots less than `gap` slots apart; return the distinct words, from slot 0.
 
-    Patterns are split where consecutive dots are `gap` slots or more apart.
+    A split is where consecutive dots are `gap` slots or more apart.
     """
     words = set()
     for slots in patterns:
@@ -50,25 +50,25 @@ def attempt_words(
     strategy: Strategy,
     **options: Any,
 ) -> tuple[Trial, int] | None:
-    """Simulate the words (groups of close dots) of patterns in all cases (hammer and rate), by rate.
+    """Simulate the words (groups of close dots) of patterns for all cases (hammer and rate).
 
-    Each word is followed by one more dot, which has to equal the first dot of the word, from rest: only then
-    is the word separate from what follows. Of a row only the first dots are simulated, and the last of these
-    have to be equal: the row has then reached its periodic orbit. It stays there if no error grows from dot
-    to dot, so that the multiplier of the row must be at most 1 in absolute value.
+    Each word is followed by one more dot, which must equal the first dot of the word, from rest: only then is
+    the word independent of the dots that follow. Of a row only the first dots are simulated, and the last of
+    these must be equal: the row has then reached its periodic orbit. The row remains on the orbit if errors
+    do not grow, so the multiplier of the row must be at most 1 in absolute value.
 
     Parameters
     ----------
     cases, patterns, strategy, options
         As for `attempt`.
     undisturbed : float
-        Rate up to which each pulse finds the device at rest, Hz.
+        Rate up to which the device is at rest at each pulse, Hz.
 
     Returns
     -------
     tuple or None
         The trial, and the number of leading cases in which every dot of the patterns is within limits.
-        None where the patterns are not split, since dots affect each other over too many slots.
+        None if the patterns are not split, since dots affect each other over too many slots.
     """
     if not undisturbed > 0.0:
         return None
