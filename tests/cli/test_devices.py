@@ -142,6 +142,19 @@ def test_words_and_units_of_the_studio_are_no_physics() -> None:
             ball.replace(key, value)
 
 
+def test_views_of_the_studio_are_listed_in_the_file() -> None:
+    block, ball = ph.load("housner-1963"), ph.load("bouncing-ball")
+    assert block.views == ("phase", "motion", "sketch", "forces")
+    assert ball.views == ()
+    other = ph.Hammer.from_toml(ball.replace("views", ["map", "line"]).to_toml())
+    assert other.views == ("map", "line")
+    assert other.fingerprint == ball.fingerprint
+    assert other.replace("views", None).views == ()
+    for views in ([], "map", ["map", "map"], ["plan"], [1], [["map"]]):
+        with refused("views", value=views):
+            ball.replace("views", views)
+
+
 def test_pulses_that_do_not_interact_need_no_table() -> None:
     """The relay is at rest to the last bit 34 ms after a pulse."""
     relay = ph.load("relay-5v")

@@ -143,6 +143,7 @@ BAD = {
     "missing format": (changed("^format.*", ""), ["format is missing: expected format = 1"]),
     "other format": (changed("^format.*", "format = 2"), ["format = 2: expected 1"]),
     "format of another kind": (changed("^format.*", "format = 1.0"), ["format = 1.0: expected 1"]),
+    "unknown view": (changed("^format.*", "format = 1\nviews = ['plan']"), ["views = ['plan']", "phase"]),
     "no name": (changed("^name.*", ""), ["name is missing"]),
     "number for a name": (changed("^name.*", "name = 3"), ["name = 3: expected text"]),
     "no TOML": ("mass: 3 kg\n", ["expected a TOML file", "line 1"]),
@@ -298,6 +299,7 @@ def test_schema_takes_the_shipped_file(validator: jsonschema.protocols.Validator
     ("section", "key", "value"),
     [
         ("", "mess", 1),
+        ("", "views", ["plan"]),
         ("", "format", 2),
         ("", "mass", 4e-4),
         ("mass", "value", -1),

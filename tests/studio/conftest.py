@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 from tests.studio.browser import Page, browser, chromium
 
+from printhammer.hammer.file import VIEWS
 from printhammer.hammer.hammer import load
 from printhammer.studio import Shelf, live_page
 from printhammer.studio.bundle import page_files
-from printhammer.studio.live import VIEWS
 
 NEEDS = "opened_browser"
 HAMMERS = ("hendriks-1983-1", "hendriks-1983", "bouncing-ball", "duffing-holmes")

@@ -55,6 +55,7 @@ def test_a_hammer_file_gives_the_numbers_of_python(ask: Any, name: str) -> None:
         (("[waveform]", "[wave]"), "wave is not known"),
         (("mass = {", "mass = 3 #{"), "mass has no unit"),
         (("format = 1", "format = 1\n__proto__ = 1"), "not known"),
+        (("format = 1", "format = 1\nviews = ['plan']"), "views is expected to be one of"),
     ],
 )
 def test_another_hammer_file_is_refused(ask: Any, change: tuple[str, str], reason: str) -> None:
@@ -62,6 +63,12 @@ def test_another_hammer_file_is_refused(ask: Any, change: tuple[str, str], reaso
     assert change[0] in text
     answer = ask("adopt", text.replace(*change, 1))
     assert reason in answer["refused"], json.dumps(answer)[:300]
+
+
+def test_a_file_lists_its_views(ask: Any) -> None:
+    text = ph.load(NAMES[0]).replace("views", ["phase", "motion"]).to_toml()
+    assert ask("adopt", text)["found"]["described"]["views"] == ["phase", "motion"]
+    assert ask("adopt", ph.load(NAMES[0]).to_toml())["found"]["described"]["views"] == []
 
 
 def test_a_value_in_another_unit_is_converted(ask: Any) -> None:

@@ -9,8 +9,8 @@ import pytest
 from tests.studio.browser import Page
 
 import printhammer as ph
+from printhammer.hammer.file import VIEWS
 from printhammer.studio import bounds
-from printhammer.studio.live import VIEWS
 
 CTRL, SHIFT = 2, 8
 AXE = Path(__file__).parent / "vendor" / "axe.min.js"

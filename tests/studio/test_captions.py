@@ -117,17 +117,20 @@ def test_a_device_has_its_own_word_and_an_oscillator_loses_no_dot(modules: Path)
 
 
 NAMES = """
-const { titleOf, viewsOf, moverOf } = await import("./words.js");
+const { titleOf, viewsOf, moverOf, openingOf } = await import("./words.js");
 const device = (mover, strike, front, rigid, ...sections) => ({
   mover, strike, rigid, places: { backstop: 0, front }, constants: sections.map((section) => ({ section })),
 });
 const devices = [
+  { ...device("block", "dot", null, true), views: ["line", "phase", "motion"] },
+  { ...device("block", "dot", null, true), views: ["line"] },
   device("armature", "dot", 1, false, "magnet", "pack"),
   device("armature", "closing", 1, true, "magnet", "pack"),
   device("ball", "dot", null, true), device("mass", "dot", null, true),
 ];
 console.log(JSON.stringify(devices.map((each) => ({
-  views: viewsOf(each), mover: moverOf(each), titles: viewsOf(each).map((view) => titleOf(view, each)),
+  views: viewsOf(each), opening: openingOf(each), mover: moverOf(each),
+  titles: viewsOf(each).map((view) => titleOf(view, each)),
 }))));
 """
 
@@ -135,7 +138,12 @@ console.log(JSON.stringify(devices.map((each) => ({
 def test_views_and_titles_suit_the_device(modules: Path) -> None:
     command = ["node", "--input-type=module", "--eval", NAMES]
     answer = subprocess.run(command, cwd=modules, capture_output=True, text=True, check=True)
-    hammer, relay, ball, oscillator = json.loads(answer.stdout)
+    block, empty, hammer, relay, ball, oscillator = json.loads(answer.stdout)
+    assert block["views"] == ["phase", "motion"]
+    assert block["opening"] == ["motion", "phase"]
+    # A list of which no view is possible says nothing.
+    assert empty["views"] == ball["views"]
+    assert hammer["opening"] == ball["opening"] == ["motion", "sketch", "map", "line"]
     assert len(hammer["views"]) == len(relay["views"]) == 9
     assert {"Printed line", "Energy per dot", "Actuator"} <= set(hammer["titles"])
     assert {"Closings", "Energy per closing", "Actuator"} <= set(relay["titles"])

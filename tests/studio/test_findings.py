@@ -9,7 +9,7 @@ import pytest
 from tests.studio.browser import Page
 
 import printhammer as ph
-from printhammer.studio.live import VIEWS
+from printhammer.hammer.file import VIEWS
 
 STATE = "window.studio.studio.store.state"
 

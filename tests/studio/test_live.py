@@ -9,11 +9,11 @@ from tests.studio.browser import Page
 from tests.studio.reading import without_modules
 
 import printhammer as ph
+from printhammer.hammer.file import VIEWS
 from printhammer.printing.page.page import print_page
 from printhammer.printing.page.pattern import Pattern
 from printhammer.studio import Shelf, live_page
 from printhammer.studio.controls import fields_of
-from printhammer.studio.live import VIEWS
 from printhammer.studio.widget import SCRIPT
 
 NAME = "hendriks-1983-1"

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from tests.studio.browser import Page
 
-from printhammer.studio.live import VIEWS
+from printhammer.hammer.file import VIEWS
 
 STATE = "window.studio.studio.store.state"
 SEEN = "!window.studio.studio.busy && !window.studio.studio.stale"

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from tests.studio.browser import Page
 
-from printhammer.studio.live import VIEWS
+from printhammer.hammer.file import VIEWS
 
 HELPERS = (Path(__file__).parent / "helpers.js").read_text("utf-8")
 RATIOS = (1.0, 1.25, 1.5, 2.0)

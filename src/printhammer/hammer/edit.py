@@ -55,7 +55,7 @@ def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, sour
     else:
         model = None
     note = quantities(model).get(name) if model is not None else None
-    texts = tuple(TEXTS) if not section else ()
+    texts = (*TEXTS, "views") if not section else ()
     if model is None or (note is None and name not in file_options(model) and name not in texts):
         tables = [name for name in SELECTORS if isinstance(document.get(name), Mapping)]
         known = [*document, *(f"{table}.{entry}" for table in tables for entry in document[table])]

@@ -1,10 +1,11 @@
 """Hammer files: parsing of TOML into parts, constants and waveform, and the JSON schema.
 
-A file has ``format = 1``, ``name``, optionally ``title``, ``note`` and ``strike``, the constants ``mass`` and
-``platen``, and a table for each part: ``[magnet]``, ``[coil]``, ``[spring]``, ``[pack]``, ``[backstop]`` and
-``[damping]`` with their ``law``, ``[waveform]`` with its ``shape``, and ``[uncertainty]`` with standard
-errors of constants (`printhammer.hammer.uncertainty`). All but name and mass are optional. A constant is ``{
-value = 0.008, unit = "in", status = "stated", source = "Fig. 3" }``, with the unit "1" for a pure number.
+A file has ``format = 1``, ``name``, optionally ``title``, ``note``, ``strike`` and ``views``, the constants
+``mass`` and ``platen``, and a table for each part: ``[magnet]``, ``[coil]``, ``[spring]``, ``[pack]``,
+``[backstop]`` and ``[damping]`` with their ``law``, ``[waveform]`` with its ``shape``, and ``[uncertainty]``
+with standard errors of constants (`printhammer.hammer.uncertainty`). All but name and mass are optional. A
+constant is ``{ value = 0.008, unit = "in", status = "stated", source = "Fig. 3" }``, with the unit "1" for a
+pure number.
 """
 
 from __future__ import annotations
@@ -55,6 +56,9 @@ TEXTS: Final = {
 }
 """Text entries of a hammer file and their meanings."""
 
+VIEWS: Final = ("motion", "forces", "loops", "phase", "sketch", "map", "strobe", "energy", "line")
+"""Names of the views that the studio can display, and that the entry ``views`` of a hammer file may list."""
+
 _NOUN: Final = re.compile("[a-z]+(-[a-z]+)*")
 _EXPECTED: Final = {
     "strike": (_NOUN, "a noun in lower case whose plural ends in s, such as 'closing'"),
@@ -95,6 +99,7 @@ class Contents:
     mover: str
     length_unit: str
     time_unit: str
+    views: tuple[str, ...]
     body: Body
     parts: dict[str, Part]
     waveform: Waveform | None
@@ -164,7 +169,7 @@ def file_options(model: type[BaseModel]) -> dict[str, Any]:
 def _build(
     document: Mapping[str, Any], folder: Path, before: Mapping[str, Any], known: Contents | None
 ) -> Contents:
-    _check_keys(document, ("format", *TEXTS, *quantities(Body), *SELECTORS, UNCERTAINTY), "")
+    _check_keys(document, ("format", *TEXTS, "views", *quantities(Body), *SELECTORS, UNCERTAINTY), "")
     if "format" not in document:
         raise InputError("format is missing", key="format", expected=f"format = {FORMAT}")
     version = document["format"]
@@ -203,6 +208,7 @@ def _build(
             )
     contents = Contents(
         **texts,
+        views=_views(document),
         body=body,
         waveform=made.pop("waveform", None),
         parts=made,
@@ -211,6 +217,18 @@ def _build(
     )
     _check_order(contents)
     return contents
+
+
+def _views(document: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the views that the file lists; an empty tuple if the entry is missing."""
+    if "views" not in document:
+        return ()
+    views = document["views"]
+    known = isinstance(views, list) and bool(views) and all(view in VIEWS for view in views)
+    if not known or len(set(views)) < len(views):
+        expected = f"a list of different views among {', '.join(VIEWS)}"
+        raise InputError.of("views", views, expected, written=shown(views))
+    return tuple(views)
 
 
 def _kind(table: Mapping[str, Any], section: str, selector: str) -> str:
@@ -382,6 +400,13 @@ def schema() -> dict[str, Any]:
     properties: dict[str, Any] = {"format": {"const": FORMAT, "description": "version of the file format"}}
     properties |= {name: {"type": "string", "description": meaning} for name, meaning in TEXTS.items()}
     properties["name"]["minLength"] = 1
+    properties["views"] = {
+        "type": "array",
+        "description": "views of the studio that apply; chosen by the parts if missing",
+        "items": {"enum": list(VIEWS)},
+        "minItems": 1,
+        "uniqueItems": True,
+    }
     properties |= _constants(Body)
     for section, selector in SELECTORS.items():
         tables = [_table(section, kind, selector) for kind in kinds_of(section)]

@@ -168,6 +168,11 @@ class Hammer:
         return {si: unit for si, unit in units.items() if unit}
 
     @property
+    def views(self) -> tuple[str, ...]:
+        """Names of the studio views that apply, in the order of the file; empty if the parts decide."""
+        return self._contents.views
+
+    @property
     def path(self) -> str:
         """Path of the hammer file, for messages; marked as modified if constants were replaced."""
         return self._where

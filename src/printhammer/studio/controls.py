@@ -117,7 +117,8 @@ def describe(hammer: Hammer) -> dict[str, Any]:
         `name`, `title`, `note`, `constants` (a list), `open` (coil constants that the file leaves open),
         `rail` (default rail driver, or None), `combined` (controls that move several constants),
         `waveform` (shape and constants, or None), `start` (entries of the opening state that differ from the
-        default), `places`, `strike`, `struck`, `mover`, `rigid` (whether the backstop acts in no time).
+        default), `places`, `strike`, `struck`, `mover`, `views` (those that the file lists), `rigid` (whether
+        the backstop acts in no time).
     """
     constants = []
     for key, constant in hammer.constants.items():
@@ -137,6 +138,7 @@ def describe(hammer: Hammer) -> dict[str, Any]:
         "strike": hammer.strike,
         "struck": hammer.struck,
         "mover": hammer.mover,
+        "views": list(hammer.views),
         "rigid": hammer.backstop is not None and hammer.backstop.law == "rigid",
     }
 

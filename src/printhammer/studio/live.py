@@ -19,6 +19,7 @@ from printhammer import __version__
 from printhammer.drive.waveforms.drivers import DECAYS
 from printhammer.drive.waveforms.shapes import SHAPES, Sine
 from printhammer.errors import InputError
+from printhammer.hammer.file import VIEWS
 from printhammer.run.energy import Ledger
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.run.plain.entries import numbers_of, page_module
@@ -78,9 +79,6 @@ _SENTENCES: Final = {
     " made with the extra `page`",
 }
 """Messages of the page about computations that only Python performs, by name."""
-
-VIEWS: Final = ("motion", "forces", "loops", "phase", "sketch", "map", "strobe", "energy", "line")
-"""Names of the views that a page can display."""
 
 
 def live_page(shelf: Shelf, start: Mapping[str, Any] | str = "") -> str:

@@ -11,9 +11,10 @@ import { marksFor } from "./marks.js";
 import { layout } from "./panels.js";
 import { loopsView, phaseView, strobeView } from "./planes.js";
 import { sketchView } from "./sketch.js";
-import { bare, fromText, pinsOf, START, Store, toText, VIEWS } from "./state.js";
+import { bare, fromText, OPENING, pinsOf, START, Store, toText, VIEWS } from "./state.js";
 import { readColours } from "./theme.js";
 import { setSystem, setUnits } from "./units.js";
+import { openingOf } from "./words.js";
 
 const MAKERS = { motion: motionView, sketch: sketchView, map: mapView, forces: forcesView, phase: phaseView, strobe: strobeView, loops: loopsView, energy: energyView, line: lineView };
 const LARGEST_TABLE = 50e6; // bytes of a measured table
@@ -141,6 +142,8 @@ export function mount(element, send, address = { read: () => "", write: () => {}
       before = null;
       return;
     }
+    const views = openingOf(frame.hammer);
+    if (views !== OPENING) frame.hammer = { ...frame.hammer, start: { ...frame.hammer.start, views } };
     Object.assign(studio, { described: frame.hammer, offered: frame.offered, limits: frame.limits, shapes: frame.shapes, drivers: frame.drivers, decays: frame.decays, unitTable: frame.units, version: frame.version });
     setUnits(frame.units);
     // A hammer without a pulse opens with one that shows it.

@@ -75,7 +75,7 @@ export function toText(state, start = {}) {
   for (const [key, value] of Object.entries(state.constants)) found.set(key, value);
   if (state.waveform) found.set("waveform", JSON.stringify(state.waveform));
   if (state.pins?.length) found.set("pins", JSON.stringify(state.pins.map(({ name, state: pinned }) => ({ name, state: Object.fromEntries(Object.entries(pinned).filter(([key, value]) => JSON.stringify(value) !== JSON.stringify(START[key]))) }))));
-  if (state.views.join() !== OPENING.join()) found.set("views", state.views.join("-"));
+  if (state.views.join() !== OPENING.join() || "views" in start) found.set("views", state.views.join("-"));
   return found.toString();
 }
 

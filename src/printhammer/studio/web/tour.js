@@ -1,6 +1,7 @@
 // A tour of two minutes: what the parts of the page are, one after the other, each marked while it is told.
 import { element as make } from "./dom.js";
 import { OPENING, VIEWS } from "./state.js";
+import { viewsOf } from "./words.js";
 
 const STEPS = [
   [".view-sketch", "The actuator, to scale along its stroke. The coil lifts the armature off its magnet on the left; it flies to the pack of ribbon and paper on the platen. Press ▶ or Space to let it move, three hundred times as slowly as it is."],
@@ -22,16 +23,18 @@ export function tourOf(studio, stories) {
   const back = make("button", { type: "button", onclick: () => go(at - 1) }, "Back");
   const next = make("button", { type: "button", class: "next", onclick: () => go(at + 1) }, "Next");
   const holder = make("div", { class: "notice coach", role: "region", "aria-label": "tour", hidden: true }, text, place, back, next, make("button", { type: "button", class: "shut", "aria-label": "end the tour", onclick: () => end() }, "×"));
+  const viewAt = (where) => /^\.view-(\w+)$/.exec(where)?.[1];
+  let steps = STEPS;
   let at = -1;
   let marked = null;
   let timer = 0;
 
   function go(k) {
     clearTimeout(timer);
-    if (k >= STEPS.length) { end(); return; }
+    if (k >= steps.length) { end(); return; }
     at = Math.max(k, 0);
-    const [where, what] = STEPS[at];
-    const view = /^\.view-(\w+)$/.exec(where)?.[1];
+    const [where, what] = steps[at];
+    const view = viewAt(where);
     if (view) studio.hero(view);
     marked?.classList.remove("marked");
     const target = studio.parts.page.querySelector(where);
@@ -41,9 +44,9 @@ export function tourOf(studio, stories) {
     marked?.closest("details")?.setAttribute("open", "");
     marked?.scrollIntoView({ block: "nearest", behavior: matchMedia("(prefers-reduced-motion: reduce)").matches ? "auto" : "smooth" });
     text.textContent = what;
-    place.textContent = `${at + 1} of ${STEPS.length}`;
+    place.textContent = `${at + 1} of ${steps.length}`;
     back.disabled = at === 0;
-    next.textContent = at + 1 < STEPS.length ? "Next" : "Done";
+    next.textContent = at + 1 < steps.length ? "Next" : "Done";
     timer = setTimeout(() => go(at + 1), 1000 * EACH);
   }
   function end() {
@@ -61,6 +64,8 @@ export function tourOf(studio, stories) {
     element: holder,
     begin: () => {
       stories.shut();
+      const known = viewsOf(studio.described);
+      steps = STEPS.filter(([where]) => !viewAt(where) || known.includes(viewAt(where)));
       if (studio.store.state.views.join() !== OPENING.join()) studio.store.set({ views: OPENING });
       if (studio.parts.grid.classList.contains("one")) studio.enlarge(VIEWS.find((name) => studio.parts.grid.querySelector(`.view-${name}.large`)));
       holder.hidden = false;

@@ -1,5 +1,5 @@
 // Names of views and of moving parts, as they suit the device that is shown; and which views apply to it.
-import { VIEWS } from "./state.js";
+import { OPENING, VIEWS } from "./state.js";
 
 const TITLES = { motion: "Motion", sketch: "Actuator", map: "Frequency-time map", forces: "Forces", phase: "Phase plane", strobe: "Strobe", loops: "Loops of force", energy: "Energy per dot", line: "Printed line" };
 const SHORT = { ...TITLES, map: "Map", loops: "Loops", energy: "Energy", line: "Line" };
@@ -31,10 +31,19 @@ export function titleOf(name, described, short = false) {
   return (short ? SHORT : TITLES)[name];
 }
 
-/** Return the views that apply to a device: without a pack nothing is printed, and a rigid stop has no loop. */
+/** Return the views that apply to a device, those that its file lists: without a pack nothing is printed, and a rigid stop has no loop. */
 export function viewsOf(described) {
   if (!described) return VIEWS;
-  const { places: { front, backstop }, rigid } = described;
+  const { places: { front, backstop }, rigid, views } = described;
   const lacks = { line: front === null, energy: front === null, loops: front === null && (backstop === null || rigid) };
-  return VIEWS.filter((name) => !lacks[name]);
+  const possible = (name) => !lacks[name];
+  return views?.some(possible) ? views.filter(possible) : VIEWS.filter(possible);
+}
+
+/** Return the views with which a device opens: where its file leaves out the map, the first large view of the list takes its place. */
+export function openingOf(described) {
+  const known = viewsOf(described);
+  if (known.includes("map")) return OPENING;
+  const large = known.find((name) => !OPENING.includes(name));
+  return VIEWS.filter((name) => name === large || (OPENING.includes(name) && known.includes(name)));
 }

@@ -6,7 +6,7 @@ const PLACES = ["backstop.position", "pack.front", "platen"];
 const SPAN = 10; // of a control about its value, as in printhammer/hammer/names.py
 const WORDS = ["name", "title", "note", "strike", "struck", "mover"];
 const SECTIONS = ["magnet", "coil", "spring", "pack", "backstop", "damping"];
-const UNREAD = ["uncertainty", "waveform", "format", "length_unit", "time_unit", ...WORDS];
+const UNREAD = ["uncertainty", "waveform", "format", "length_unit", "time_unit", "views", ...WORDS];
 const STATUSES = ["stated", "datasheet", "derived", "reconstructed", "assumed"];
 
 /** Entries of a document by dotted key, without what describes it. */
@@ -85,7 +85,7 @@ function entryOf(text, shelf, templates) {
   const waveform = document.waveform === undefined ? null : waveformOf(isTable(document.waveform) ? Object.fromEntries(Object.entries(document.waveform).map(([key, entry]) => [key, bare(entry)])) : document.waveform, shelf);
   const place = (key, before) => (before === null ? null : values[key] ?? before);
   const made = {
-    ...described, name: "dropped file", title: "", note: "", ...words, constants, combined: combinedOf(described.combined, values), waveform: waveform && shelf.readers.waveform(waveform),
+    ...described, name: "dropped file", title: "", note: "", ...words, views: shelf.readers.views(document.views ?? []), constants, combined: combinedOf(described.combined, values), waveform: waveform && shelf.readers.waveform(waveform),
     start: waveform ? {} : described.start.waveform ? described.start : { waveform: described.waveform }, places: { backstop: place("backstop.position", described.places.backstop), front: place("pack.front", described.places.front), platen: place("platen", described.places.platen) },
   };
   const set = ([keys, list]) => [keys, list.map((number, k) => (keys[k] in values ? values[keys[k]] : number))];
