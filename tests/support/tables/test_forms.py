@@ -1,5 +1,6 @@
 """Forms in which one small record is written: every cell is right, or refused with its line."""
 
+import gc
 from pathlib import Path
 
 import numpy as np
@@ -76,6 +77,7 @@ def test_times_before_the_trigger_are_kept(tmp_path: Path) -> None:
         "# time [us]  current [A]\n0.0  0.0\n 1.0  0.5\n",
         ",time [us],current [A]\n0,0.0,0.0\n1,1.0,0.5\n",
         "\ufefftime [us],current [A],\n0,0,\n1,0.5,\n",
+        "time\tIx(u1:out)\n0.0\t0.0\n1.0e-6\t0.5\n",
         "time [us]|current [A]\n0|0\n1|5e-1\n".encode("utf-16"),
         "Zeit [µs];Strom [mA]\n0;0\n1;500\n".encode("latin-1"),
         "Zeit [µs];Strom [mA]\n0;0\n1;500\n".encode("utf-16-le"),
@@ -123,6 +125,16 @@ def test_a_name_with_brackets_is_no_unit(tmp_path: Path) -> None:
     shows(read(tmp_path, "time [us],i(t)\n0,0\n1,1\n", "current=2*1 mA"), [0.0, 1e-6], current=[0.0, 1e-3])
 
 
+def test_units_in_capital_letters_are_read_only_if_unambiguous(tmp_path: Path) -> None:
+    text = "TIME [MS],CURRENT [MA]\n0,0\n1,800\n"
+    with refused("CURRENT [MA]"):
+        read(tmp_path, text)
+    with refused("CURRENT [MA]"):
+        read(tmp_path, text, "current=2")
+    shows(read(tmp_path, text, "current=2*1 mA/MA"), [0.0, 1e-3], current=[0.0, 0.8])
+    assert gc.isenabled()
+
+
 def test_a_channel_with_a_number_has_no_unit(tmp_path: Path) -> None:
     """A1 is a channel, not an ampere."""
     for text in ("time [us],A1\n0,0\n1,1\n", "time [us],probe_A1\n0,0\n1,1\n", "A1\n0\n1\n"):
@@ -137,6 +149,8 @@ def test_a_channel_with_a_number_has_no_unit(tmp_path: Path) -> None:
         ("X,CH1,Start,Increment\nSequence,Volt,0,1e-6\n0,0\n1,1\n2,2\n", "'current=2*1 A/V'"),
         ("CH1\nV\n0\n1\n2\n", "'time=0 s + STEP, current=1*1 A/V'"),
         ("Time,CH1\ns,V\n0,0\n1e-6,1\n2e-6,2\n", "'time=1, current=2*1 A/V'"),
+        # The column in amperes is the current, wherever it stands.
+        ("Time,CH1,CH2\ns,V,A\n0,0,1\n1e-6,1,2\n", "'time=1, current=3, voltage=2'"),
     ],
 )
 def test_a_refusal_names_columns_that_may_be_stated(tmp_path: Path, text: str, columns: str) -> None:

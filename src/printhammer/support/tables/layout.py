@@ -20,7 +20,15 @@ import numpy as np
 
 from printhammer.errors import InputError, located
 from printhammer.support.arrays import FloatArray
-from printhammer.support.tables.text import is_number, is_reading, read_any, spaced, split_cells, with_points
+from printhammer.support.tables.text import (
+    is_number,
+    is_reading,
+    paused_collector,
+    read_any,
+    spaced,
+    split_cells,
+    with_points,
+)
 from printhammer.units import parse, to_si
 
 ALIASES: Final = {
@@ -189,6 +197,7 @@ def read_layout(path: Path, what: str, words: Collection[str] = ()) -> Table:
     return layout_of(read_any(path, what), str(path), words)
 
 
+@paused_collector()
 def layout_of(text: str, where: str, words: Collection[str] = ()) -> Table:
     """Determine the layout of a table in a text; arguments and errors as for `read_layout`.
 
@@ -222,7 +231,7 @@ def layout_of(text: str, where: str, words: Collection[str] = ()) -> Table:
     for line, row in data:
         if not len(row) <= width <= whole[line]:
             raise InputError(
-                f"{where}: line {line} has {len(row)} cells",
+                f"{where}: line {line} has {len(row)} {'cell' if len(row) == 1 else 'cells'}",
                 file=where,
                 key=f"line {line}",
                 expected=f"{width}",
@@ -283,10 +292,16 @@ def _width(data: list[Row], above: list[Row]) -> int:
     """Return the number of columns: the length of the heading, or else of the longest row."""
     last = above[-1][1] if above else []
     if any(map(_is_named, last)) or is_unit_row(last):
-        facts = (k for k, cell in enumerate(last) if _key(cell) in _CLOCK or _ASSIGNED.fullmatch(cell))
+        facts = (k for k, cell in enumerate(last) if _key(cell) in _CLOCK or _is_clock_entry(cell))
         numbers = (k for k, cell in enumerate(last) if is_number(cell.strip()) and not cell.strip().isdigit())
         return min(next(facts, len(last)), next(numbers, len(last)))
     return max((len(row) for _line, row in data), default=len(last))
+
+
+def _is_clock_entry(cell: str) -> bool:
+    """Whether a cell states the sampling, such as "t0 = -1 ms"; "Ix(u1:out)" is the name of a column."""
+    match = _ASSIGNED.fullmatch(cell)
+    return match is not None and _key(match[1]) in _CLOCK
 
 
 def _commented(notes: list[tuple[int, str]], separator: str, width: int, first: int) -> list[Row]:

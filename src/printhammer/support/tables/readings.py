@@ -35,6 +35,8 @@ BEFORE: Final = 0.1
 """Largest drive value before time 0, as a fraction of the peak, that counts as noise; arbitrary."""
 
 _TINY: Final = float(np.finfo(np.float64).tiny)
+_CAPITALS: Final = frozenset({"MA", "MV", "MN", "MW", "MJ"})
+"""Units that headings in capital letters write for mA, mV, mN, mW and mJ."""
 _BY_UNIT: Final = {"time": "s", "current": "A", "force": "N"}
 """Quantities of a record that are identified by their unit alone; a voltage may be any quantity."""
 
@@ -318,6 +320,14 @@ def _values(table: Table, name: str, source: Source, si: str, gaps: bool) -> Flo
     """Return the numbers of a column in SI."""
     cells = table.cells(source.place - 1)
     heading = table.columns[source.place - 1]
+    if heading.unit in _CAPITALS and not source.unit.endswith(f"/{heading.unit}"):
+        small = heading.unit.replace("M", "m")
+        raise InputError(
+            f"{table.where}: heading {heading.shown!r}: {heading.unit} may be {small} in capital letters",
+            file=table.where,
+            key=heading.shown,
+            expected=f"{small}, or --columns '{name}={source.place}*1 {small}/{heading.unit}, ...'",
+        )
     numbers = _floats(table, name, cells, heading.unit or source.unit, si, gaps)
     place = heading.name or name
     with located(f"{table.where}: {place}", file=table.where, key=place):
@@ -452,7 +462,16 @@ def _example(table: Table, numbers: Mapping[str, str]) -> str:
             entries = [] if clock else ["time=0 s + STEP"]
         if counted:
             places = [place for place in places if clock and place - 1 != clock.numbers]
-    for place, (name, si) in zip(places, names.items(), strict=False):
+    of_quantity = {
+        name: next((place for place in places if is_unit_of(table.columns[place - 1].unit, si)), 0)
+        for name, si in names.items()
+        if name != "time" and si != "V"  # A voltage may be any quantity.
+    }
+    others = [place for place in places if place not in of_quantity.values()]
+    for name, si in names.items():
+        place = of_quantity.get(name) or (others.pop(0) if others else 0)
+        if not place:
+            continue
         own = table.columns[place - 1].unit
         factor = "" if own and is_unit_of(own, si) else f"*1 {si}/{own}" if own else f"*1 {si}"
         entries.append(f"{name}={place}{factor}")

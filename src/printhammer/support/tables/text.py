@@ -9,10 +9,11 @@ Numbers are parsed with their decimal marks, thousands separators, gaps, and out
 from __future__ import annotations
 
 import csv
+import gc
 import io
 import re
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -34,6 +35,18 @@ class Cells:
     """Comments of the form ``# key: value``; for a repeated key, the last."""
     notes: list[tuple[int, str]]
     """Line number and text of every comment."""
+
+
+@contextmanager
+def paused_collector() -> Iterator[None]:
+    """Pause the collector of cycles, which doubles the time to build a million rows of cells."""
+    running = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if running:
+            gc.enable()
 
 
 def read_cells(path: Path, what: str, *, gaps: bool = False) -> Cells:
