@@ -1,5 +1,6 @@
 """What is said of columns beside a table: factors, offsets, delays, even samples."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,8 @@ from hypothesis import strategies as st
 from tests.errors import refused
 
 import printhammer as ph
+from printhammer.drive.waveforms.sampled import read_csv
+from printhammer.errors import InputError
 from printhammer.support.tables.columns import read_columns
 from printhammer.support.tables.readings import Readings, read_table
 
@@ -118,6 +121,19 @@ def test_the_file_beside_a_table(path: Path) -> None:
         beside.write_text(text)
         with refused(key, file="trace.csv.toml"):
             read(path, None)
+
+
+def test_advice_for_a_table_that_another_file_names(tmp_path: Path) -> None:
+    """A sampled waveform has no option --columns: its columns are declared in the file beside the table."""
+    path = tmp_path / "s.csv"
+    path.write_text("Time,Channel A\n(ms),(V)\n0,0\n1,-0.1\n")
+    with pytest.raises(InputError) as caught:
+        read_csv(path)
+    advice = str(caught.value.expected)
+    assert "--columns" not in advice
+    file, lines = advice.partition("or a file ")[2].split(" with the lines ")
+    (tmp_path / file).write_text("\n".join(re.findall("'([^']*)'", lines)))
+    assert read_csv(path).values == (0.0, -0.1)
 
 
 def test_the_text_may_be_of_a_file() -> None:

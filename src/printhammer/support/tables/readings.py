@@ -13,7 +13,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from operator import ne
 from pathlib import Path
-from types import MappingProxyType
+from types import EllipsisType, MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -107,7 +107,7 @@ def read_table(
     optional: Mapping[str, str] = _NONE,
     text: Mapping[str, tuple[str, ...]] = _NO_WORDS,
     gaps: Collection[str] = (),
-    columns: str | None = None,
+    columns: str | EllipsisType | None = ...,
     what: str = "the table",
 ) -> Readings:
     """Read a table and convert its numbers to SI; optional columns may be missing from the result.
@@ -126,6 +126,7 @@ def read_table(
         Columns whose empty cells become NaN.
     columns : str, optional
         Declaration of the columns; by default the file beside the table, or else its heading.
+        Without this argument, messages advise a file beside the table instead of ``--columns``.
     what : str, optional
         Name of the file in error messages.
 
@@ -138,10 +139,11 @@ def read_table(
     """
     source = Path(path)
     content = read_any(source, what)
-    told = columns_of(source, columns)
+    option = columns is not ...
+    told = columns_of(source, columns if isinstance(columns, str) else None)
     words = {word for allowed in text.values() for word in allowed}
     table = layout_of(content, str(source), words)
-    return readings_of(table, required, optional=optional, text=text, gaps=gaps, columns=told)
+    return readings_of(table, required, optional=optional, text=text, gaps=gaps, columns=told, option=option)
 
 
 def columns_of(path: Path, columns: str | None) -> Columns | None:
@@ -157,11 +159,15 @@ def readings_of(
     text: Mapping[str, tuple[str, ...]] = _NO_WORDS,
     gaps: Collection[str] = (),
     columns: Columns | None = None,
+    option: bool = True,
 ) -> Readings:
-    """Convert a table to quantities; arguments and errors as for `read_table`."""
+    """Convert a table to quantities; arguments and errors as for `read_table`.
+
+    Messages advise the option ``--columns`` if the caller has that `option`, else a file beside the table.
+    """
     numbers = {**required, **optional}
     wanted = _wanted(required, optional, text)
-    sources, words = assigned(table, numbers, text, wanted, columns)
+    sources, words = assigned(table, numbers, text, wanted, columns, option)
     clock = columns.clock if columns and columns.clock else table.clock
     missing = [name for name in required if name not in sources and not (name == "time" and clock)]
     if missing:
@@ -169,7 +175,7 @@ def readings_of(
             f"{table.where}: {_line(table)}the column {missing[0]!r} is missing among {_list_columns(table)}",
             file=table.where,
             key=missing[0],
-            expected=f"{wanted}, or --columns {_example(table, required)}",
+            expected=f"{wanted}, or {_advice(table, required, option)}",
         )
     if not table.rows:
         raise InputError(
@@ -197,10 +203,11 @@ def assigned(
     text: Mapping[str, tuple[str, ...]],
     wanted: str,
     columns: Columns | None,
+    option: bool,
 ) -> tuple[dict[str, Source], dict[str, int]]:
     """Assign columns to quantities and text columns, by the declaration or, without one, by the heading."""
     if columns is None:
-        return _by_heading(table, numbers, text, wanted)
+        return _by_heading(table, numbers, text, wanted, option)
     for name, source in columns.sources.items():
         if name not in numbers or source.place > len(table.columns):
             raise InputError(
@@ -258,7 +265,7 @@ def _levels(table: Table) -> set[int]:
 
 
 def _by_heading(
-    table: Table, numbers: Mapping[str, str], text: Mapping[str, tuple[str, ...]], wanted: str
+    table: Table, numbers: Mapping[str, str], text: Mapping[str, tuple[str, ...]], wanted: str, option: bool
 ) -> tuple[dict[str, Source], dict[str, int]]:
     """Assign columns to quantities by the names in the heading, or by a unit that occurs once."""
     where = f"{table.where}: {_line(table)}".rstrip(": ")
@@ -299,7 +306,7 @@ def _by_heading(
             else f"{where}: column {unknown[0] + 1} has no heading",
             file=where,
             key=shown,
-            expected=f"{wanted}, or --columns {_example(table, numbers)}",
+            expected=f"{wanted}, or {_advice(table, numbers, option)}",
         )
     for name, source in sources.items():
         heading = table.columns[source.place - 1]
@@ -448,8 +455,18 @@ def _list_columns(table: Table) -> str:
     return ", ".join(listed) + (", ..." if len(table.columns) > len(listed) else "")
 
 
-def _example(table: Table, numbers: Mapping[str, str]) -> str:
-    """Return an example of the option `--columns`; STEP stands for an unknown sampling interval."""
+def _advice(table: Table, numbers: Mapping[str, str], option: bool) -> str:
+    """Return an example of a declaration of columns, as the option `--columns` or as the lines of a file."""
+    entries = _example(table, numbers)
+    if option:
+        return f"--columns '{', '.join(entries)}'"
+    lines = (entry.replace("=", ' = "', 1) + '"' for entry in entries)
+    beside = f"{Path(table.where).name}.toml"
+    return f"a file {beside} with the lines '[columns]', {', '.join(map('{!r}'.format, lines))}"
+
+
+def _example(table: Table, numbers: Mapping[str, str]) -> list[str]:
+    """Return the entries of an example of a declaration; STEP stands for an unknown sampling interval."""
     names, clock = dict(numbers), table.clock
     places = [place for place in range(1, len(table.columns) + 1) if any(table.cells(place - 1))]
     entries = []
@@ -475,4 +492,4 @@ def _example(table: Table, numbers: Mapping[str, str]) -> str:
         own = table.columns[place - 1].unit
         factor = "" if own and is_unit_of(own, si) else f"*1 {si}/{own}" if own else f"*1 {si}"
         entries.append(f"{name}={place}{factor}")
-    return f"'{', '.join(entries)}'"
+    return entries
