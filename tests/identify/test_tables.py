@@ -104,7 +104,7 @@ HEADING = "displacement [um],force [N]\n"
         (HEADING + "1,2\n3,-9.9e37\n", ("line 3", "-9.9e37 N", "measured value")),
         (HEADING + "5e-324,1\n", ("line 2", "5e-324 um", "measured value")),
         (HEADING + "1,2,3\n", ("line 2", "3 cells", "expected 2")),
-        (HEADING + "1\n", ("line 2", "1 cells")),
+        (HEADING + "1\n", ("line 2", "1 cell: ")),
         (HEADING + '1,"2\n', ("line 2", "comma-separated")),
     ],
 )
