@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
@@ -281,7 +282,7 @@ def motion(
             known = fit.into(known)
         return fit_motion(files, known, free=keys, **passed)
 
-    return _run_fit(job, hammer, strict, made)
+    return _run_fit(job, hammer, strict, made, "time 0 of a record is the firing")
 
 
 _probe = partial(opt.text, panel="Probe")
@@ -337,7 +338,8 @@ def coil(
         keys = None if free is None else _keys(free)
         return fit_coil(files, known, free=keys, also=_keys(also or ""), **passed)
 
-    return _run_fit(job, hammer, strict, made)
+    zero = "time 0 of a record is switch-on; a column 'voltage' drives the coil from its first row on"
+    return _run_fit(job, hammer, strict, made, zero)
 
 
 def _keys(text: str) -> list[str]:
@@ -360,8 +362,10 @@ def _earlier_fits(tables: dict[str, Path], known: Hammer, robust: bool) -> list[
     return [*fits, *(fit(kind, path, **options) for kind, path in rest.items())]
 
 
-def _run_fit(job: Job, hammer: str | None, strict: bool, fitted: Callable[[Hammer | None], Fit]) -> Answer:
-    """Run a fit; return its summary and its files."""
+def _run_fit(
+    job: Job, hammer: str | None, strict: bool, fitted: Callable[[Hammer | None], Fit], zero: str = ""
+) -> Answer:
+    """Run a fit; return its summary and its files. `zero` states the time zero of records over time."""
     from printhammer.hammer.hammer import load
     from printhammer.support.files import write_file
 
@@ -372,7 +376,10 @@ def _run_fit(job: Job, hammer: str | None, strict: bool, fitted: Callable[[Hamme
             )
     announce_compiling()
     known = None if hammer is None else load(hammer)
-    fit = fitted(known)
+    with job.status_line("reading and fitting"):
+        fit = fitted(known)
+    if zero:
+        fit = replace(fit, remarks=(*fit.remarks, zero))
     files = {
         "out": Content(lambda path: write_file(path, fit.fragment()), fit.plot),
         "covariance": Content.text(fit.covariance_table),
