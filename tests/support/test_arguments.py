@@ -29,6 +29,13 @@ TRAIN = ph.PulseTrain(HAMMER.waveform, rate="1 kHz", pulses=2)
         (lambda: ph.holding_margin("hendriks-1983", 1e-4), "hammer", "hendriks-1983"),
         (lambda: ph.bifurcation_curve(TRAIN, "mass", (1.0, 2.0)), "source", TRAIN),
         (lambda: ph.measure("magnet", "hendriks-1983"), "hammer", "hendriks-1983"),
+        (lambda: ph.load(HAMMER), "name_or_path", HAMMER),
+        (lambda: ph.load(None), "name_or_path", None),  # type: ignore[arg-type]
+        (lambda: ph.load_table(HAMMER), "path", HAMMER),
+        (lambda: ph.sweep(HAMMER, "out.zarr"), "spec", HAMMER),
+        (lambda: ph.sweep("spec.toml", HAMMER), "out", HAMMER),
+        (lambda: ph.thermal_limit(None, ["10 Hz"]), "ambient", None),  # type: ignore[arg-type]
+        (lambda: ph.thermal_limit(["15 degC"], "10 Hz"), "rate", "10 Hz"),
     ],
 )
 def test_wrong_objects_are_named(call: Any, key: str, value: object) -> None:

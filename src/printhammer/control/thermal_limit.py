@@ -85,6 +85,9 @@ def thermal_limit(
         The sequences differ in length, no rail has rates at two ambient temperatures, or the rates do not
         fall appreciably with the ambient temperature.
     """
+    for name, values in (("ambient", ambient), ("rate", rate)):
+        if isinstance(values, str) or not np.iterable(values):
+            raise InputError.of(name, values, "a sequence of numbers or texts with units")
     cold = np.array([read_temperature(each, "ambient") for each in ambient])
     rates = np.array([read_positive(each, "Hz", "rate") for each in rate])
     rails = np.array([read_number(each, "V", "voltage") for each in voltage or [0.0] * len(cold)])

@@ -25,6 +25,7 @@ from printhammer.hammer.edit import Edit, changed, changed_text, edit_of
 from printhammer.hammer.file import FORMAT, Contents, build, file_options, read_document
 from printhammer.hammer.uncertainty import UNCERTAINTY, Uncertainty
 from printhammer.parts import BackstopPart, CoilPart, DampingPart, MagnetPart, PackPart, Part, SpringPart
+from printhammer.support.arguments import checked
 from printhammer.support.constants import Constant, quantities
 from printhammer.support.html import html_table, titled
 
@@ -40,6 +41,7 @@ def shipped() -> tuple[str, ...]:
     return tuple(sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml")))
 
 
+@checked
 def load(name_or_path: str | Path) -> Hammer:
     """Load a shipped hammer by name, or a hammer file by path.
 

@@ -1,4 +1,4 @@
-"""Type checks of public functions for arguments that are a hammer, a drive or a waveform.
+"""Type checks of public functions for arguments that are a hammer, a drive, a waveform or a path.
 
 A name in place of a hammer, or two arguments swapped, is an `InputError` that names the argument.
 """
@@ -14,6 +14,8 @@ from printhammer.errors import InputError
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+_PATH: Final = "str | Path"
+
 _KINDS: Final = {
     "Hammer": "a hammer, such as load('hendriks-1983')",
     "Regime": "a regime",
@@ -22,6 +24,7 @@ _KINDS: Final = {
     "CompensationTable": "a compensation table, such as a result of tune or load_table",
     "Branch": "a branch of orbits",
     "Orbit": "an orbit",
+    _PATH: "a text or a path",
 }
 """Noun phrase for each checked class, for error messages."""
 
@@ -49,10 +52,13 @@ def check_objects(function: F) -> Callable[[tuple[Any, ...], dict[str, Any]], No
     """
     arguments = []
     for place, each in enumerate(inspect.signature(function).parameters.values()):
-        names = [part.strip() for part in str(each.annotation).split("|")]
+        annotation = str(each.annotation)
+        names = [annotation] if annotation == _PATH else [part.strip() for part in annotation.split("|")]
         kinds = [name for name in names if name != "None"]
         if each.kind in (each.POSITIONAL_OR_KEYWORD, each.KEYWORD_ONLY) and set(kinds) <= _KINDS.keys():
             classes = frozenset(["NoneType", *kinds] if "None" in names else kinds)
+            if annotation == _PATH:
+                classes = frozenset({"str", "PurePath"})
             expected = " or ".join(_KINDS[kind] for kind in kinds)
             arguments.append(_Argument(each.name, place, classes, expected))
 

@@ -13,6 +13,7 @@ import numpy as np
 from printhammer.errors import InputError
 from printhammer.results.files import frame_of, need_for, write_csv
 from printhammer.results.store import Store, open_store
+from printhammer.support.arguments import checked
 from printhammer.support.threads import thread_count
 from printhammer.sweep.plan import make_plan
 from printhammer.sweep.spec import read_spec
@@ -26,6 +27,7 @@ Progress = Callable[[float, int, int], None]
 """Progress callback; arguments: members done, members done before this run, total number of members."""
 
 
+@checked
 def sweep(
     spec: str | Path | Mapping[str, Any],
     out: str | Path,

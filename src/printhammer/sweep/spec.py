@@ -83,6 +83,8 @@ def read_spec(source: str | Path | Mapping[str, Any]) -> Spec:
         import tomlkit
 
         text, where, folder = tomlkit.dumps(source), "spec", Path()
+    elif not isinstance(source, str | Path):
+        raise InputError.of("spec", source, "a path, or the contents of a spec file as a mapping")
     else:
         path = Path(source)
         where, folder = str(path), path.parent

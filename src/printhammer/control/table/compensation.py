@@ -57,6 +57,7 @@ from printhammer.results.summary import (
     Summary,
 )
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
+from printhammer.support.arguments import checked
 from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.files import read_text, write_file
 
@@ -471,6 +472,7 @@ class TableStrategy:
         return [sequence(pulses, self._pulse, known) for pulses in every]
 
 
+@checked
 def load_table(path: str | Path) -> CompensationTable:
     """Read a compensation table from CSV or JSON; every value is restored to the last bit.
 
