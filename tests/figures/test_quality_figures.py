@@ -134,7 +134,7 @@ def test_yields_are_drawn_with_and_without_a_rate(hammer: "ph.Hammer") -> None:
     (steps,) = [line.get_ydata() for line in drawn.axes[0].lines if len(line.get_xdata()) > 2]
     assert steps[0] == pytest.approx(100.0 * 7 / 8)
     assert min(steps) == 0.0
-    assert "1 of 8 drawn hammers" in words(drawn)
+    assert "1 of 8 sampled hammers" in words(drawn)
     assert "7 pass" in {
         text.get_text()
         for text in dataclasses.replace(common, rate=600.0).plot().axes[0].get_legend().get_texts()

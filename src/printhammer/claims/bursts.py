@@ -1,7 +1,4 @@
-"""Claims about bursts of nine pulses as a function of the rate, Figs. 8 and 9.
-
-The claim about the sensitivity of the frequency-time map to the rate is included.
-"""
+"""Claims about bursts of nine pulses against the rate, Figs. 8 and 9, including the map's sensitivity."""
 
 from __future__ import annotations
 
@@ -20,7 +17,7 @@ from printhammer.maps.frequency import TAIL
 from printhammer.run.motion import Motion
 from printhammer.support.arrays import BoolArray, FloatArray
 
-# Rates computed at once; the search stops at the first batch with a lost dot; arbitrary
+# Number of rates simulated in one batch; the search stops at the first batch with a lost dot; arbitrary
 _TOGETHER: Final = 64
 _SAMPLES: Final = 2001  # Samples of a drive for a lower bound of its peak; arbitrary
 
@@ -36,7 +33,7 @@ def spreads(motion: Motion) -> tuple[int, float | None, float | None]:
 
 @measures("independent_at_low_rate", "pack", "waveform")
 def independent_at_low_rate(context: Context, claim: Claim) -> Measured:
-    """Measure the spread of peak forces and flight times over the dots of a burst at a low rate."""
+    """Measure the spreads of peak force and flight time over the dots of a burst at a low rate."""
     rate, pulses = claim.settings["rate_Hz"], claim.settings["pulses"]
     struck, force, flight = spreads(context.train(rate, pulses))
     value = {"dots_struck": struck, "force_spread": force, "flight_time_spread_s": flight}
@@ -50,16 +47,16 @@ def independent_at_low_rate(context: Context, claim: Claim) -> Measured:
 
 
 def rates_of(settings: Mapping[str, Any]) -> list[float]:
-    """Return the firing rates, Hz, at which a claim is evaluated, in ascending order."""
+    """Return the ascending grid of firing rates, Hz, that a claim's settings define."""
     first, last, step = (settings[name] for name in ("first_rate_Hz", "last_rate_Hz", "rate_step_Hz"))
     return [float(first + step * k) for k in range(round((last - first) / step) + 1)]
 
 
 def onsets(context: Context) -> dict[str, float]:
-    """Return the lowest rates, Hz, at which flight times vary, forces vary, and a dot is lost.
+    """Find the lowest rates, Hz, at which flight times vary, forces vary, and a dot is lost.
 
-    The keys are "flight_time", "force" and "lost"; an event that does not occur up to the first lost dot is
-    absent.
+    The keys are "flight_time", "force" and "lost"; the key of an event that does not occur up to the first
+    lost dot is absent.
     """
     settings = claims()["order_of_onset"].settings
     rates, pulses = rates_of(settings), settings["pulses"]
@@ -103,12 +100,12 @@ def order_of_onset(context: Context, _claim: Claim) -> Measured:
 
 @measures("second_dot_lost", *WHOLE)
 def second_dot_lost(context: Context, claim: Claim) -> Measured:
-    """Measure the lowest range of rates at which the peak after the second firing stays below the pack."""
+    """Measure the lowest range of rates at which the peak after the second firing is below the pack."""
     settings = claim.settings
     waveform, front, _ = context.waveform, context.front, context.dot
     begins = ends = None
     for rate in rates_of(settings):
-        # The third firing ends the interval of the second.
+        # The interval of the second firing ends at the time of a third firing.
         motion = context.run(PulseTrain(waveform, rate=rate, pulses=2), 2.0 / rate)
         peak = motion.peak_after(1)
         below = peak is None or peak[1] < front
@@ -134,7 +131,7 @@ def hung_up(motion: Motion) -> bool:
     left = _first_leaving(motion)
     if left is None:
         return False
-    # Every touch and release ends a step, so that none is missed in between.
+    # Every touch and release ends a step, so that the step times miss no contact.
     times = motion.step_times
     between = (times > left) & (times < motion.drive.times[-1])
     return not (motion.at(times)[0][between] <= motion.hammer.origin).any()
@@ -152,17 +149,17 @@ def _first_leaving(motion: Motion) -> float | None:
 
 
 def _exceeds(drive: Drive, limit: float) -> bool:
-    """Whether the largest absolute current or force of a drive exceeds a limit."""
-    # The samples are a lower bound of the peak, which is slow to find.
+    """Whether the peak absolute current or force of a drive exceeds a limit."""
+    # Samples give a lower bound of the peak, whose exact value is slow to compute.
     samples = np.abs(drive.value(np.linspace(0.0, drive.end, _SAMPLES)))
     return bool(samples.max() > limit) or drive.peak > limit
 
 
 def hang_up_range(context: Context) -> tuple[float | None, list[Motion], float]:
-    """Return the lowest rate at which bursts hang up, the motions from this rate on, and the highest rate.
+    """Find the hang-up range: lowest rate, Hz; motions from that rate on; highest rate simulated, Hz.
 
-    The rates are in Hz; the highest rate is the last rate of the claim, or the highest that the current limit
-    permits.
+    The highest rate is the last rate of the claim, or the highest that the current limit permits. The lowest
+    is None if the armature does not hang up at the highest rate.
     """
     settings = claims()["hang_up_at_high_rate"].settings
     step, pulses, limit = (settings[name] for name in ("rate_step_Hz", "pulses", "current_limit_A"))
@@ -184,7 +181,7 @@ def hang_up_range(context: Context) -> tuple[float | None, list[Motion], float]:
 
 @measures("hang_up_at_high_rate", *WHOLE)
 def hang_up_at_high_rate(context: Context, _claim: Claim) -> Measured:
-    """Measure the rate above which the armature hangs up in every burst, up to the current limit."""
+    """Measure the rate above which every burst hangs up, up to the rate that the current limit permits."""
     lowest, _, highest = context.once("hang-up", lambda: hang_up_range(context))
     value = {"hang_up_rate_Hz": lowest, "highest_rate_Hz": highest}
     if lowest is None:
@@ -194,7 +191,7 @@ def hang_up_at_high_rate(context: Context, _claim: Claim) -> Measured:
 
 @measures("weak_prints_when_hung_up", *WHOLE)
 def weak_prints_when_hung_up(context: Context, _claim: Claim) -> Measured:
-    """Measure the largest force of a distinct impact after the first dot, in bursts that hang up."""
+    """Measure the peak force of distinct impacts after the first dot, in bursts that hang up."""
     lowest, motions, highest = context.once("hang-up", lambda: hang_up_range(context))
     if lowest is None:
         raise NotMeasurableError("The armature does not hang up")
@@ -214,8 +211,9 @@ def weak_prints_when_hung_up(context: Context, _claim: Claim) -> Measured:
     }
     return Measured(
         value,
-        f"From {lowest:.0f} to {highest:.0f} Hz the strongest distinct impact after the first dot has"
-        f" {force:.1f} N, at {rate:.0f} Hz; the strongest of all has {other:.1f} N, at {other_rate:.0f} Hz.",
+        f"From {lowest:.0f} to {highest:.0f} Hz the strongest distinct impact after the first dot reaches"
+        f" {force:.1f} N, at {rate:.0f} Hz; the strongest of all impacts reaches {other:.1f} N, at"
+        f" {other_rate:.0f} Hz.",
     )
 
 
@@ -234,7 +232,7 @@ def later_impacts(motion: Motion) -> list[tuple[float, bool]]:
 
 @measures("flight_time_spread", *WHOLE)
 def flight_time_spread(context: Context, claim: Claim) -> Measured:
-    """Measure the flight-time spread of bursts at the strobe times that the paper calls strange."""
+    """Measure the flight-time spread of bursts at the strobe times of the strange panels of Fig. 11."""
     settings, pulses = claim.settings, claim.settings["pulses"]
     _, _, slow = spreads(context.train(settings["rate_Hz"], pulses))
     by_panel: dict[str, Any] = {}
@@ -254,8 +252,8 @@ def flight_time_spread(context: Context, claim: Claim) -> Measured:
     }
     return Measured(
         value,
-        f"Of {len(by_panel)} bursts, {over['dot_matrix_s']} spread by more than 200 us, what dot-matrix"
-        f" printing tolerates, and {over['engraved_s']} by more than 30 us.",
+        f"Of {len(by_panel)} bursts, {over['dot_matrix_s']} have a spread above 200 us, the tolerance of"
+        f" dot-matrix printing, and {over['engraved_s']} one above 30 us.",
     )
 
 
@@ -287,13 +285,13 @@ def sensitivity(context: Context, band: tuple[float, float], grid: float, step: 
     result = context.ensemble(drives, ends, times=times)
     assert result.x is not None
     change = (result.x[1::2].astype(np.float64) - result.x[::2]) / step
-    # A record has no values beyond its end.
+    # Displacements beyond the end of a record are NaN.
     return float(np.sqrt(np.nanmean(change**2)))
 
 
 @measures("map_sensitivity", *WHOLE)
 def map_sensitivity(context: Context, claim: Claim) -> Measured:
-    """Measure the change of the displacement record per hertz below, in and above the erratic band."""
+    """Measure the change of the displacement record per hertz below, inside and above the erratic band."""
     settings = claim.settings
     first = context.once("onsets", lambda: onsets(context)).get("flight_time")
     hung, _, highest = context.once("hang-up", lambda: hang_up_range(context))
@@ -321,7 +319,7 @@ def map_sensitivity(context: Context, claim: Claim) -> Measured:
     }
     if first is None or hung is None:
         missing = "Flight times do not vary" if first is None else "The armature does not hang up"
-        return Measured(value, f"{missing} at any rate looked at: the erratic band has no end.")
+        return Measured(value, f"{missing} at any rate simulated: the erratic band has no end.")
     texts = {name: f"{change * 1e6:.3g} um" for name, change in changes.items()}
     fine, whole = settings["rate_step_Hz"], settings["coarse_step_Hz"]
     return Measured(
@@ -337,7 +335,7 @@ def map_sensitivity(context: Context, claim: Claim) -> Measured:
 def erratic_pairs(
     struck: BoolArray, flight_time: FloatArray, settings: Mapping[str, Any]
 ) -> tuple[BoolArray, BoolArray]:
-    """Return masks of neighbouring rates between which a later dot changes, and of rates with unequal dots.
+    """Mask the pairs of neighbouring rates between which a later dot changes, and rates with unequal dots.
 
     A dot changes if it is printed at only one of the two rates, or if its flight times, s, differ by more
     than `flight_time_change_s`; dots before `first_dot` do not count. Dots vary if one is lost, or if their
@@ -354,9 +352,10 @@ def erratic_pairs(
 def erratic_share(
     rates: FloatArray, erratic: BoolArray, varies: BoolArray, hang_up: float | None
 ) -> tuple[float | None, float | None]:
-    """Return the fraction of erratic pairs from the first rate with unequal dots to hang-up, and that rate.
+    """Compute the fraction of erratic pairs from the first rate with unequal dots, Hz, up to hang-up.
 
-    Rates are in Hz; the pairs are from `erratic_pairs`. None if dots vary at no rate, or only after hang-up.
+    The fraction and that first rate are returned; None if dots vary at no rate, or only after hang-up.
+    `erratic` and `varies` are from `erratic_pairs`.
     """
     if not varies.any():
         return None, None
@@ -367,7 +366,7 @@ def erratic_share(
 
 @measures("chaotic_region", *WHOLE)
 def chaotic_region(context: Context, claim: Claim) -> Measured:
-    """Measure the fraction of neighbouring rates below hang-up between which a later dot changes."""
+    """Measure the fraction of neighbouring rates below hang-up between which a late dot changes."""
     rates = rates_of(claim.settings)
     pulses = claim.settings["pulses"]
     dots = context.dots([PulseTrain(context.waveform, rate=rate, pulses=pulses) for rate in rates])

@@ -1,4 +1,4 @@
-"""Context of the claims: a hammer with the runs that several claims share, each computed once."""
+"""Context of the claims: a hammer and the runs that several claims share, each simulated once."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CYCLE: Final = 20e-3
 TAIL: Final = 4e-3
 """Time simulated after the last firing of a train, s, so that its dot is included."""
 
-_IDLE: Final = 1e-3  # Firing time after the end of a motion at rest, s; arbitrary
+_IDLE: Final = 1e-3  # Firing time of the pulse that ends the simulated rest, s; arbitrary
 
 _T = TypeVar("_T")
 
@@ -33,7 +33,7 @@ class NotMeasurableError(PrinthammerError):
 
 
 class Context:
-    """Hammer with the motions that the claims need, each simulated once.
+    """Hammer with the simulated motions that the claims need, each computed once.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class Context:
         return float(self.need("pack").front)
 
     def once(self, name: str, search: Callable[[], _T]) -> _T:
-        """Return the result of a search, which is run at the first call and cached by name."""
+        """Return the result of `search`, which runs at the first call with a given name and is cached."""
         if name not in self._kept:
             self._kept[name] = search()
         kept: _T = self._kept[name]
@@ -103,12 +103,12 @@ class Context:
         options = {"tolerance": self.tolerance, "scheme": self.scheme, **options}
         key = (which.fingerprint, drive.fingerprint, duration, state, *sorted(options.items()))
         if key not in self._motions:
-            # The output grid is not used; values are computed on demand.
+            # Only two grid points: values are computed on demand.
             self._motions[key] = simulate(which, drive, duration=duration, state=state, points=2, **options)
         return self._motions[key]
 
     def run(self, drive: Drive, duration: float, **options: Any) -> Motion:
-        """Simulate like `attempt`, but require the run to reach its end.
+        """Simulate a drive as `attempt` does; raise an error if the run ends early.
 
         Raises
         ------
@@ -137,13 +137,13 @@ class Context:
         return result
 
     def dots(self, drives: Sequence[Drive], tail: float = TAIL) -> DotTable:
-        """Run many drives, each until `tail`, s, after its last firing; return the table of dots."""
+        """Simulate many drives, each until `tail`, s, after its last firing; return the table of dots."""
         result = self.ensemble(drives, [float(drive.times[-1]) + tail for drive in drives], dots=True)
         assert result.dots is not None
         return result.dots
 
     def pulses(self, times: Iterable[float], duration: float) -> Motion:
-        """Simulate pulses fired at given times, s, from rest."""
+        """Simulate single pulses fired at given times, s, from rest."""
         return self.run(PulseTrain(self.waveform, at=list(times)), duration)
 
     def train(self, rate: float, pulses: int, tail: float = TAIL) -> Motion:
@@ -152,18 +152,18 @@ class Context:
         return self.run(drive, float(drive.times[-1]) + tail)
 
     def strobe_train(self, period: float, points: int) -> Motion:
-        """Simulate a pulse train of a period, s, from rest, up to the firing of the last strobe point."""
+        """Simulate a pulse train of a given period, s, from rest to the firing of the last strobe point."""
         drive = PulseTrain(self.waveform, period=period, pulses=points)
         return self.run(drive, float(drive.times[-1]))
 
     @cached_property
     def single(self) -> Motion:
-        """Motion of the single-pulse cycle, from rest to rest."""
+        """Motion of the single-pulse cycle: one pulse, from rest until the armature has settled."""
         return self.pulses([0.0], CYCLE)
 
     @cached_property
     def returns(self) -> list[Contact]:
-        """Contacts with the backstop after a single pulse, in order of time."""
+        """Backstop contacts after a single pulse, in order of time."""
         contacts = touches(self.single)
         if not contacts:
             raise NotMeasurableError("The armature does not return to the backstop after a single pulse")

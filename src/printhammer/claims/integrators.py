@@ -14,8 +14,8 @@ from printhammer.hammer.equilibrium import equilibria
 from printhammer.run.motion import Motion
 
 REFERENCE_TOLERANCE: Final = 1e-13  # Tolerance of the reference motion, well below the errors of 1983
-_CYCLE: Final = 10e-3  # Duration of the single-pulse cycle, s: the motion has settled
-_SETTLED: Final = 0.01  # Largest error of a settled motion, as a fraction of the stroke; arbitrary
+_CYCLE: Final = 10e-3  # Duration of the simulated single-pulse cycle, s; the motion has settled by then
+_SETTLED: Final = 0.01  # Largest final error of a scheme that works, as a fraction of the stroke; arbitrary
 _RATIO: Final = 2.0**0.25  # Ratio of successive step scales tried; arbitrary
 _LARGEST: Final = 32.0  # Largest step scale tried; arbitrary
 _RUNGE_KUTTA_LIMIT: Final = math.sqrt(8.0)
@@ -63,13 +63,13 @@ def _scheme(context: Context, name: str, scale: float) -> Motion:
 
 
 def _error(motion: Motion, reference: Motion) -> float:
-    """Return the largest difference of displacement from a reference, at the ends of steps, m."""
+    """Compute the largest displacement error of a motion against a reference, at the ends of steps, m."""
     times = motion.step_times
     return float(np.abs(motion.at(times)[0] - reference.at(times)[0]).max())
 
 
 def _completes(context: Context, motion: Motion, reference: Motion) -> bool:
-    """Whether a scheme completes the cycle, with one pack contact, and ends close to the reference."""
+    """Whether a scheme completes the cycle, makes one pack contact, and ends close to the reference."""
     if not motion.ok or sum(c.surface == "pack" for c in motion.contacts) != 1:
         return False
     times = motion.step_times[motion.step_times >= 0.5 * _CYCLE]
@@ -78,7 +78,7 @@ def _completes(context: Context, motion: Motion, reference: Motion) -> bool:
 
 
 def _failing_scale(context: Context, reference: Motion, name: str) -> float:
-    """Return the smallest scale factor on all step sizes, of those tried, at which a scheme fails."""
+    """Find the smallest factor on all step sizes, of those tried, at which a scheme fails."""
     scale = 1.0
     while scale < _LARGEST and _completes(context, _scheme(context, name, scale), reference):
         scale *= _RATIO

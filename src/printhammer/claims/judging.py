@@ -1,7 +1,7 @@
-"""Evaluation of claims: a function measures the values, and the bands of `claims.toml` decide.
+"""Evaluation of claims: a function measures the values; the bands in `claims.toml` decide.
 
-A `Claim` is a statement of the paper as numbers in `claims.toml` beside this file. The claims share the
-measures `largest`, `falling`, `rank_correlation` and `spread`.
+A `Claim` is a statement of the paper as numbers in `claims.toml` beside this file. The module also has the
+statistics that claims share: `largest`, `falling`, `rank_correlation` and `spread`.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ KINDS: Final = get_args(Kind)
 TEXTS: Final = ("kind", "source", "says", "reading", "note")
 SIDES: Final = {"above": operator.gt, "at_least": operator.ge, "below": operator.lt, "at_most": operator.le}
 
-_PRINTED_DIGITS: Final = 1e-9  # Relative difference up to which numbers are equal; rounding
+_PRINTED_DIGITS: Final = 1e-9  # Relative difference up to which two numbers are equal; covers rounding
 
 
 class Claim(Declared):
@@ -89,7 +89,7 @@ def claims() -> Mapping[str, Claim]:
 
 
 WHOLE: Final = ("backstop", "pack", "waveform")
-"""Components that most claims require of a hammer."""
+"""Components of a complete hammer, which most claims require."""
 
 Verdict = Literal["holds", "fails", "not yet"]
 
@@ -120,7 +120,7 @@ class JudgedClaim(Declared):
 
     @property
     def statements(self) -> tuple[int, int]:
-        """Numbers of statements that hold and of all statements; each entry of a list is one statement."""
+        """Numbers of statements that hold and of all statements; a list in a band counts one per entry."""
         value = self.value or {}
         lists = {name: band for name, band in self.claim.band.items() if _is_texts(band)}
         if not lists:
@@ -133,7 +133,7 @@ class JudgedClaim(Declared):
         return sum(found == wanted for found, wanted in pairs), sum(map(len, lists.values()))
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the claim and its verdict as an entry of `claims.json`."""
+        """Return the claim and its verdict as a dictionary, the form of an entry of `claims.json`."""
         claim = self.claim
         return {
             "name": claim.name,
@@ -157,11 +157,11 @@ Judge = Callable[[Context, Claim], Measured]
 """Type of a function that measures the values of a claim."""
 
 JUDGES: Final[dict[str, tuple[tuple[str, ...], Judge]]] = {}
-"""Required components and measuring function of each claim, by name."""
+"""Required components and measuring function of each claim, by the claim's name."""
 
 
 def measures(name: str, *needs: str) -> Callable[[Judge], Judge]:
-    """Register the measuring function of a claim; `needs` are the components that the claim requires."""
+    """Decorate the measuring function of a claim; `needs` are the components that the claim requires."""
 
     def register(function: Judge) -> Judge:
         if name in JUDGES or name not in claims():
@@ -173,7 +173,7 @@ def measures(name: str, *needs: str) -> Callable[[Judge], Judge]:
 
 
 PENDING: Final[dict[str, str]] = {}
-"""Claims that cannot be evaluated yet, with the missing capability, by name."""
+"""Missing capability of each claim that cannot be evaluated yet, by the claim's name."""
 
 
 def judge_all(
@@ -214,7 +214,7 @@ def judge_all(
 def judge(context: Context, claim: Claim) -> JudgedClaim:
     """Evaluate one claim: measure its values and compare them with their bands."""
     if claim.name in PENDING:
-        return JudgedClaim(claim, None, "not yet", f"Not judged yet: it takes {PENDING[claim.name]}.")
+        return JudgedClaim(claim, None, "not yet", f"Not judged yet: requires {PENDING[claim.name]}.")
     start = perf_counter()
     needs, function = JUDGES[claim.name]
     try:
@@ -233,7 +233,7 @@ _ZOOMS: Final = 6  # Refinements of the grid; arbitrary
 
 
 def largest(function: Callable[[FloatArray], FloatArray], start: float, end: float) -> float:
-    """Estimate the maximum of a function of time over an interval, on successively refined grids."""
+    """Estimate the maximum of a function of time, s, over an interval by repeated grid refinement."""
     best = -np.inf
     for _ in range(_ZOOMS if end > start else 1):
         grid = np.linspace(start, end, _POINTS)

@@ -83,12 +83,12 @@ def low_restitution(context: Context, _claim: Claim) -> Measured:
         "speeds_in_m_per_s": [v_in for v_in, _ in left],
     }
     series = ", ".join(f"{ratio:.3f}" for ratio in ratios[:8]) + (", ..." if len(ratios) > 8 else "")
-    return Measured(value, f"Speed ratios from touch to touch: {series}.")
+    return Measured(value, f"Ratios of rebound speed to impact speed: {series}.")
 
 
 @measures("backstop_force_dominates", *WHOLE)
 def backstop_force_dominates(context: Context, _claim: Claim) -> Measured:
-    """Measure the largest total force during and outside backstop contacts, after a single pulse."""
+    """Measure the largest total force inside and outside backstop contacts after a single pulse."""
     motion = context.single
 
     def total(t: FloatArray) -> FloatArray:
@@ -108,7 +108,7 @@ def backstop_force_dominates(context: Context, _claim: Claim) -> Measured:
 
 @measures("quiet_look_loud_force", *WHOLE)
 def quiet_look_loud_force(context: Context, claim: Claim) -> Measured:
-    """Measure the largest backstop force of the impacts after rebounds too low to be seen."""
+    """Measure the largest backstop force after rebounds that are too low to be seen."""
     static = float(context.idle.forces_at(0.0)["backstop"][0])
     quiet = claim.settings["quiet_rebound_over_stroke"] * context.stroke
     late = {bounce.end for bounce in rebounds(context.single, context.position) if bounce.height < quiet}
@@ -122,16 +122,16 @@ def quiet_look_loud_force(context: Context, claim: Claim) -> Measured:
     }
     return Measured(
         value,
-        f"After a rebound below {quiet * 1e6:.1f} um still {max(forces):.1f} N, against {static:.1f} N"
-        " at rest.",
+        f"After a rebound below {quiet * 1e6:.1f} um the force still reaches {max(forces):.1f} N, against"
+        f" {static:.1f} N at rest.",
     )
 
 
 @measures("loops", *WHOLE)
 def loops(context: Context, _claim: Claim) -> Measured:
-    """Measure the work of each contact on the armature, and the energy balance of the cycle."""
+    """Measure the work of each contact on the armature and the energy balance of the single-pulse cycle."""
     motion = context.single
-    # The last touch, in which the armature comes to rest, is not a closed loop.
+    # The last touch, after which the armature stays at rest, has no closed loop.
     works = [-c.loss for c in motion.contacts if not c.initial and c.t_out is not None]
     losses = [c.loss for c in touches(motion) if c.t_out is not None]
     if not works:
@@ -151,8 +151,8 @@ def loops(context: Context, _claim: Claim) -> Measured:
     }
     return Measured(
         value,
-        f"The coil gives {energy.coil_work * 1e3:.3f} mJ, the pack takes {energy.pack_loss * 1e3:.3f} mJ,"
-        f" the backstop {energy.backstop_loss * 1e3:.3f} mJ.",
+        f"Coil work {energy.coil_work * 1e3:.3f} mJ, pack loss {energy.pack_loss * 1e3:.3f} mJ, backstop loss"
+        f" {energy.backstop_loss * 1e3:.3f} mJ.",
     )
 
 
@@ -160,23 +160,23 @@ def loops(context: Context, _claim: Claim) -> Measured:
 def print_force(context: Context, _claim: Claim) -> Measured:
     """Measure the peak pack force of the single-pulse dot."""
     force = context.print_force
-    return Measured({"peak_force_N": force}, f"The dot is printed with {force:.1f} N.")
+    return Measured({"peak_force_N": force}, f"The peak force of the dot is {force:.1f} N.")
 
 
 @measures("pack_energy", "pack", "waveform")
 def pack_energy(context: Context, _claim: Claim) -> Measured:
-    """Measure the loading work on the pack by the single-pulse dot, and the energy that the pack absorbs."""
+    """Measure the loading work of the single-pulse dot on the pack, and the energy that the pack absorbs."""
     dot = context.dot
     value = {"loading_work_J": dot.loading_work, "net_loss_J": dot.net_loss}
     work, loss = (dot.loading_work or 0.0) * 1e3, (dot.net_loss or 0.0) * 1e3
-    return Measured(value, f"Of {work:.3f} mJ put into it the pack keeps {loss:.3f} mJ.")
+    return Measured(value, f"Loading work {work:.3f} mJ, of which the pack absorbs {loss:.3f} mJ.")
 
 
 @measures("delivered_energy", "magnet", "waveform")
 def delivered_energy(context: Context, _claim: Claim) -> Measured:
-    """Measure the work of the coil in the single-pulse cycle."""
+    """Measure the work of the coil per dot in the single-pulse cycle."""
     work = context.single.energy.coil_work
-    return Measured({"coil_work_per_dot_J": work}, f"The coil gives {work * 1e3:.3f} mJ.")
+    return Measured({"coil_work_per_dot_J": work}, f"The coil does {work * 1e3:.3f} mJ of work per dot.")
 
 
 @measures("two_pulses_660us", *WHOLE)
@@ -204,7 +204,7 @@ def two_pulses_660us(context: Context, claim: Claim) -> Measured:
 
 @measures("two_pulses_700us", *WHOLE)
 def two_pulses_700us(context: Context, claim: Claim) -> Measured:
-    """Measure force, flight time and phase of the second of two pulses fired 700 us apart."""
+    """Measure force and flight time of the second of two pulses fired 700 us apart, and its phase."""
     interval = claim.settings["interval_s"]
     motion = context.pulses([0.0, interval], interval + TAIL)
     first, second = context.dot, motion.dots[1]
@@ -240,7 +240,7 @@ def two_pulses_700us(context: Context, claim: Claim) -> Measured:
 
 
 def second_coil_work(context: Context, interval: float) -> float:
-    """Compute the work of the coil on the armature, J, after the second of two firings."""
+    """Compute the coil work on the armature, J, due to the second of two firings `interval`, s, apart."""
     both, first = context.pulses([0.0, interval], interval + TAIL), context.pulses([0.0], interval)
     return both.energy.coil_work - first.energy.coil_work
 
@@ -259,14 +259,14 @@ def half_rise(waveform: Waveform) -> float:
 
 
 def _requirements() -> tuple[int, tuple[float, float]]:
-    """Return the number of dots, and the limits of their relative force, that count as buzz printing."""
+    """Return the requirements of buzz printing: smallest number of dots, and range of relative forces."""
     band = claims()["buzz_printing"].band
     limits = (band["least_force_over_single"]["at_least"], band["largest_force_over_single"]["at_most"])
     return band["dots"]["at_least"], limits
 
 
 def buzz_search(context: Context) -> BuzzSearch:
-    """Search for a train that buzz-prints; the result is cached."""
+    """Search for a train that prints in buzz mode; the context caches the result."""
     fewest, forces = _requirements()
     return context.once("buzz", lambda: find_buzz_train(context.hammer, fewest=fewest, forces=forces))
 
@@ -278,7 +278,7 @@ def _described(train: BuzzTrain) -> str:
 
 @measures("buzz_printing", *WHOLE)
 def buzz_printing(context: Context, claim: Claim) -> Measured:
-    """Measure number and relative force of the best train of dots without backstop contacts in between."""
+    """Measure number and relative force of the dots of the best train without backstop contacts."""
     search = buzz_search(context)
     train = search.best
     if train is None or not train.count:
@@ -304,7 +304,7 @@ def buzz_printing(context: Context, claim: Claim) -> Measured:
     }
     if search.train is None:
         return Measured(
-            value, f"The best of {search.tried} trains tried, {_described(train)}, is not enough."
+            value, f"The best of {search.tried} trains, {_described(train)}, does not meet the requirements."
         )
     return Measured(
         value,
@@ -318,7 +318,7 @@ def buzz_is_delicate(context: Context, claim: Claim) -> Measured:
     """Count how many of four small changes of interval and pack front break the buzz-printing train."""
     train = buzz_search(context).train
     if train is None:
-        return Measured({"cases_broken": None}, "There is no train to be broken.")
+        return Measured({"cases_broken": None}, "There is no buzz-printing train to perturb.")
     change, shift = claim.settings["interval_change"], claim.settings["pack_front_shift_m"]
     fewest, _ = _requirements()
     counts = {
@@ -335,7 +335,7 @@ def buzz_is_delicate(context: Context, claim: Claim) -> Measured:
     broken = [name for name, count in counts.items() if count < fewest]
     value = {"cases_broken": len(broken), "dots_left": counts}
     left = ", ".join(f"{count} with {name}" for name, count in counts.items())
-    return Measured(value, f"Dots left of {train.count}: {left}.")
+    return Measured(value, f"Dots that remain of {train.count}: {left}.")
 
 
 def _count(context: Context, hammer: Hammer, train: BuzzTrain, interval: float) -> int:

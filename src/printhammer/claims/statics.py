@@ -37,7 +37,7 @@ def geometry(context: Context, _claim: Claim) -> Measured:
 
 @measures("rest_state", "magnet", "backstop", "waveform")
 def rest_state(context: Context, _claim: Claim) -> Measured:
-    """Measure how deep the armature rests in the backstop, the residual force, and the stability."""
+    """Measure the compression of the backstop at rest, the residual force, and the stability."""
     rest = context.rest
     force = float(context.idle.forces_at(0.0)["total"][0])
     equilibrium = min(equilibria(context.hammer), key=lambda e: abs(e.x - rest), default=None)
@@ -76,7 +76,7 @@ def return_from_everywhere(context: Context, _claim: Claim) -> Measured:
 
 @measures("release_margin", "magnet", "spring", "backstop")
 def release_margin(context: Context, _claim: Claim) -> Measured:
-    """Measure the net force at the backstop at zero current, as a fraction of the magnet force."""
+    """Measure the net force at the backstop without current, as a fraction of the magnet force."""
     force = StaticForce(context.hammer)
     magnet, spring = force.magnet(context.position), force.spring(context.position)
     if magnet == 0.0:
@@ -87,15 +87,13 @@ def release_margin(context: Context, _claim: Claim) -> Measured:
         "magnet_force_N": magnet,
         "spring_force_N": spring,
     }
-    detail = (
-        f"Of {abs(magnet):.2f} N of the magnet the spring leaves {abs(spring + magnet):.2f} N to be overcome."
-    )
+    detail = f"The spring leaves {abs(spring + magnet):.2f} N of the magnet force of {abs(magnet):.2f} N."
     return Measured(value, detail)
 
 
 @measures("current_range", "magnet", "waveform")
 def current_range(context: Context, _claim: Claim) -> Measured:
-    """Measure the largest current of the drives in the paper: single pulse, pairs of pulses, and trains."""
+    """Measure the largest current of the paper's drives: single pulse, pulse pairs and trains."""
     waveform = context.waveform
     if waveform.quantity != "current":
         raise NotMeasurableError(f"The hammer is driven by a {waveform.quantity}, not by a current")
@@ -138,7 +136,7 @@ def elastomer_backstop(context: Context, claim: Claim) -> Measured:
         raise NotMeasurableError(f"The impact on the backstop did not end: {hard_impact.message}")
     hard = _rebounds(hard_impact)
     crushed = []
-    # The softest elastomer that stops the armature within the range of the magnet's law.
+    # Choose the softest elastomer that stops the armature within the range of the magnet's law.
     for force in settings["forces_N"]:
         part = {
             "law": "elastomer",
@@ -170,7 +168,7 @@ def elastomer_backstop(context: Context, claim: Claim) -> Measured:
 
 
 def _impact(context: Context, hammer: Hammer, speed: float) -> Motion:
-    """Simulate the impact of a hammer on its backstop at a given speed, m/s, without current."""
+    """Simulate the impact of the armature on the backstop at a given speed, m/s, without current."""
     drive = PulseTrain(context.waveform, at=[_NEVER])
     return context.attempt(drive, CYCLE, hammer=hammer, state=(context.position, speed))
 

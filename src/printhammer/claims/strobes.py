@@ -47,7 +47,7 @@ def panels(context: Context, *, strange: bool = True) -> dict[str, FloatArray]:
 
 @measures("poincare_window", *WHOLE)
 def poincare_window(context: Context, claim: Claim) -> Measured:
-    """Measure the fraction of each panel's strobe points inside the window, and list the points outside."""
+    """Measure the fraction of each panel's strobe points inside the window; list the points outside."""
     centre, half = window()
     shares: dict[str, float] = {}
     outside: dict[str, Any] = {}
@@ -71,7 +71,7 @@ def poincare_window(context: Context, claim: Claim) -> Measured:
 
 @measures("behind_the_backstop", *WHOLE)
 def behind_the_backstop(context: Context, _claim: Claim) -> Measured:
-    """Measure how far behind the backstop the deepest strobe point of the strange panels lies."""
+    """Measure the depth of the deepest strobe point of the strange panels behind the backstop, m."""
     depths = {name: context.position - float(points[:, 0].min()) for name, points in panels(context).items()}
     deepest = max(depths, key=lambda name: depths[name])
     value = {"depth_m": depths[deepest], "depths_m": depths}
@@ -82,7 +82,7 @@ def behind_the_backstop(context: Context, _claim: Claim) -> Measured:
 
 @measures("low_rate_fixed_point", *WHOLE)
 def low_rate_fixed_point(context: Context, claim: Claim) -> Measured:
-    """Measure the scatter of the last strobe points of slow trains, which should have a fixed point."""
+    """Measure the scatter of the last strobe points of slow trains, which should reach a fixed point."""
     settings = claim.settings
     last = settings["last_points"]
     apart = {}
@@ -100,7 +100,7 @@ def low_rate_fixed_point(context: Context, claim: Claim) -> Measured:
 
 @measures("cloud_grows", *WHOLE)
 def cloud_grows(context: Context, _claim: Claim) -> Measured:
-    """Measure the 95th percentile of the distance of strobe points from the rest state, against the rate."""
+    """Measure, per panel, the 95th percentile of the distance of strobe points from the rest state."""
     rest = scaled(np.array([context.rest, 0.0]))
     radii = {
         name: float(np.percentile(np.linalg.norm(scaled(points) - rest, axis=1), 95.0))
@@ -112,7 +112,7 @@ def cloud_grows(context: Context, _claim: Claim) -> Measured:
     first, *_, last = radii.items()
     return Measured(
         value,
-        f"The radius goes from {first[1]:.2f} of the window at {first[0]} to {last[1]:.2f} at {last[0]}.",
+        f"The radius grows from {first[1]:.2f} of the window at {first[0]} to {last[1]:.2f} at {last[0]}.",
     )
 
 

@@ -14,8 +14,8 @@ from printhammer.claims.context import Context
 from printhammer.claims.judging import WHOLE, Claim, Measured, claims, measures
 from printhammer.hammer.hammer import Hammer
 
-_CHANGE: Final = 1e-5  # Relative change of all constants, far below any tolerance of production; arbitrary
-_TIGHTER: Final = 0.1  # Factor of the tolerance; arbitrary
+_CHANGE: Final = 1e-5  # Relative change of every constant, far below production tolerances; arbitrary
+_TIGHTER: Final = 0.1  # Factor on the integration tolerance in the robustness test; arbitrary
 _PLAIN: Final = "as it is"
 _FINE: Final = "ten times tighter tolerance"
 _CHANGED: Final[dict[str, Callable[[int], int]]] = {
@@ -24,20 +24,20 @@ _CHANGED: Final[dict[str, Callable[[int], int]]] = {
     "constants up and down by turns": lambda number: 1 - 2 * (number % 2),
     "constants down and up by turns": lambda number: 2 * (number % 2) - 1,
 }
-"""Simultaneous changes of all constants of a hammer: sign by index of the constant, for each variant."""
+"""Perturbations of all constants of a hammer: sign of the change by index of the constant, per variant."""
 
 _APERIODIC: Final = "no period"
 _PANELS: Final = "panels of Fig. 11"
 
 
 def printed_verdicts() -> dict[float, str]:
-    """Return the classifications printed on the panels of Fig. 11, by strobe time, s."""
+    """Return the classifications that Fig. 11 prints on its panels, by strobe time, s."""
     claim = claims()["poincare"]
     return dict(zip(claim.settings["strobe_times_s"], claim.band["verdicts"], strict=True))
 
 
 def changed(hammer: Hammer, sign: Callable[[int], int], part: float = _CHANGE) -> Hammer:
-    """Return a hammer with every constant increased or decreased by the fraction `part`."""
+    """Return a copy of a hammer with every constant raised or lowered by the fraction `part`."""
     # Keep the unit of the file, which distinguishes a current from a force.
     return hammer.replace(
         {
@@ -48,12 +48,12 @@ def changed(hammer: Hammer, sign: Callable[[int], int], part: float = _CHANGE) -
 
 
 def panel_name(period: float) -> str:
-    """Return the name of a panel in a report: its strobe time in ms."""
+    """Format the name of a panel: its strobe time in ms."""
     return f"{period * 1e3:.2f} ms"
 
 
 def panel_strobes(context: Context) -> list[Strobe]:
-    """Compute the strobe points of the panels of Fig. 11, classified; cached for several claims."""
+    """Compute the classified strobe points of the panels of Fig. 11; the context caches them."""
     points = claims()["poincare_window"].settings["points"]
     return context.once(
         _PANELS,
@@ -62,7 +62,7 @@ def panel_strobes(context: Context) -> list[Strobe]:
 
 
 def variants(context: Context, periods: list[float]) -> dict[str, list[Verdict]]:
-    """Classify trains for each variant of constants and tolerance, in the order of the periods, s."""
+    """Classify trains of given periods, s, for each variant of constants and tolerance."""
     hammers = [context.hammer, *(changed(context.hammer, sign) for sign in _CHANGED.values())]
     every = strobes(
         [hammer for hammer in hammers for _ in periods],
@@ -86,7 +86,7 @@ def _verdicts(judged: list[Strobe]) -> list[Verdict]:
 
 @measures("poincare", *WHOLE)
 def poincare(context: Context, claim: Claim) -> Measured:
-    """Compare the classifications of the panels with Fig. 11, and test their robustness to small changes."""
+    """Compare the classifications of the panels with Fig. 11, and test their robustness to perturbations."""
     periods = list(claim.settings["strobe_times_s"])
     printed = list(claim.band["verdicts"])
     by_variant = variants(context, periods)
@@ -98,7 +98,7 @@ def poincare(context: Context, claim: Claim) -> Measured:
     shown = []
     for verdicts in zip(*by_variant.values(), strict=True):
         kinds = list(dict.fromkeys(verdict.name for verdict in verdicts))
-        # Classifications that differ between the variants, joined by "or", never equal the printed one.
+        # A panel whose variants disagree gets several classes, joined by "or", and never matches Fig. 11.
         shown.append(" or ".join(kinds))
     right = [name for name, kind, band in zip(names, shown, printed, strict=True) if kind == band]
     wrong = [
@@ -147,7 +147,7 @@ def stretches(periods: Sequence[float], names: Sequence[str]) -> list[Stretch]:
 
 
 def cascades(scanned: Sequence[Stretch]) -> list[Stretch]:
-    """Return the first of every three successive intervals with the periods 2, 4 and 8."""
+    """Find cascades: return the first of every three successive intervals with periods 2, 4 and 8."""
     return [
         three[0]
         for three in zip(scanned, scanned[1:], scanned[2:], strict=False)
@@ -162,7 +162,7 @@ def no_period_doubling_cascade(context: Context, claim: Claim) -> Measured:
     first, last, step = (
         settings[name] for name in ("first_strobe_time_s", "last_strobe_time_s", "strobe_time_step_s")
     )
-    # Rounding removes the errors of the multiplication: the periods equal decimal numbers.
+    # Rounding to decimals removes the errors of the multiplication.
     periods = [round(first - step * k, 12) for k in range(round((first - last) / step) + 1)]
     judged = scan(context.hammer, periods, tolerance=context.tolerance, exponents=False)
     names = [_APERIODIC if verdict.period is None else verdict.name for verdict in judged]
@@ -203,7 +203,7 @@ def no_period_doubling_cascade(context: Context, claim: Claim) -> Measured:
 
 
 def _first_strange(context: Context, periods: Sequence[float], names: Sequence[str], way: int) -> int | None:
-    """Return the index of the first strange train from one end of a scan; None without a strange train.
+    """Find the first strange train from one end of a scan; return its index, or None.
 
     Since Lyapunov exponents are expensive, they are computed only until the first strange train.
     """
@@ -216,7 +216,7 @@ def _first_strange(context: Context, periods: Sequence[float], names: Sequence[s
 
 
 def _window(stretch: Stretch, step: float) -> dict[str, Any]:
-    """Return an interval of strobe times for the report: classification, ends and width, s."""
+    """Describe an interval of strobe times for the report: classification, ends and width, s."""
     return {
         "verdict": stretch.name,
         "from_s": stretch.longest,

@@ -1,4 +1,4 @@
-"""Derivatives of the dots with respect to constants, from the columns at contacts and peaks.
+"""Derivatives of the dots with respect to constants, from the tangent columns at contacts and peaks.
 
 The time of a touch changes by dt = -(dx - dg) / v, with dx the change of the displacement at a fixed time and
 dg the change of the surface position; the touch speed changes by dv + a dt. Losses are integrals of power,
@@ -44,10 +44,10 @@ RUN_QUANTITIES: Final = {
 }
 """Unit and meaning of the energies of a whole run, by name; the last energy only with damping."""
 
-_ENERGY: Final = 3  # First row of the energies in a column
-_PACK_LOSS: Final = 5  # Row of the pack loss in a column
+_ENERGY: Final = 3  # First row of the energies in a tangent column
+_PACK_LOSS: Final = 5  # Row of the pack loss in a tangent column
 _SAMPLES: Final = 65  # Samples of a contact for the bracket of its largest force; arbitrary
-# Relative difference between two times up to which they are the same maximum; rounding of a minimisation
+# Relative difference below which two times are the same maximum; the accuracy of the minimisation
 _NEAR: Final = 1e-6
 
 
@@ -214,7 +214,7 @@ def changes_of(
 
 @dataclass(frozen=True)
 class _Look:
-    """Run, flow and constants from which the derivatives of the quantities of a dot are computed."""
+    """Context of the derivatives of one dot: motion, problem, tangent flow and constants."""
 
     problem: Problem
     record: Record
@@ -224,7 +224,7 @@ class _Look:
     rows: dict[int, int]
 
     def columns(self, t: float) -> tuple[FloatArray, FloatArray]:
-        """Return the state and its derivatives with respect to the constants, at a time of `marks`, s."""
+        """Return the state at one of the `marks`, s, and its derivatives with respect to the constants."""
         row = int(np.searchsorted(self.marks, t))
         return self.flow.states[row], self.flow.changes[row]
 

@@ -46,7 +46,7 @@ class Parameter(Declared):
     """Constant of hammer or drive, with the derivatives of the kernel's arrays."""
 
     name: str = part('name of the constant, such as "pack.stiffness", "waveform.width", "period", "firing.1"')
-    value: float = part("in SI")
+    value: float = part("value in SI")
     scale: float = part(
         "scale of its changes, SI: the absolute value of the constant, or, if that is zero, a value typical"
         " of its dimension"
@@ -213,7 +213,7 @@ def _difference(function: Callable[[float], FloatArray], value: float, scale: fl
             samples = [function(value + offset * _SPACING * scale) for offset in offsets]
         except InputError:
             continue
-        # Relative to the middle, so that entries independent of the constant are exactly zero.
+        # Subtract the middle value, so that entries independent of the constant are exactly zero.
         with np.errstate(invalid="ignore"):
             change = sum(weight * (array - middle) for weight, array in zip(weights, samples, strict=True))
         change = np.asarray(change) / (12.0 * _SPACING)

@@ -33,15 +33,15 @@ MORE: Final = 4
 """Number of dots after the firing where the map starts, so that the end of the row has no effect."""
 
 DOTS: Final = FIRING + MORE
-"""Number of dots in a row that is long enough for the default starting firing."""
+"""Shortest row for the default `FIRING`, in dots."""
 
 _SPACING: Final = 1e-5  # Finite-difference step of the state, in its scales
-# Largest error tolerance: a derivative errs by that of a run over the step. In velocity the former counts in
-# speeds of the flight, the latter in ways per period, 150 times smaller for a relay.
+# Largest tolerance of a run. A derivative's error is the run's error divided by the step; in velocity the
+# error scales with the flight speed, but the step with travel / period, 150 times smaller for a relay.
 _TOLERANCE: Final = 1e-9
 _CLOSED: Final = 1e-6  # Distance from state to image below which an orbit is closed, in scales of the state
 _LONGEST_STEP: Final = 0.1  # Longest Newton step, in scales of the state
-# Size of the derivative below which steps are not limited; arbitrary, well below 1
+# Norm of the derivative below which the map is contracting and steps are not clipped; arbitrary, well below 1
 _CONTRACTING: Final = 0.3
 _ITERATIONS: Final = 12  # Iteration limit; arbitrary
 

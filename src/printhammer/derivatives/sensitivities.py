@@ -112,7 +112,7 @@ class Sensitivities(Result):
 
     @property
     def lost(self) -> tuple[int, ...]:
-        """Indices of the firings, from 0, whose dots are lost, and which have no sensitivities."""
+        """Indices, from 0, of the firings whose dots are lost; these dots have no sensitivities."""
         return tuple(int(k) for k in np.flatnonzero(np.isnan(self.dots[:, 0])))
 
     @property

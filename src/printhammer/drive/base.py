@@ -95,7 +95,7 @@ class Drive:
         return self._segments
 
     def kernel_arrays(self) -> tuple[FloatArray, IntArray, FloatArray, bool, bool]:
-        """Return the arrays of the drive for the kernel.
+        """Return the arrays of the drive for the kernel, as a tuple.
 
         Firing times, s; first row of each firing's segment table; all segment tables stacked
         (`printhammer.drive.segments.stacked`); whether pulses replace each other; whether the drive is a
@@ -169,7 +169,7 @@ class Drive:
         return ends
 
     def _reach(self) -> int:
-        """Return the number of latest firings whose pulses may still be active at a time."""
+        """Return how many of the latest firings may have active pulses at the same time."""
         return self.overlapping
 
     def _values(self, time: FloatArray, pulse: IntArray) -> FloatArray:

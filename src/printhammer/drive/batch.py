@@ -1,4 +1,4 @@
-"""Batches of pulse trains as flat arrays of firing times, for maps and reports over patterns.
+"""Batches of pulse trains as flat arrays of firing times, for maps and for statistics over patterns.
 
 `Ragged` holds rows of unequal length in one array: firing times, strobe times, dots of many runs.
 """
@@ -62,7 +62,7 @@ class Ragged:
 
     @classmethod
     def empty(cls, rows: int) -> Self:
-        """Create `Ragged` with a number of empty rows."""
+        """Create a `Ragged` of `rows` empty rows."""
         return cls(np.zeros(0), np.zeros(rows + 1, np.int64))
 
     def __len__(self) -> int:
@@ -90,7 +90,7 @@ class Ragged:
         return self.values[self.starts[1:] - 1]
 
     def places(self, rows: IntArray) -> IntArray:
-        """Return the indices of the entries of several rows in `values`, concatenated."""
+        """Return the indices in `values` of all entries of the given rows, concatenated."""
         counts = self.counts[rows]
         starts = starts_of(counts)
         return np.arange(starts[-1]) + np.repeat(self.starts[rows] - starts[:-1], counts)
@@ -112,7 +112,7 @@ class Ragged:
 
 
 def starts_of(counts: IntArray) -> IntArray:
-    """Return the start index of each row, and the total length, from the lengths of the rows."""
+    """Convert the lengths of rows to the start index of each row, followed by the total length."""
     starts = np.zeros(len(counts) + 1, np.int64)
     np.cumsum(counts, out=starts[1:])
     return starts
@@ -193,7 +193,7 @@ class PulseTrains(Sequence[PulseTrain]):
         firings.values.flags.writeable = False
 
     def _check(self) -> None:
-        """Validate the firing times; raise the InputError of a single train if the times are invalid."""
+        """Validate the firing times of all trains; raise the `InputError` of the first invalid train."""
         if not len(self):
             raise InputError("trains: the list is empty", key="train", expected="at least one")
         times, starts = self._firings.values, self._firings.starts

@@ -26,10 +26,11 @@ A file has ``format = 1``, optionally ``overlap = "add"`` or ``"replace"``, and 
 
 Train, times and burst fire a waveform: the table ``[waveform]`` of the file, or else the hammer's. The
 waveforms of a sequence are the tables ``[waveforms.print]``, ``[waveforms.soft]`` and so on. The keys of a
-waveform are ``shape`` and the constants of the shape; a sampled one names a CSV file (``file``, relative to
-the drive file) or holds the samples as ``time`` and ``current`` or ``force``, each ``{ values = [...], unit =
-"us" }``; one of the shape "chain" has ``parts``, a list of waveforms, each with its offset ``at`` from the
-firing; one of the shape "switched" lists times ``at``, ``levels``, and the time constant of its ``edge``.
+waveform are ``shape`` and the constants of the shape. A sampled waveform names a CSV file (``file``, relative
+to the drive file) or contains the samples as ``time`` and ``current`` or ``force``, each ``{ values = [...],
+unit = "us" }``. A waveform of the shape "chain" has ``parts``, a list of waveforms, each with its offset
+``at`` from the firing. A waveform of the shape "switched" has lists of times ``at`` and of ``levels``, and
+the time constant ``edge``.
 Every quantity is written with its unit, as a string or as ``{ value = 1.2, unit = "kHz" }``.
 """
 
@@ -86,7 +87,7 @@ def load_drive(path: str | Path, waveform: Waveform | None = None) -> Drive:
 def read_drive(
     text: str, waveform: Waveform | None = None, *, name: str = "drive", folder: Path | None = None
 ) -> Drive:
-    """Parse the text of a drive file; `name` is used in messages, `folder` holds sampled waveforms."""
+    """Parse the text of a drive file; `name` appears in messages, `folder` is that of sampled waveforms."""
     try:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -102,7 +103,7 @@ def drive_of(
     name: str = "drive",
     folder: Path | None = None,
 ) -> Drive:
-    """Build a drive from the tables of a drive file; arguments and errors as for `read_drive`."""
+    """Build a drive from the parsed tables of a drive file; arguments and errors as for `read_drive`."""
     with located(name):
         return _drive(data, waveform, folder or Path())
 
@@ -193,7 +194,7 @@ def _required(table: Mapping[str, Any], keys: tuple[str, ...], name: str) -> Non
 
 
 def _arguments(table: dict[str, Any], kind: str) -> dict[str, Any]:
-    """Parse the keys of a timing table into SI."""
+    """Parse the keys of a timing table; return the values in SI."""
     _known(table, set(_KEYS[kind]), kind)
     result: dict[str, Any] = {}
     for key, value in table.items():
@@ -367,7 +368,7 @@ def _read_switched(data: dict[str, Any], where: str) -> Switched:
 
 
 def _samples(data: dict[str, Any], where: str) -> Waveform:
-    """Parse a sampled waveform whose samples are in the file."""
+    """Parse a sampled waveform whose samples are stored in the drive file itself."""
     si = {name: unit for unit, name in QUANTITY_UNITS.items()}
     _known(data, {"interpolation", "time", *si}, where)
     driven = [name for name in si if name in data]

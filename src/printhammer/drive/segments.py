@@ -35,15 +35,15 @@ POLYNOMIAL: Final = 0
 EXPONENTIAL: Final = 1
 SINE: Final = 2
 END: Final = 3
-"""Kind of the end row of each segment table if the kernel receives several tables in one array."""
+"""Kind of the end row of a segment table when several tables are stacked in one array for the kernel."""
 SWITCHED: Final = 4
 DECAY: Final = 5
 RESERVOIR: Final = 6
 """Kinds of a driver's segments: supply on (value: supply voltage p0), supply off (value 0), reservoir."""
 COLUMNS: Final = 6  # Number of columns of a table
 
-_CHUNK: Final = 1024  # Intervals evaluated at once, which bounds the memory; arbitrary
-_REFINED: Final = 16  # Intervals with the largest samples that are refined; arbitrary
+_CHUNK: Final = 1024  # Number of intervals evaluated at once, which bounds the memory; arbitrary
+_REFINED: Final = 16  # Number of intervals, those with the largest samples, to refine; arbitrary
 _ROUNDS: Final = 9  # Rounds of refinement: they reach 1e-9 of the interval
 
 
@@ -99,7 +99,7 @@ def evaluate(segments: FloatArray, t: npt.ArrayLike, fired: npt.ArrayLike = 0.0)
     index = np.where(early, index - 1, index)
     active = (index >= 0) & (index < last) & np.isfinite(tau)
     _, kind, p0, p1, p2, p3 = np.moveaxis(segments[np.where(active, index, last)], -1, 0)
-    # The further numbers of a driver's segment are not a function of time.
+    # The parameters of a driver's segment are limits and resistances, not coefficients of a polynomial.
     p0 = np.where(kind == DECAY, 0.0, p0)
     p1, p2, p3 = (np.where(kind >= SWITCHED, 0.0, each) for each in (p1, p2, p3))
     s = np.where(active, np.maximum(tau - starts[np.where(active, index, 0)], 0.0), 0.0)

@@ -35,7 +35,7 @@ class PulseSequence(Drive):
     at
         Firing times, s, ascending, one for each waveform.
     overlap
-        "add": overlapping pulses add up; "replace": each firing cuts off the pulse before.
+        "add": overlapping pulses add up; "replace": each firing cuts off the preceding pulse.
     start
         Shift of the firing times, s.
 

@@ -17,14 +17,13 @@ END: Final = 3.0
 SWITCHED: Final = 4.0
 DECAY: Final = 5.0
 RESERVOIR: Final = 6.0
-"""Kinds of segments, as described in `printhammer.drive.segments`."""
+"""Codes of the kinds of segments, as described in `printhammer.drive.segments`."""
 
 ROWS: Final = 4
 """Largest number of rows of the table of a shape, including the end."""
 
 DECAY_TIMES: Final = 27.6310211159
-"""Number of decay time constants after which a decaying current is set to zero: its value is then 1e-12 of
-the initial value."""
+"""Decay time constants after which a decaying current, then 1e-12 of its initial value, is cut off."""
 
 DIODE: Final = 0.7
 """Forward voltage of a silicon diode, V; the usual textbook value."""
@@ -34,11 +33,11 @@ RAIL: Final = 2.0
 
 _VOLTAGE, _WIDTH, _DECAY_VOLTAGE, _DECAY_RESISTANCE, _SOURCE_RESISTANCE, _COILS, _DIODE_VOLTAGE = range(7)
 _OWN: Final = 7
-"""Indices of the fields common to all drivers; fields of the shape follow; the decay path is last."""
+"""Indices of the fields common to all drivers; the shape's own fields follow, and last the decay path."""
 
 
 def put(table: Any, row: int, start: float, kind: float, p0: float, p1: float, p2: float, p3: float) -> int:
-    """Write a row of a segment table; return the index of the next row."""
+    """Write one row of a segment table; return the index of the next row."""
     table[row, 0], table[row, 1] = start, kind
     table[row, 2], table[row, 3], table[row, 4], table[row, 5] = p0, p1, p2, p3
     return row + 1
@@ -105,7 +104,7 @@ def trapezoid(fields: Any, table: Any) -> int:
 
 
 def end_slope(h0: float, h1: float, m0: float, m1: float) -> float:
-    """Return the slope of a shape-preserving cubic at the end of a record, from two intervals and secants."""
+    """Return the slope of a shape-preserving cubic at the end of a record, from the two outer intervals."""
     slope = ((2.0 * h0 + h1) * m0 - h0 * m1) / (h0 + h1)
     if slope * m0 <= 0.0:
         return 0.0
@@ -115,7 +114,7 @@ def end_slope(h0: float, h1: float, m0: float, m1: float) -> float:
 
 
 def inner_slope(h0: float, h1: float, m0: float, m1: float) -> float:
-    """Return the slope between two intervals: a weighted harmonic mean of their secants, 0 at an extremum."""
+    """Return the slope of a shape-preserving cubic between two intervals, 0 at an extremum of the record."""
     if m0 == 0.0 or m1 == 0.0 or (m0 < 0.0) != (m1 < 0.0):
         return 0.0
     w0, w1 = 2.0 * h1 + h0, h1 + 2.0 * h0
@@ -123,9 +122,9 @@ def inner_slope(h0: float, h1: float, m0: float, m1: float) -> float:
 
 
 def sampled(fields: Any, table: Any) -> int:
-    """Write the table of a record, interpolated by shape-preserving cubics; return the number of rows.
+    """Write the table of a sampled record, interpolated by shape-preserving cubics; return the row count.
 
-    `fields` holds the n times and then the n values; the table has room for n + 1 rows. Slopes as in
+    `fields` contains the n times and then the n values; the table has room for n + 1 rows. Slopes as in
     `scipy.interpolate.PchipInterpolator`.
     """
     n = len(fields) // 2
@@ -157,12 +156,12 @@ def series_of(fields: Any) -> float:
 
 
 def put_on(fields: Any, table: Any, row: int, at: float, upper: float, lower: float) -> int:
-    """Write the segment of a driver that begins when the supply is switched on, with its thresholds."""
+    """Write the segment of a driver with the supply on, from time `at`, s; return the next row."""
     return put(table, row, at, SWITCHED, fields[_VOLTAGE], series_of(fields), upper, lower)
 
 
 def put_off(fields: Any, table: Any, row: int, at: float) -> int:
-    """Write the segment of a driver that begins when the supply is switched off, and the end of the table."""
+    """Write the segment of a driver with the supply off, from time `at`, s, and the end; return row count."""
     decay = fields[len(fields) - 1]
     against = fields[_DECAY_VOLTAGE]
     if math.isnan(against):
@@ -207,7 +206,7 @@ def bridge(fields: Any, table: Any) -> int:
 
 
 def fill_supply(fields: Any, reservoir: bool, supply: Any, at: int) -> None:
-    """Write the supply of a driver, beginning at index `at`: the fields of `drive.waveforms.base.Supply`."""
+    """Write the supply of a driver to an array, from index `at`: fields of `drive.waveforms.base.Supply`."""
     supply[at], supply[at + 1] = fields[_DIODE_VOLTAGE], 0.0
     supply[at + 2] = fields[_OWN] if reservoir else 0.0
     supply[at + 3] = fields[_OWN + 1] if reservoir else 0.0
@@ -247,7 +246,7 @@ def fill_values(table: Any, times: Any, values: Any) -> None:
 
 
 def largest_inside(kind: float, p0: float, p1: float, p2: float, p3: float, length: float) -> float:
-    """Return the largest absolute value of a segment of a `length`, s, at its ends and turning points."""
+    """Return the largest absolute value of a segment of duration `length`, s: at its ends or extrema."""
     best = abs(segment_value(kind, p0, p1, p2, p3, 0.0))
     if not math.isinf(length):
         best = max(best, abs(segment_value(kind, p0, p1, p2, p3, length)))
@@ -297,7 +296,7 @@ def largest_value(table: Any) -> float:
 SUPPORT, TABLE_END, LARGEST, REPLACES, SERIES_OF_PULSE, HOLD_UPPER, UPPER = range(7)
 SUPPLY_OF_PULSE: Final = 7
 SHOWN: Final = 13
-"""Indices of the numbers that describe a pulse; see `pulse`."""
+"""Indices of the numbers in `about` that describe a pulse; see `pulse`."""
 
 (
     HALF_SINE,
@@ -340,21 +339,21 @@ def fill_table(shape: int, fields: Any, table: Any) -> int:
 
 
 def pulse(shape: int, fields: Any, table: Any, about: Any) -> int:
-    """Write the segment table of a pulse, and numbers that describe the pulse; return the row count.
+    """Write the segment table of a pulse and the numbers that describe it; return the row count.
 
     Parameters
     ----------
     shape : int
         Code of the shape.
     fields : float64 array
-        Fields of the shape in order of declaration, NaN for a missing one; of a driver then the index of the
-        decay path. Of a record, the times and then the values.
-    table : float64 array, shape (4 or more, of a record one more than samples, 6)
+        Fields of the shape in order of declaration, NaN if missing; for a driver then the index of the decay
+        path. For a record, the times and then the values.
+    table : float64 array, shape (rows, 6), at least 4 rows, for a record one more than samples
         Segment table, in the form for the kernel: the last row has the kind `END`.
     about : float64 array, shape (14,)
         Support, s; end of the table, s; largest value; 1 if the latest firing replaces earlier ones, else 0;
-        resistance of the supply in series with one coil, ohm; upper current of a hold, and of a chopper, A,
-        NaN without one; the six numbers of the supply; end of a picture of the pulse, s.
+        resistance of the supply in series with one coil, ohm; upper current of the hold phase and of the
+        chopper, A, NaN if missing; the six numbers of the supply; end of the time axis of a plot, s.
 
     Returns
     -------

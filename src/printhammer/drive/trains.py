@@ -77,7 +77,7 @@ class PulseTrain(_Pulsed):
     pulses
         Number of firings; by default nine, as in the bursts of the paper, or one without rate and period.
     overlap
-        "add": overlapping pulses add up; "replace": each firing cuts off the pulse before.
+        "add": overlapping pulses add up; "replace": each firing cuts off the preceding pulse.
     start
         Time of the first firing, or shift of the times `at`, s.
 

@@ -30,7 +30,7 @@ class PaperFigure:
     number: int
     """Number of the figure in the paper."""
     place: str
-    """Module in `printhammer.figures.paper` and function that draws the figure, separated by a dot."""
+    """Drawing function as "module.function", the module in `printhammer.figures.paper`."""
     title: str
     """Short title of the figure."""
     caption: str
@@ -38,7 +38,7 @@ class PaperFigure:
 
     @property
     def function(self) -> Callable[..., Figure]:
-        """Function that draws the figure, given a hammer and options."""
+        """Function that draws the figure for a hammer and options."""
         module, _, name = self.place.partition(".")
         function: Callable[..., Figure] = getattr(import_module(f"{__name__}.paper.{module}"), name)
         return function

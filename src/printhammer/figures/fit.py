@@ -32,11 +32,11 @@ _KINDS: Final = {
 """Axis scale of each measured quantity, by name; other quantities are drawn as pure numbers."""
 
 _MANY: Final = 400
-"""Number of data points from which on they are drawn small; arbitrary."""
+"""Number of data points above which the points are drawn smaller; arbitrary."""
 
 _LEGEND: Final = 8  # Largest number of entries in a legend; arbitrary
 _NAMED: Final = 6
-"""Largest number of outliers whose line numbers are written; arbitrary."""
+"""Largest number of outliers that are labelled with their line numbers; arbitrary."""
 
 
 @styled
@@ -97,7 +97,7 @@ def _data(ax: Axes, fit: Fit, across: Scale, up: Scale) -> None:
 
 
 def _is_curve(values: FloatArray) -> bool:
-    """Whether fitted values, in the order of the abscissa, form one curve rather than several."""
+    """Whether the fitted values, sorted by the abscissa, form a single curve rather than several."""
     return float(np.abs(np.diff(values)).sum()) <= 4.0 * float(np.ptp(values)) if len(values) > 1 else False
 
 
@@ -129,7 +129,7 @@ def _residuals(ax: Axes, fit: Fit, across: Scale, up: Scale) -> None:
 
 
 def _spread(fit: Fit) -> FloatArray:
-    """Compute the standard deviation of each datum relative to the residual scale."""
+    """Compute the standard deviation of each datum, normalised by the RMS over the used data."""
     used = ~fit.outliers
     spread = 1.0 / np.sqrt(fit.weights)
     return np.asarray(spread / np.sqrt(np.mean(spread[used] ** 2)))
@@ -163,7 +163,7 @@ def _correlation(ax: Axes, fit: Fit) -> None:
 
 
 def _short(key: str) -> str:
-    """Shorten the key of a constant to fit beside the correlation matrix."""
+    """Shorten the key of a constant for the label of the correlation matrix."""
     plain = key if " " in key else key.rpartition(".")[2]
     for section in ("magnet.", "spring.", "backstop."):
         plain = plain.replace(section, "")

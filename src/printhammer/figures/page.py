@@ -40,7 +40,7 @@ _TOGETHER: Final = 1_000_000  # Pixels computed at once, which bounds the memory
 
 @dataclass(frozen=True)
 class Sheet:
-    """Rectangle of the paper that is drawn, by its edges."""
+    """Rectangle of paper to draw, given by its edges, m."""
 
     left: float
     right: float
@@ -78,7 +78,7 @@ def inked(
     reach = int(np.ceil(radius + soft)) + 1
     x, y = (across - sheet.left) / size - 0.5, (down - sheet.top) / size - 0.5
     on = (x > -reach) & (x < columns + reach) & (y > -reach) & (y < rows + reach)
-    # A border of twice the radius of a dot avoids clipping each dot.
+    # A border of two dot radii, rounded up, avoids clipping each dot.
     border = 2 * reach + 1
     x, y, ink = x[on] + border, y[on] + border, density[on]
     wide = columns + 2 * border
@@ -186,7 +186,7 @@ def plot(page: Page, view: View = "page") -> Figure:
 
 
 def whole_sheet(page: Page) -> Sheet:
-    """Return the rectangle of paper that contains all print lines of a page, with a margin."""
+    """Return the rectangle of paper with all print lines of a page and a margin."""
     head, pattern = page.head, page.pattern
     margin = 2.0 * head.wire_diameter
     across = (pattern.slots - 1) * head.pitch
@@ -215,7 +215,7 @@ def zoomed_sheet(page: Page) -> Sheet:
 
 
 def _panel(figure: Figure, sheet: Sheet, top: float, height: float, title: str, left: float = _SIDE) -> Axes:
-    """Add axes for a sheet to a figure, with a title; height, top and left edge are in inches."""
+    """Add titled axes for a sheet to a figure; height, top and left edge in inches."""
     width, whole = figure.get_size_inches()
     wide = height * sheet.width / sheet.height
     ax = figure.add_axes((left / width, (top - height) / whole, wide / width, height / whole))
@@ -242,7 +242,7 @@ def _zoom_title(page: Page) -> str:
 
 
 def _dots(page: Page) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return positions across and down, m, and densities of all dots on paper, with extra contacts."""
+    """Return positions across and down, m, and optical densities of all dots, extra contacts included."""
     printed, extra = (*page.places, page.density), (*page.extra_places, page.extra_density)
     across, down, density = (
         np.concatenate([values[page.printed], more]) for values, more in zip(printed, extra, strict=True)
@@ -326,7 +326,7 @@ def _zoom(ax: Axes, sheet: Sheet, page: Page) -> None:
 
 
 def _sign(figure: Figure, page: Page) -> None:
-    """Write hammer and print quality below the figure of a page."""
+    """Write the hammer and the print quality at the foot of the figure of a page."""
     sign(figure, page.hammer)
     _width, whole = figure.get_size_inches()
     left = _SIDE / _WIDTH
@@ -334,7 +334,7 @@ def _sign(figure: Figure, page: Page) -> None:
 
 
 def summary(page: Page) -> str:
-    """Return the print quality of a page as one line of text."""
+    """Summarise the print quality of a page in one line."""
     lost, extra = int(page.lost.sum()), int(page.extra_contacts.sum())
     said = [f"{page.line.size} dots requested", f"{int(page.printed.sum())} printed", f"{lost} lost"]
     if not page.run.all():

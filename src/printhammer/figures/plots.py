@@ -48,7 +48,7 @@ PLOTS: Final = {
     "ToleranceYield": "quality.plot_tolerance",
     "ZeroOne": "chaos.exponents.plot_zero_one",
 }
-"""Module and function that draw a result, by its class name; further figures have a name after a dot."""
+"""Drawing function of each result class, as module and name; a further figure's key is "Class.figure"."""
 
 
 def plot(result: object, picture: str = "", **options: Any) -> Figure:

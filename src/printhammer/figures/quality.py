@@ -1,4 +1,4 @@
-"""Print quality: force and arrival time of every dot, and their deviations against the rate.
+"""Figures of print quality: force and arrival time of every dot, and their deviations against the rate.
 
 `plot_damping` draws safe rate, settle-out time and wear of every material of a damping study.
 
@@ -26,7 +26,7 @@ from printhammer.support.arrays import FloatArray
 
 _MOST_SLOTS: Final = 64  # Largest number of slots shown; arbitrary
 _US: Final = 1e6  # Microseconds in a second
-_ROOM: Final = 1.25  # Half-width of the axes in units of the limits or of the dots; arbitrary
+_ROOM: Final = 1.25  # Half-width of the axes, relative to the limit or the largest deviation; arbitrary
 
 
 @styled
@@ -52,8 +52,8 @@ def plot(quality: Quality) -> Figure:
             dots(plane, late[which], share[which], 3.2, colour, alpha=0.7, label=name, gid=name)
     if quality.lost.any():
         plane.plot([], [], "x", ms=5.0, color=style.INK, label=f"{int(quality.lost.sum())} lost")
-    plane.set_xlabel("Arrives late by  [µs]")
-    plane.set_ylabel("Force against the single pulse  [%]")
+    plane.set_xlabel("Arrival deviation  [µs]")
+    plane.set_ylabel("Force deviation  [%]")
     plane.legend(loc="upper right", fontsize=style.TINY, frameon=False, handletextpad=0.2)
     begin = _window(quality)
     shown = (quality.slot >= begin) & (quality.slot < begin + _MOST_SLOTS)
@@ -137,7 +137,7 @@ def _reach(values: FloatArray, bound: float) -> float:
 
 
 def _window(quality: Quality) -> int:
-    """Return the first slot shown, so that the worst dot is in the middle of the slots shown."""
+    """Return the first slot to draw, chosen so that the worst dot is in the middle."""
     if len(quality.wanted) <= _MOST_SLOTS:
         return 0
     bounds = np.maximum([quality.limits.force, quality.limits.arrival], 1e-300)
@@ -240,7 +240,7 @@ def plot_tolerance(batch: ToleranceYield, *, bars: int = 8) -> Figure:
     _correlations(right, batch, outcome, bars)
     heading(right, f"Rank correlation {title}")
     odd = int((batch.status != "ok").sum())
-    remark = f"{odd} of {len(batch.status)} drawn hammers do not print." if odd else ""
+    remark = f"{odd} of {len(batch.status)} sampled hammers do not print." if odd else ""
     sign(figure, batch.hammer, remark)
     return figure
 
@@ -252,7 +252,7 @@ def _rates(ax: Axes, batch: ToleranceYield) -> None:
     ax.fill_between(batch.grid[:last], shares[:last], step="post", color=style.BLUE, alpha=0.15, lw=0.0)
     ax.set_ylim(0.0, 104.0)
     ax.set_xlabel("Slots per second  [Hz]")
-    ax.set_ylabel("Hammers within limits up to this rate  [%]")
+    ax.set_ylabel("Hammers within limits at this rate and below  [%]")
     for share in (95.0, 50.0):
         ax.axhline(share, color=style.FAINT, lw=style.THIN, zorder=0)
     heading(ax, f"{len(batch.passed)} hammers")
@@ -260,7 +260,7 @@ def _rates(ax: Axes, batch: ToleranceYield) -> None:
 
 def _singles(ax: Axes, batch: ToleranceYield) -> None:
     flights, forces = 1e6 * batch.single_flight_time, batch.single_force
-    for which, colour, name in ((batch.passed, style.BLUE, "pass"), (~batch.passed, style.ORANGE, "do not")):
+    for which, colour, name in ((batch.passed, style.BLUE, "pass"), (~batch.passed, style.ORANGE, "fail")):
         dots(ax, flights[which], forces[which], 3.2, colour, alpha=0.8, label=f"{int(which.sum())} {name}")
     ax.set_xmargin(0.05)
     ax.set_xlabel("Single-pulse flight time  [µs]")

@@ -185,7 +185,7 @@ def fit_coil(
 class CurrentLaw:
     """Law of a fit: currents of all records, A, shape (m,).
 
-    p holds the named constants, the fitted probe errors, and the offset of each edge of a recorded voltage
+    p contains the named constants, the fitted probe errors, and the offset of each edge of a recorded voltage
     from the middle between its two rows, SI.
     """
 
@@ -200,7 +200,7 @@ class CurrentLaw:
         self._slopes: dict[bytes, FloatArray] = {}
 
     def space(self, start: FloatArray) -> Parameters:
-        """Return initial guess, bounds, prior and scales of all parameters; `start` holds the constants."""
+        """Build initial guess, bounds, prior and scales of all parameters; `start` contains the constants."""
         longest = max(float(trace.times[-1]) for trace in self.traces)
         peak = max(float(np.abs(trace.table.values["current"]).max()) for trace in self.traces)
         ends = [bounds_of(error, longest) for error in self.fitted]
@@ -260,7 +260,7 @@ class CurrentLaw:
         return terms
 
     def value(self, p: FloatArray) -> FloatArray:
-        """Compute the currents of all records, A; NaN if the constants are invalid."""
+        """Compute the currents of all records, A; NaN for invalid constants."""
 
         def made() -> FloatArray:
             try:
@@ -327,7 +327,7 @@ class Averaged:
         return self.mean(self.law.value(p))
 
     def jacobian(self, p: FloatArray) -> FloatArray:
-        """Compute the derivatives averaged over plateaus."""
+        """Compute the derivatives of the averaged currents with respect to the parameters."""
         slopes = self.law.jacobian(p)
         return np.column_stack([self.mean(column) for column in slopes.T])
 
@@ -342,7 +342,7 @@ def _within(p: FloatArray, space: Parameters) -> FloatArray:
 
 
 def _kept(known: dict[bytes, FloatArray], p: FloatArray, made: Callable[[], FloatArray]) -> FloatArray:
-    """Return the cached result of `made` at parameters `p`, since a fit evaluates a point repeatedly."""
+    """Return the cached value of `made` at parameters `p`; a fit evaluates the same point repeatedly."""
     key = p.tobytes()
     if key not in known:
         known[key] = made()
@@ -350,7 +350,7 @@ def _kept(known: dict[bytes, FloatArray], p: FloatArray, made: Callable[[], Floa
 
 
 def _start(hammer: Hammer, names: list[str], trace: Trace) -> tuple[Hammer, FloatArray]:
-    """Estimate missing resistance and inductance from a record; return the hammer and the initial guesses."""
+    """Estimate a missing resistance or inductance from a record; return hammer and initial guesses, SI."""
     t, current = trace.table.values["time"], np.abs(trace.table.values["current"])
     top = int(np.argmax(current))
     if not (current[top] > 0.0 and trace.waveform.peak > 0.0):

@@ -1,4 +1,4 @@
-"""Current of a voltage-driven coil as shown by a current probe: simulation, and reading of records.
+"""Current of a voltage-driven coil as a current probe shows it: simulation, and reading of records.
 
 A record has the columns ``time`` and ``current``, optionally ``voltage``; one shot per file. The armature is
 free or locked. The probe is a first-order low-pass; the current is interpolated linearly between points at
@@ -125,7 +125,7 @@ class Trace(Declared, eq=False):
         return float(np.median(np.diff(self.times)))
 
     def driven(self, shifts: FloatArray) -> Waveform:
-        """Return the recorded voltage; each edge is shifted by `shifts`, s, from the middle between rows."""
+        """Return the recorded voltage; `shifts`, s, move each edge from the middle between its two rows."""
         if not self.edges.size:
             return self.waveform
         t, volts = self.times, self.table.values["voltage"]

@@ -126,11 +126,11 @@ _TAKEN: Final = {
     "pack": ("thickness", "pack.thickness"),
     "backstop": ("stiffness", "backstop.stiffness"),
 }
-"""Known constant that each static fit requires: option name, and key in the hammer file."""
+"""Known constant that each static fit requires: name of the option, and key in the hammer file."""
 
 
 def _known(hammer: Hammer | None, key: str) -> float | None:
-    """Return a known constant of a hammer, SI, or None; the backstop stiffness may follow from its bodies."""
+    """Return a known constant of a hammer, SI, or None; a backstop stiffness may follow from its bodies."""
     if hammer is None:
         return None
     if key == "backstop.stiffness":

@@ -44,17 +44,17 @@ _SINGULAR: Final = 1e-12
 """Smallest singular value of the column-normalised Jacobian at which all parameters count as determined."""
 
 _TIED: Final = 0.5
-"""Component in the weakest direction, as a fraction of the largest, above which a parameter may be fixed."""
+"""Component of the weakest direction, as a fraction of the largest, above which a parameter may be held."""
 
 _RESISTS: Final = 1.0
-"""Largest increase of the weighted sum of squares (one standard error) that fixing a parameter may cause."""
+"""Largest increase of the weighted sum of squares (one standard error) that holding a parameter may cause."""
 
 _DIFFERENCES: Final = 1e-9
 """Error of finite-difference derivatives, as a fraction of the largest datum magnitude."""
 
 
 class Law(Protocol):
-    """Model to fit: data as a function of parameters."""
+    """Interface of a law to fit: predicted data as a function of parameters."""
 
     def value(self, p: FloatArray) -> FloatArray:
         """Return the predicted data, shape (m,)."""
@@ -143,10 +143,10 @@ class Solution(Declared, eq=False):
 
 
 class NoSolutionError(ArithmeticError):
-    """No parameters fit the data; `row` is the row with the largest deviation from the initial prediction."""
+    """Raised if no parameters fit the data; `row` deviates most from the initial prediction."""
 
     def __init__(self, row: int) -> None:
-        super().__init__(f"no parameters of the law come near the data, row {row} lies farthest off")
+        super().__init__(f"the law does not fit the data: row {row} deviates most")
         self.row = row
 
 
@@ -154,8 +154,8 @@ def solve(law: Law, data: FloatArray, start: FloatArray | Parameters, *, robust:
     """Fit a law to data, shape (m,), with more rows than parameters, from an initial guess.
 
     A robust fit excludes outliers, but never all rows that determine a parameter. A parameter that the data
-    do not determine, or that runs into a bound, is held and the others are fitted again; the weakest right
-    singular vector of the scaled Jacobian selects it.
+    do not determine, or that runs into a bound, is held and the fit is repeated; the weakest right
+    singular vector of the scaled Jacobian selects the parameter.
 
     Raises
     ------
@@ -182,7 +182,7 @@ def solve(law: Law, data: FloatArray, start: FloatArray | Parameters, *, robust:
 def _finite_solution(
     law: Law, data: FloatArray, space: Parameters, start: FloatArray, free: BoolArray, robust: bool
 ) -> Solution | None:
-    # A gross outlier can make the first, non-robust fit diverge; the second attempt skips that fit.
+    # A gross outlier can make the plain first fit diverge; the second attempt omits that fit.
     for plain_first in (True, False) if robust else (True,):
         with np.errstate(all="ignore"):
             try:
@@ -204,7 +204,7 @@ def _at_bound(solution: Solution) -> BoolArray:
 
 
 def _next_held(solution: Solution, data: FloatArray) -> int | None:
-    """Return the index of the next parameter to fix; None if the data determine all free parameters."""
+    """Select the next parameter to hold; return its index, or None if the data determine all free ones."""
     space, free = solution.parameters, np.flatnonzero(solution.free)
     bound = [k for k in free.tolist() if _at_bound(solution)[k]]
     if bound:
@@ -222,12 +222,12 @@ def _next_held(solution: Solution, data: FloatArray) -> int | None:
     if singular[-1] >= limit:
         return None
     parts = np.abs(directions[-1])
-    # Of correlated parameters the last is held, since laws list their main constants first.
+    # Of correlated parameters the last one is held, since laws list their main constants first.
     return int(free[np.flatnonzero(parts > _TIED * parts.max())[-1]])
 
 
 def _held_at(law: Law, data: FloatArray, solution: Solution, free: BoolArray, held: int) -> FloatArray:
-    """Fix a parameter at its default, or at its estimate if the data exclude the default, and refit."""
+    """Hold a parameter at its default, or at its estimate if the data exclude the default; refit the rest."""
     p, space = solution.p.copy(), solution.parameters
     if _at_bound(solution)[held]:
         return p
@@ -283,7 +283,7 @@ def _solve(
             inside = _inside(jacobian[:, free], residuals, variance, used)
             inside = _with_determining_rows(_weighted_jacobian(jacobian, variance, None, space, free), inside)
             if inside.tobytes() in tried:
-                # Rows that alternate between in and out stay out.
+                # Rows that alternate between used and excluded stay excluded.
                 inside &= used
             tried.add(inside.tobytes())
         else:

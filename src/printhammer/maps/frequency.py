@@ -53,7 +53,7 @@ LAYOUT: Final = {
 """Unit, meaning and dimensions of each variable of a map, by name."""
 
 PLACES: Final = {"backstop": "backstop_m", "pack": "pack_front_m", "platen": "platen_m"}
-"""Attributes of a map that hold the positions of backstop, pack and platen, m, by surface."""
+"""Attribute of a map that contains the position of backstop, pack or platen, m, by surface."""
 
 
 def map_dataset(
@@ -84,7 +84,7 @@ def places_of(chart: xr.Dataset) -> dict[str, float]:
 
 
 def failed_rates(chart: xr.Dataset) -> dict[str, list[float]]:
-    """Return the rates of the runs that stopped early, Hz, by the name of their status."""
+    """Return the firing rates of the runs that ended early, Hz, by name of the status."""
     if "status" not in chart:
         return {}
     codes = str(chart["status"].attrs.get("codes", ""))
@@ -97,7 +97,7 @@ def failed_rates(chart: xr.Dataset) -> dict[str, list[float]]:
 
 
 def hammer_attributes(hammer: Hammer) -> dict[str, Any]:
-    """Return the map attributes that describe a hammer: origin of its constants, and surface positions."""
+    """Return the map attributes that describe a hammer: status of its constants, and surface positions."""
     statuses = {constant.status for constant in hammer.constants.values()}
     guessed = [status for status in ("reconstructed", "assumed") if status in statuses]
     places = {"backstop": hammer.position, "pack": hammer.front, "platen": hammer.platen}
@@ -136,7 +136,7 @@ def interpolated(at: npt.ArrayLike, values: npt.ArrayLike, times: FloatArray) ->
     result = samples[left] + share * (samples[right] - samples[left])
     exact = known[right] == times
     result[exact] = samples[right[exact]]
-    # Tolerance for rounding: times at the ends of the samples are not beyond them.
+    # Allow for rounding: a time at an end of the samples is not outside.
     room = 1e-12 * max(abs(known[0]), abs(known[-1]))
     result[(times < known[0] - room) | (times > known[-1] + room)] = np.nan
     return result
@@ -155,7 +155,7 @@ TIMES: Final = 512
 """Default number of times of a map; arbitrary."""
 
 TAIL: Final = 1e-3
-"""Default time shown after the last firing at the lowest rate, s; arbitrary. Longer for slow devices."""
+"""Default time simulated after the last firing at the lowest rate, s; longer for slow devices. Arbitrary."""
 
 MOST_CELLS: Final = 200_000_000
 """Largest number of cells of a map; arbitrary, catches typing errors in rates and times."""
@@ -241,7 +241,7 @@ def frequency_map(
 
 
 def tail_of(hammer: Hammer, waveform: Waveform) -> float:
-    """Return the default time shown after the last firing at the lowest rate of a map, s.
+    """Return the default time to simulate after the last firing at the lowest rate of a map, s.
 
     For a slow device the time is extended to cover the response to the last firing.
     """
@@ -318,7 +318,7 @@ def _spacing(times: FloatArray) -> float:
 
 
 def default_rates(hammer: Hammer, waveform: Waveform | None = None, count: int = RATES) -> FloatArray:
-    """Return the default rates of a device's map, Hz: scaled from those of the paper's hammer."""
+    """Return the default rates of a map, Hz: those of the paper's hammer, scaled to the device."""
     lowest, highest = (scaled_rate(hammer, rate, waveform) for rate in (LOWEST, HIGHEST))
     return np.linspace(lowest, highest, count)
 

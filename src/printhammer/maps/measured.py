@@ -229,7 +229,7 @@ def _common_times(records: list[RateRecord]) -> FloatArray:
     start = min(float(record.times[0]) for record in records)
     end = max(float(record.times[-1]) for record in records)
     closest = min(float(np.median(np.diff(record.times))) for record in records)
-    # Allow for rounding, so that evenly spaced samples are their own grid.
+    # Allow for rounding, so that the grid of evenly spaced samples is the samples themselves.
     count = int(min(np.ceil((end - start) / closest * (1.0 - 1e-9)), MOST_TIMES - 1)) + 1
     return np.linspace(start, end, count)
 

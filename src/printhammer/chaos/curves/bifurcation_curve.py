@@ -1,6 +1,6 @@
 """Bifurcation curves in a plane of two parameters, continued from events of branches or from saved curves.
 
-A `BifurcationCurve` holds the points at which an orbit bifurcates, and its points of codimension two.
+A `BifurcationCurve` contains the points at which an orbit bifurcates, and the points of codimension two.
 
 `settled_plane` computes the periods of trains from rest on a grid of the plane, as an ensemble.
 """

@@ -237,7 +237,7 @@ class _Chart:
         """Locate stability limits of branches in the second parameter, started at orbits of the branch."""
         branch, values = self.branch, self.branch.values
         low, high = float(values.min()), float(values.max())
-        # A stable orbit is preferred: stability is lost at its limits.
+        # Prefer a stable orbit: its branch loses stability at its limits.
         among = np.flatnonzero(branch.stable) if branch.stable.any() else np.arange(len(values))
         aims = [low + place * (high - low) for place in _ACROSS]
         numbers = dict.fromkeys(int(among[np.argmin(np.abs(values[among] - aim))]) for aim in aims)
@@ -300,6 +300,6 @@ class _Chart:
         with np.errstate(invalid="ignore", divide="ignore"):
             shares = np.clip(((place - points[:-1]) * along).sum(axis=1) / lengths, 0.0, 1.0)
         feet = points[:-1] + np.nan_to_num(shares)[:, np.newaxis] * along
-        # The distance of a chord from its curve is a small fraction of its length.
+        # A chord deviates from its curve by a small fraction of the length of the chord.
         near = np.sqrt(((feet - place) ** 2).sum(axis=1)) <= 0.1 * np.sqrt(lengths) + SAME
         return bool(near.any())

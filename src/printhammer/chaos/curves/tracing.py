@@ -192,7 +192,7 @@ class CurveTracer:
         return np.array([surface, unknown[1]])
 
     def watch(self, system: System) -> Watch:
-        """Build the callback that decides, between two points, whether the curve ends."""
+        """Build the callback that ends a curve between two nodes: lost, grazing, resonance or bound."""
         low, high = self.plane.bounds[0]
         corrector = Corrector(system, system.scales, self.steps.precision)
         place = system.scales.size - 2

@@ -55,7 +55,7 @@ class Waveform(BaseModel):
 
     shape: ClassVar[str]
     code: ClassVar[int] = tables.SAMPLED
-    """Code of the shape in `printhammer.drive.tables`, for shapes that have a table of a few segments."""
+    """Code of the shape in `printhammer.drive.tables`, for shapes with a table of a few segments."""
     quantity: QuantityName = "current"
 
     if not TYPE_CHECKING:
@@ -139,5 +139,5 @@ class Waveform(BaseModel):
         return Supply()
 
     def content(self) -> dict[str, FloatArray]:
-        """Return the arrays that identify the waveform besides its fields, e.g. samples."""
+        """Return the arrays that identify the waveform in addition to its fields, e.g. samples."""
         return {}

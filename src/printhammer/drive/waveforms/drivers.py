@@ -7,7 +7,7 @@ voltage to zero, and stays zero until the coil drives it again.
 
 `Switched` is a current switched between levels by a driver of finite speed.
 
-After each switching the current approaches its new level exponentially, with one time constant, as in a coil
+After each switching the current approaches its new level exponentially with one time constant, as in a coil
 behind a driver that holds a voltage. It never exceeds the largest level, since every value is a weighted mean
 of the old and the new level.
 """
@@ -108,8 +108,8 @@ class Chopper(_Driver):
     shape: ClassVar[str] = "chopper"
     code: ClassVar[int] = tables.CHOPPER
     upper: float = measured("A", "Iu", "current at which the chopper switches off", gt=0.0)
-    lower: float | None = measured("A", "Il", "current at which it switches on again", gt=0.0, default=None)
-    off_time: float | None = measured("s", "to", "time for which it stays off", gt=0.0, default=None)
+    lower: float | None = measured("A", "Il", "current at which the chopper turns on", gt=0.0, default=None)
+    off_time: float | None = measured("s", "to", "time for which the chopper is off", gt=0.0, default=None)
 
     @model_validator(mode="after")
     def _thresholds(self) -> Self:
@@ -126,8 +126,8 @@ class PeakAndHold(_Driver):
     shape: ClassVar[str] = "peak-and-hold"
     code: ClassVar[int] = tables.PEAK_AND_HOLD
     peak_time: float = measured("s", "tp", "time of the full supply", gt=0.0)
-    hold_upper: float = measured("A", "Iu", "upper current while it holds", gt=0.0)
-    hold_lower: float = measured("A", "Il", "lower current while it holds", gt=0.0)
+    hold_upper: float = measured("A", "Iu", "upper current of the hold phase", gt=0.0)
+    hold_lower: float = measured("A", "Il", "lower current of the hold phase", gt=0.0)
 
     @model_validator(mode="after")
     def _thresholds(self) -> Self:
@@ -141,7 +141,7 @@ class PeakAndHold(_Driver):
 
 
 class Capacitor(_Driver):
-    """Capacitor driver: a capacitor, always being charged, discharges through the coil for the width."""
+    """Capacitor driver: a continuously charged capacitor discharges through the coil for the width."""
 
     shape: ClassVar[str] = "capacitor"
     code: ClassVar[int] = tables.CAPACITOR
@@ -162,7 +162,7 @@ class Bridge(_Driver):
 DRIVERS: tuple[type[Waveform], ...] = (Rail, Chopper, PeakAndHold, Capacitor, Bridge)
 """Waveform classes of the coil drivers."""
 
-_KEPT: Final = 256  # Cached tables; arbitrary
+_KEPT: Final = 256  # Number of cached segment tables; arbitrary
 
 
 class Switched(Waveform):
@@ -171,7 +171,7 @@ class Switched(Waveform):
     Attributes
     ----------
     at : tuple of float
-        Times of the switchings since the firing, s or strings with units, ascending, the first one not
+        Switching times since the firing, s or strings with units, ascending, the first one not
         negative.
     levels : tuple of float
         Level after each switching, A, or strings with units; in N for a force. The last level is 0.
@@ -203,7 +203,7 @@ class Switched(Waveform):
 
     @model_validator(mode="after")
     def _check_order(self) -> Self:
-        """Check that the switchings ascend and end at zero."""
+        """Check that the switching times ascend and that the last level is zero."""
         if not self.at or len(self.at) != len(self.levels):
             raise InputError(
                 f"levels = {list(self.levels)}",
@@ -225,7 +225,7 @@ class Switched(Waveform):
         return self
 
     def segments(self) -> FloatArray:
-        """Return the segment table: an exponential for each switching."""
+        """Return the segment table: one exponential per switching."""
         return switched_table(self.at, self.levels, self.edge, self.initial)
 
     def scaled(self, factor: float) -> Self:

@@ -23,7 +23,7 @@ from printhammer.support.tables.readings import read_table
 
 _UNITS: Final[dict[str, str]] = {name: si for si, name in QUANTITY_UNITS.items()}
 _HEADINGS: Final = "'time [us],current [A]' or 'time [us],force [N]'"
-_EDGE: Final = 1e-9  # Length of the edges of a record of levels, s; arbitrary, below any driver's
+_EDGE: Final = 1e-9  # Duration of an edge between recorded levels, s; arbitrary, shorter than any driver's
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ def read_csv(path: Path) -> Samples:
 
 
 def _held(times: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Hold each level until the next row, by a copy of the level just before that row."""
+    """Hold each level up to the next row: repeat it just before the time of that row."""
     before = times[1:] - min(_EDGE, 0.5 * float(np.diff(times).min()))
     order = np.argsort(times := np.concatenate([times, before]))
     return times[order], np.concatenate([values, values[:-1]])[order]

@@ -30,13 +30,13 @@ TAIL: Final = 1e-3
 """Largest remainder of a decaying waveform that the next waveform may cut off, relative to the peak."""
 
 _SAMPLES: Final = 257  # Samples of the remaining waveform; arbitrary
-_ROUNDING: Final = 1e-14  # Relative difference of times that counts as rounding
+_ROUNDING: Final = 1e-14  # Relative difference between times that counts as rounding
 
 
 class Chain(Waveform):
     """Several consecutive waveforms in one firing, each at an offset; the drive is zero between them.
 
-    `parts` holds pairs of the offset, s or a string with a unit, and the waveform, in ascending order; all
+    `parts` are pairs of the offset, s or a string with a unit, and the waveform, in ascending order; all
     are currents or all are forces. A part may begin once the part before has ended or decayed to `TAIL` of
     its peak; the remainder is cut off. The edges of a part lie at the rounded sums of offset and edge.
     """
@@ -47,7 +47,7 @@ class Chain(Waveform):
     @model_validator(mode="before")
     @classmethod
     def _read_parts(cls, data: Any) -> Any:
-        """Validate the waveforms one by one; the chain drives the same quantity as its waveforms."""
+        """Validate the waveforms one by one; the driven quantity of the chain is that of its waveforms."""
         if not isinstance(data, dict) or "parts" not in data:
             return data
         parts = _validate(data["parts"])
@@ -77,7 +77,7 @@ class Chain(Waveform):
         for offset, part in self.parts:
             own = [tuple(float(number) for number in row) for row in part.segments()]
             while rows and offset <= rows[-1][0]:
-                # The remainder of the previous waveform is cut off here.
+                # The remainder of the preceding waveform is cut off here.
                 rows.pop()
             rows += [(offset + start, *rest) for start, *rest in own]
         return table(rows[:-1], rows[-1][0])
@@ -88,7 +88,7 @@ class Chain(Waveform):
 
 
 def _validate(parts: object) -> tuple[tuple[float, Waveform], ...]:
-    """Return the validated offsets, s, and waveforms; no waveform begins before the previous one is over."""
+    """Validate offsets, s, and waveforms; no waveform may begin before the preceding one is over."""
     try:
         pairs = [tuple(pair) for pair in parts]  # type: ignore[attr-defined]
     except TypeError:
@@ -127,9 +127,9 @@ def _validate(parts: object) -> tuple[tuple[float, Waveform], ...]:
 def _is_over(begun: float, waveform: Waveform, time: float) -> bool:
     """Whether a waveform that began at `begun`, s, has ended or decayed to its tail by `time`, s."""
     segments = waveform.segments()
-    # The circuit of the coil remains after the supply of a driver ends.
+    # A driver's circuit carries current after the supply is off.
     end = waveform.support
-    # Rounding may place the end slightly after the beginning of the next one.
+    # Rounding may place the end slightly after the beginning of the next waveform.
     if time >= begun + end or math.isclose(time, begun + end, rel_tol=_ROUNDING):
         return True
     if time <= begun or waveform.replaces:

@@ -1,4 +1,4 @@
-"""Bifurcation diagrams: states at the firings against a parameter; bands below classify the motion."""
+"""Figures of bifurcation diagrams: states at the firings against a parameter, and classification bands."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def plot(
         raise InputError(
             "the diagram has no states to draw",
             key="states",
-            expected="at least one run that got to its points",
+            expected="at least one run that reaches its recorded firings",
         )
     figure = new_figure(4.8)
     bands = len(diagram.directions)

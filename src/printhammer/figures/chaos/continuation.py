@@ -1,4 +1,4 @@
-"""Branches of periodic orbits against a parameter: stable solid, unstable dashed, branch points marked."""
+"""Figures of branches of periodic orbits against a parameter: stable solid, unstable dashed."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def axis_of(name: str, si: str) -> tuple[str, float]:
 
 
 def draw(ax: Axes, branch: Branch, show: str, factors: tuple[float, float]) -> None:
-    """Draw the lines of a branch, solid where it is stable; `factors` scale parameter and quantity."""
+    """Draw a branch as lines, solid where stable; `factors` convert parameter and quantity to axis units."""
     values, table, stable = _with_points(branch, show)
     colour = colour_of(branch.firings)
     begin = 0
@@ -138,7 +138,7 @@ def _with_points(branch: Branch, show: str) -> tuple[FloatArray, FloatArray, lis
 
 
 def _at_event(branch: Branch, event: Any, table: FloatArray) -> FloatArray:
-    """Return a quantity at an event of a branch, interpolated along the arc length."""
+    """Interpolate a quantity at an event of a branch, along the arc length."""
     i, nodes = event.after, branch.curve.nodes
     span = nodes[i + 1].arc - nodes[i].arc
     share = min(max((event.point.node.arc - nodes[i].arc) / span, 0.0), 1.0) if span > 0.0 else 0.5

@@ -1,4 +1,4 @@
-"""Bifurcation curves in the plane of two parameters, over the attractors of trains from rest.
+"""Figures of bifurcation curves in the plane of two parameters, over the attractors of trains from rest.
 
 `plot_chart` draws a stability chart: the limits of an orbit, and the trains from rest that settle to its
 period.

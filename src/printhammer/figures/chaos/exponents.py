@@ -1,4 +1,4 @@
-"""Lyapunov exponents: running estimates for one train, charts of many trains, and the 0-1 test.
+"""Figures of Lyapunov exponents: running estimates of a train, charts of many trains, and the 0-1 test.
 
 `plot_correlation` draws correlation sums and their local slopes against the distance, with the plateau.
 
@@ -93,7 +93,7 @@ def _running(ax: Axes, counts: Any, means: FloatArray, errors: FloatArray, colou
     reach = _SIGMAS * errors[sure]
     band = (means[sure] - reach, means[sure] + reach)
     ax.fill_between(counts[sure], *band, color=colour, alpha=0.18, lw=0.0, zorder=2.0, gid="band")
-    # The first few firings have no meaning and do not set the limits.
+    # Estimates over the first few firings are meaningless and do not set the limits.
     settled = sure & (counts >= counts[-1] // 20)
     if settled.any():
         low = float((means - _SIGMAS * np.where(sure, errors, 0.0))[settled].min())

@@ -1,4 +1,4 @@
-"""Periodic orbits in the plane of displacement and velocity, over strobe points, and against time."""
+"""Figures of periodic orbits: over strobe points in the plane of states, and against time."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray
 
 POINTS: Final = 600
-"""Number of strobe points drawn below the orbits, after discarding a third as many firings."""
+"""Number of strobe points drawn under the orbits; a third as many firings are discarded before them."""
 
 _MARKS: Final = (("o", style.BLUE), ("s", style.ORANGE), ("^", style.GREEN), ("D", style.YELLOW))
 """Marker and colour of orbits of 1, 2, 3 and 4 firings."""

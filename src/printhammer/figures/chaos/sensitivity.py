@@ -1,4 +1,4 @@
-"""Bar charts of sensitivities, sorted by magnitude, one panel per quantity."""
+"""Figures of sensitivities: bar charts sorted by magnitude, one panel per quantity."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def plot(
         of_dot = f", dot {number + 1}" if name in table.quantities and len(table.dots) > 1 else ""
         heading(ax, name.replace("_", " ") + of_dot)
         if place >= len(quantities) - columns:
-            ax.set_xlabel("change in % for 1 % of the constant", fontsize=style.SMALL)
+            ax.set_xlabel("Change in % per 1 % of the constant", fontsize=style.SMALL)
     remarks = [] if table.ok else [f"The run ended early: {table.status}."]
     if not table.smooth:
         remarks.append("The armature touches a surface at zero velocity: the later motion has no derivative.")

@@ -1,4 +1,4 @@
-"""Strobe points in the plane of displacement and velocity: for one train, or as a panel of Fig. 11.
+"""Figures of strobe points in the plane of displacement and velocity: one train, or a panel of Fig. 11.
 
 `plot_section` draws an impact map: velocity at touch against the time since the last firing.
 
@@ -53,7 +53,7 @@ RING: Final[dict[str, Any]] = {
     "mfc": "none",
     "mec": style.ORANGE,
 }
-"""Line style of the rings around the last points of a periodic train."""
+"""Style of the rings around the last points of a periodic train."""
 
 
 @styled

@@ -1,4 +1,4 @@
-"""Dead time, and pulses of equal impact speed, against rail voltage and temperature.
+"""Figures of a coil: dead time and pulses of equal impact speed, against rail voltage and temperature.
 
 `plot_duty` draws the highest continuous rate of a coil against the ambient temperature.
 
@@ -49,7 +49,7 @@ def plot_dead_time(table: DeadTime) -> Figure:
     widths.set_ylabel("Width  [ms]")
     widths.set_xlabel("Rail  [V]")
     times.legend(fontsize=style.SMALL, loc="best", frameon=False)
-    heading(times, f"Equal impact speed, {table.blow:.3g} m/s; dashed: own pulse")
+    heading(times, f"Equal impact speed, {table.blow:.3g} m/s; dashed: nominal pulse")
     widths.set_xlim(*times.get_xlim())
     sign(figure, table.hammer)
     return figure
@@ -74,7 +74,7 @@ def plot_duty(duty: ThermalDuty) -> Figure:
 
 @styled
 def plot_limit(limit: ThermalLimit) -> Figure:
-    """Draw stated rates against the ambient temperature, and a line per rail voltage to the fitted limit."""
+    """Draw stated rates against the ambient temperature, and the fitted limit as a line per rail voltage."""
     figure, ax = new_panel(3.4)
     for number, rail in enumerate(np.unique(limit.voltage).tolist()):
         rows = limit.voltage == rail

@@ -1,4 +1,4 @@
-"""Feedback compared with other drives: deviations of dots, and a single run; bursts of least work.
+"""Figures of feedback, compared with other drives, and of bursts of least work.
 
 `plot_burst` draws motion, current and energies of a burst of least work, `plot_rates` the work against the
 rate.
@@ -74,7 +74,7 @@ def plot(feedback: Feedback) -> Figure:
 
 
 def _style_of(feedback: Feedback, number: int) -> tuple[str, str]:
-    """Return colour and marker of a strategy by its number; the last strategy is feedback."""
+    """Return colour and marker of a strategy by index; the last strategy is feedback."""
     if number == len(feedback.strategies) - 1:
         return style.BLUE, "o"
     return _COLOURS[number % len(_COLOURS)], _MARKS[number % len(_MARKS)]
@@ -201,7 +201,7 @@ def plot_burst(burst: LeastWork) -> Figure:
 def _ledger(ax: Axes, burst: LeastWork) -> None:
     absorbed = burst.ledger.pack_loss
     if not absorbed > 0.0:
-        ax.text(0.5, 0.5, "The pack absorbed nothing.", ha="center", va="center", transform=ax.transAxes)
+        ax.text(0.5, 0.5, "The pack absorbed no energy.", ha="center", va="center", transform=ax.transAxes)
         ax.set_axis_off()
         return
     bars = [

@@ -1,4 +1,4 @@
-"""Compensation tables, and their gains and losses relative to open loop.
+"""Figures of compensation tables, and of their gains and losses relative to open loop.
 
 `plot_learning` draws the dots before, during and after learning.
 """
@@ -24,7 +24,7 @@ from printhammer.printing.rates.quality import PITCH
 from printhammer.support.arrays import FloatArray
 from printhammer.units import from_si
 
-_FEW: Final = 4  # Number of rates from which curves replace maps; arbitrary
+_FEW: Final = 4  # Number of rates from which on curves replace maps; arbitrary
 _LINES: Final = (style.BLUE, style.ORANGE, style.GREEN, style.YELLOW)
 _MICROSECONDS: Final = Scale("", "s", "us")
 _BINS: Final = 41  # Bins of a histogram, odd so that one is centred at zero; arbitrary
@@ -133,7 +133,7 @@ def plot_report(report: TableReport) -> Figure:
 
 
 def _histogram(ax: Axes, values: FloatArray, limit: float, name: str) -> None:
-    """Draw histograms of deviations in open loop and with the table; end bins hold all beyond 3 limits."""
+    """Draw histograms of deviations in open loop and with the table; end bins include all beyond 3 limits."""
     edges = np.linspace(-3.0 * limit, 3.0 * limit, _BINS + 1)
     ax.axvspan(-limit, limit, color=style.FAINT, lw=0.0, zorder=0)
     for row, colour, look in zip(values, (style.ORANGE, style.BLUE), ("--", "-"), strict=True):
@@ -145,12 +145,12 @@ def _histogram(ax: Axes, values: FloatArray, limit: float, name: str) -> None:
     ax.set_ylabel("Dots of the cycle")
 
 
-_FIRST: Final = LEAD_IN + 128  # First slot drawn: from here on dots and gaps are mixed
+_FIRST: Final = LEAD_IN + 128  # First slot drawn, after the lead-in, where dots and gaps are mixed
 _SLOTS: Final = 88  # Number of slots drawn; arbitrary
 _HEIGHT: Final = 0.42  # Height of a line, inches; arbitrary
 _SIZE: Final = 20.0  # Area of a dot of nominal force; arbitrary
-_CONTRAST: Final = 4.0  # Exaggeration of the force in the area of a dot; arbitrary
-_SMALLEST: Final = 0.1  # Smallest area, as a fraction of that of nominal force; arbitrary
+_CONTRAST: Final = 4.0  # Factor by which the area of a dot exaggerates its force deviation; arbitrary
+_SMALLEST: Final = 0.1  # Smallest area of a dot, as a fraction of the area at nominal force; arbitrary
 
 
 @styled

@@ -48,7 +48,7 @@ def places(hammer: Hammer) -> dict[str, float]:
 
 
 def times_of(motion: Motion, start: float | None = None, end: float | None = None) -> FloatArray:
-    """Return the plot times of a motion, s: uniform times, integration steps, contacts and extrema."""
+    """Return the times at which to plot a motion, s: a uniform grid, steps, contacts and extrema."""
     start = motion.start if start is None else max(start, motion.start)
     end = motion.end if end is None else min(end, motion.end)
     steps = motion.step_times
@@ -82,7 +82,7 @@ def orbit(motion: Motion, times: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def settled_at(motion: Motion) -> float:
-    """Return the time, s, after which the armature stays within `SETTLED` of its final position."""
+    """Return the time, s, from which on the armature stays within `SETTLED` of its final position."""
     times = times_of(motion)
     x, _v = motion.at(times)
     room = SETTLED * float(np.ptp(x))
@@ -91,13 +91,13 @@ def settled_at(motion: Motion) -> float:
 
 
 def shown_until(motion: Motion) -> float:
-    """Return the end of the time axis, s, for a motion that settles: rounded up, with a margin."""
+    """Return the end of the time axis for a motion that settles, s: rounded up, with a margin."""
     step = 10.0 ** math.floor(math.log10(motion.end)) / 4.0
     return float(min(motion.end, step * math.ceil(1.1 * settled_at(motion) / step)))
 
 
 def reach(hammer: Hammer) -> tuple[float, float]:
-    """Return the range of displacement, m, over which static forces are drawn.
+    """Return the range of displacement for plots of static forces, m.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Elements of the figures of frequency-time maps: scales, firings, lost dots, colour bar."""
+"""Elements of the figures of frequency-time maps: scales, firing lines, lost dots, colour bar."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ LOST: Final = "lost dots"
 """SVG id of the marks of lost dots."""
 
 FEW: Final = 50
-"""Number of rates below which firings and lost dots are marked separately in the row of each rate."""
+"""Number of rates below which each rate's firings and lost dots are marked in its own row; arbitrary."""
 
 UNKNOWN: Final = "#e4e4e4"
 """Colour of map cells without a displacement."""
@@ -39,7 +39,7 @@ UNKNOWN: Final = "#e4e4e4"
 LOWEST, HIGHEST, RATES, TIMES = 500.0, 2500.0, 640, 1024
 """Defaults of Figs. 8 and 9: lowest and highest rate, Hz, and the numbers of rates and of times."""
 
-_KILO: Final = 1e3  # Rate from which the axis is in kHz, Hz
+_KILO: Final = 1e3  # Highest rate of a map, Hz, from which on its axis is in kHz
 _LOST: Final = 2.0  # Width of the lines of lost dots, points
 
 
@@ -59,7 +59,7 @@ def chart_of(
 
 
 def drawable(chart: xr.Dataset) -> xr.Dataset:
-    """Return a map if it can be drawn; raise InputError if it has fewer than two times."""
+    """Check that a map can be drawn; return the map, or raise InputError for fewer than two times."""
     if chart["time"].size < 2:
         raise InputError(
             f"the map has {chart['time'].size} times", key="times", expected="at least 2 to draw it"
@@ -68,7 +68,7 @@ def drawable(chart: xr.Dataset) -> xr.Dataset:
 
 
 def edges(centres: FloatArray) -> FloatArray:
-    """Compute the cell borders around ascending centres, one more than there are centres."""
+    """Compute the borders of the cells around ascending centres, one more than centres."""
     if len(centres) == 1:
         return np.asarray([0.98 * centres[0], 1.02 * centres[0]], dtype=np.float64)
     middle = 0.5 * (centres[1:] + centres[:-1])
@@ -87,7 +87,7 @@ class Scales:
 
 
 def scales_of(*charts: xr.Dataset) -> Scales:
-    """Return scales common to several maps; the colour scale covers all displacements."""
+    """Build the axis scales common to several maps, and a colour scale for all their displacements."""
     from matplotlib.colors import Normalize
 
     low, high = limits_of(*charts)
@@ -169,7 +169,7 @@ def _strokes(
     borders: FloatArray,
     rows: npt.NDArray[np.intp] | slice = slice(None),
 ) -> tuple[FloatArray, FloatArray]:
-    """Return line segments through the cells of rows, from lower to upper border, separated by NaN."""
+    """Build line segments through the cells of rows, from lower to upper border, separated by NaN."""
     centre, place, slope = rates[rows], at[rows], slopes[rows]
     ends = np.column_stack([borders[:-1][rows], borders[1:][rows], np.full_like(centre, np.nan)])
     across = place[:, np.newaxis] + slope[:, np.newaxis] * (ends - centre[:, np.newaxis])
@@ -224,7 +224,7 @@ def colour_bar(ax: Axes, chart: xr.Dataset, scales: Scales) -> None:
 
 
 def failures(chart: xr.Dataset) -> str:
-    """Describe how many runs of a map stopped early, and why; empty if all runs are complete."""
+    """Describe how many runs of a map ended early, by status; empty if all runs are complete."""
     failed = {name: len(rates) for name, rates in failed_rates(chart).items()}
     if not failed:
         return ""

@@ -33,13 +33,13 @@ from printhammer.run.motion import Motion
 from printhammer.support.arrays import FloatArray
 
 CURVE: Final = "curve:"
-"""Prefix of the label of every line that labels and insets must not cover."""
+"""Label prefix of the curves that texts and insets must not cover."""
 
-_SPACING: Final = 0.004  # Distance between points on a curve, fraction of the axes: less than a label
+_SPACING: Final = 0.004  # Spacing of points on a curve, as a fraction of the axes; smaller than any label
 
 
 def occupied(ax: Axes) -> FloatArray:
-    """Return points along the curves of a panel, as fractions of the axes, shape (n, 2).
+    """Sample points along the curves of a panel, as fractions of the axes, shape (n, 2).
 
     The points are dense enough that no label fits between two of them.
     """
@@ -61,7 +61,7 @@ def occupied(ax: Axes) -> FloatArray:
 def freest(
     points: FloatArray, size: tuple[float, float], corners: Iterable[tuple[float, float]]
 ) -> tuple[tuple[float, float], int]:
-    """Find the first box that covers no points, or else the box that covers the fewest.
+    """Find the first box that covers no points, or else the box that covers the fewest points.
 
     `points`, shape (n, 2), `size` (width and height of the box) and `corners` (lower left, best first) are
     fractions of the axes. The corner and the number of covered points are returned.
@@ -85,7 +85,7 @@ HALO: Final[dict[str, Any]] = {"facecolor": "white", "edgecolor": "none", "alpha
 
 ALONG_X: Final = ("data", "axes fraction")
 ALONG_Y: Final = ("axes fraction", "data")
-"""Coordinates of annotations: x as a fraction of the axes, y in data units; `ALONG_X` is the reverse."""
+"""Annotation coordinates: x in data units and y as a fraction of the axes, or the reverse."""
 
 _LINE_NAME: Final = (0.095, 0.06)
 """Width and height of a name on a horizontal line, as fractions of the axes; arbitrary."""
@@ -95,7 +95,7 @@ _BELOW: Final = 30.0
 
 
 def place_lines(ax: Axes, hammer: Hammer, shown: Scale, side: Literal["x", "y"] = "y") -> None:
-    """Draw lines at the positions of backstop, pack and platen; vertical lines are labelled.
+    """Draw lines at the positions of backstop, pack and platen; label vertical lines.
 
     `side` is the axis of the displacement; the limits of the axes must be set already.
     """
@@ -111,7 +111,7 @@ def place_lines(ax: Axes, hammer: Hammer, shown: Scale, side: Literal["x", "y"] 
 
 
 def name_lines(ax: Axes, hammer: Hammer, shown: Scale) -> None:
-    """Label the horizontal position lines by name, near the right edge and away from curves."""
+    """Label the horizontal position lines near the right edge, away from curves."""
     low, high = ax.get_ylim()
     points = occupied(ax)
     for name, place in places(hammer).items():
@@ -138,7 +138,7 @@ def name_lines(ax: Axes, hammer: Hammer, shown: Scale) -> None:
 
 
 def note(ax: Axes, text: str, at: tuple[float, float], **options: Any) -> Text:
-    """Write a small remark at a position given as fractions of the axes."""
+    """Write a small remark at a position in fractions of the axes."""
     style = {"fontsize": SMALL, "color": MUTED, "va": "top", "ha": "left", "zorder": 5.0, **options}
     return ax.text(*at, text, transform=ax.transAxes, **style)
 
@@ -173,7 +173,7 @@ def dots(ax: Axes, x: npt.ArrayLike, y: npt.ArrayLike, size: float, color: str, 
 
 
 def dashed(line: Callable[..., Any], *levels: float, **options: Any) -> None:
-    """Draw thin dashed lines at levels with the method `axhline` or `axvline` of the axes (`line`)."""
+    """Draw thin dashed lines at `levels`; `line` is the method `axhline` or `axvline` of the axes."""
     for level in levels:
         line(level, **{"color": MUTED, "lw": HAIR, "ls": (0, (4, 3)), **options})
 
@@ -242,7 +242,7 @@ def arrows(
         at = (k + first) / count * length[-1]
         row = int(np.clip(np.searchsorted(length, at), 1, len(x) - 1))
         back = row - 1
-        # A head needs a direction: extend the chord backwards until it is long enough.
+        # An arrow head needs a direction: extend the chord backwards until it is long enough.
         while back > 0 and length[row] - length[back] < 0.02:
             back -= 1
         ax.annotate(

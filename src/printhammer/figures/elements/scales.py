@@ -20,7 +20,7 @@ class Scale(Declared):
     """Scale of an axis: name, SI unit, display unit, and display unit of the secondary axis."""
 
     label: str = part("name on the axis")
-    si: str = part("SI unit of the numbers inside")
+    si: str = part("SI unit of the data")
     unit: str = part("display unit of the numbers on the axis")
     other: str = part("display unit of the secondary axis; empty without such an axis", default="")
 
@@ -61,7 +61,7 @@ _SCALES: Final[dict[str, tuple[tuple[float, Scale], ...]]] = {
 
 
 def scale(name: Name, largest: float = 0.0) -> Scale:
-    """Return the scale of a quantity for values up to a largest magnitude, SI, with a suitable unit."""
+    """Choose the scale of a quantity, with display units suited to magnitudes up to `largest`, SI."""
     return next(shown for limit, shown in _SCALES[name] if largest <= limit)
 
 

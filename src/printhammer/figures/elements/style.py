@@ -88,7 +88,7 @@ RC: Final[dict[str, Any]] = {
 
 
 def in_style() -> AbstractContextManager[None]:
-    """Return a context in which matplotlib uses the settings of the style."""
+    """Return a context in which matplotlib uses the settings `RC`."""
     from matplotlib import rc_context
 
     settings: Any = RC  # The type stub of matplotlib lists every setting by name.
@@ -124,7 +124,7 @@ def _name_strikes(figure: Figure, strike: str) -> None:
 
 
 def new_figure(height: float, width: float = WIDTH, layout: _Layout = "constrained") -> Figure:
-    """Return an empty figure, sizes in inches; by default the layout avoids overlaps."""
+    """Create an empty figure, sizes in inches; by default its layout avoids overlaps."""
     from printhammer.figures.elements.picture import Picture
 
     figure = Picture(figsize=(width, height), layout=layout)  # type: ignore[arg-type]
@@ -133,7 +133,7 @@ def new_figure(height: float, width: float = WIDTH, layout: _Layout = "constrain
 
 
 def new_panel(height: float, width: float = WIDTH) -> tuple[Figure, Axes]:
-    """Return a figure with a single panel, and the panel; sizes in inches."""
+    """Create a figure with a single panel, sizes in inches; return both."""
     figure = new_figure(height, width)
     return figure, figure.add_subplot()
 
@@ -149,7 +149,7 @@ def with_strip(figure: Figure, ratio: float = 5.5) -> tuple[Axes, Axes]:
 
 
 def sign(figure: Figure, hammer: Hammer, *remarks: str) -> None:
-    """Write hammer name, fingerprint and status of constants below a figure, and remarks above the figure."""
+    """Write hammer name, fingerprint and status of constants at the foot of a figure, remarks at the top."""
     statuses = {constant.status for constant in hammer.constants.values()}
     known = [status for status in ("reconstructed", "assumed") if status in statuses]
     origin = [hammer.name, hammer.fingerprint[:8]]
@@ -160,7 +160,7 @@ def sign(figure: Figure, hammer: Hammer, *remarks: str) -> None:
 
 
 def foot(figure: Figure, origin: str, remark: str = "") -> None:
-    """Write the origin of the data below a figure, and a remark above the figure."""
+    """Write the origin of the data at the foot of a figure, and a remark at the top."""
     text = figure.supxlabel(origin, x=0.99, ha="right", fontsize=TINY, color=MUTED)
     text.set_in_layout(True)
     if remark:

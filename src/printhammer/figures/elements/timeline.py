@@ -69,7 +69,7 @@ def timeline(
     for number, (motion, grid, path) in enumerate(zip(motions, grids, paths, strict=True)):
         colour = _COLOURS[number % len(_COLOURS)]
         gid = f"displacement {number + 1}" if several else "displacement"
-        # Later motions lie under earlier ones where they coincide.
+        # Where motions coincide, the first one is on top.
         order = 3.0 - 0.1 * number
         marks.curve(panel, time.shown(grid), way.shown(path), gid, colour, zorder=order)
         if show_firings:

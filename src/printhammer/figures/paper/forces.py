@@ -90,13 +90,13 @@ def total_force(hammer: Hammer, *, duration: float | str | None = None) -> Figur
 
 
 def rigid_remark(motion: Motion) -> str:
-    """Return a remark that rigid impacts are not drawn in a force diagram; empty without such impacts."""
+    """Remark that a force diagram omits rigid impacts; empty for a motion without such impacts."""
     impacts = any(c.surface == "backstop" and c.peak_force is None and not c.initial for c in motion.contacts)
     return "The rigid backstop changes the velocity at once; its impulses are not drawn." if impacts else ""
 
 
 _INSERTS: Final = ((0.52, 0.46), (0.44, 0.4), (0.36, 0.32), (0.3, 0.26))
-"""Widths and heights tried for the inset, largest first, as fractions of the axes; arbitrary."""
+"""Candidate sizes of the inset, width and height as fractions of the axes, largest first; arbitrary."""
 
 _NOTE: Final = (0.4, 0.09)  # Width and height of the note on loops, fractions of the axes; arbitrary
 
@@ -119,14 +119,14 @@ def force_loops(hammer: Hammer, *, duration: float | str | None = None) -> Figur
     ax.set_xlim(float(way.shown(min(ends) - room)), float(way.shown(max(ends) + room)))
     low, high = float(total.min()), float(total.max())
     above = (high - low) or 1.0
-    # The names of the positions are above the curve.
+    # Leave room above the curve for the names of the positions.
     ax.set_ylim(float(force.shown(low - 0.08 * above)), float(force.shown(high + 0.21 * above)))
     ax.axhline(0.0, color=FAINT, lw=HAIR, zorder=0.5)
     place_lines(ax, hammer, way, "x")
     curve(ax, way.shown(x), force.shown(total), "force", BLUE, lw=1.0)
     touches = [c.t_in for c in motion.contacts if c.surface == "backstop" and not c.initial and c.peak_force]
     settling = touches[1] if len(touches) > 1 else math.inf
-    # Settle-out oscillates along nearly one line, so that its arrows are drawn in the inset.
+    # Settle-out oscillates along nearly one line: its arrows are drawn in the inset only.
     cycle = times < settling
     arrows(ax, way.shown(x[cycle]), force.shown(total[cycle]), 10, BLUE, 8.0)
     _annotate(ax, motion, times >= settling, x, total, way, force)
@@ -145,7 +145,7 @@ def _annotate(
     way: Scale,
     force: Scale,
 ) -> None:
-    """Add the inset, if there is a settle-out, and a note on the meaning of the loops."""
+    """Add the inset of the settle-out, if any, and a note on the meaning of the loops."""
     points = occupied(ax)
     if late.any():
         left, bottom, width, height = box = _place(points)
@@ -164,7 +164,7 @@ def _annotate(
 
 
 def _place(points: FloatArray) -> tuple[float, float, float, float]:
-    """Return left, bottom, width and height of the inset: as large as possible, preferably upper right."""
+    """Choose left, bottom, width and height of the inset: as large as possible, preferably upper right."""
     boxes = []
     for width, height in _INSERTS:
         corners = [
@@ -172,7 +172,7 @@ def _place(points: FloatArray) -> tuple[float, float, float, float]:
             for left in np.linspace(0.915 - width, 0.05, 12).tolist()
             for bottom in np.linspace(0.73 - height, 0.05, 12).tolist()
         ]
-        # Tick labels and title need room, too.
+        # Include the room of tick labels and title.
         (left, bottom), covered = freest(points, (width + 0.07, height + 0.12), corners)
         boxes.append((covered, (left + 0.07, bottom + 0.07, width, height)))
         if covered == 0:
@@ -217,7 +217,7 @@ def phase_plane(hammer: Hammer, *, duration: float | str | None = None) -> Figur
     way, speed = scale("displacement", max(abs(low), abs(high))), scale("velocity")
     figure, ax = new_panel(4.4)
     ax.set_xlim(float(way.shown(low - room)), float(way.shown(high + room)))
-    # The names of the positions are above the orbit.
+    # Leave room above the orbit for the names of the positions.
     ax.set_ylim(float(speed.shown(slow - 0.06 * above)), float(speed.shown(fast + 0.17 * above)))
     ax.axhline(0.0, color=FAINT, lw=HAIR, zorder=0.5)
     place_lines(ax, hammer, way, "x")
@@ -235,7 +235,7 @@ CURRENTS: Final = (0.0, 0.5, 1.0, 1.5, 2.0)
 
 _POINTS: Final = 400  # Points of a static curve: more than a picture resolves
 _HALF_WIDTH, _ENOUGH, _PREFERRED = 0.04, 0.055, 0.3
-"""Placement of labels, as fractions of the axes: half-width, sufficient clearance, preferred position."""
+"""Label placement, as fractions of the axes: half-width, sufficient clearance, preferred position."""
 
 
 @styled
@@ -308,14 +308,14 @@ def statics(hammer: Hammer, *, currents: Sequence[float] = CURRENTS) -> Figure:
 def _limits(
     hammer: Hammer, x: FloatArray, family: list[FloatArray], spring: FloatArray | None
 ) -> tuple[float, float]:
-    """Return force limits of the axes that include every curve within the stroke."""
+    """Compute force limits of the axes that include every curve over the stroke."""
     ends = list(places(hammer).values())
     stroke = (x >= min(ends)) & (x <= max(ends)) if len(ends) > 1 else np.full(x.shape, True)
     curves = [*family, *([] if spring is None else [spring, -spring])]
     values = np.concatenate([curve[stroke] for curve in curves])
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     room = 0.1 * (high - low) or 1.0
-    # The names of the positions are above the curves.
+    # Leave room above the curves for the names of the positions.
     return low - room, high + 2.2 * room
 
 
@@ -340,7 +340,7 @@ def _label_curves(
         others += [(values - bottom) / (top - bottom) for values in further]
         clear = np.full(x.shape, 1.0)
         for other in others:
-            # A label is wider than high: distances count over its whole width.
+            # A label is wider than high: measure the clearance over its whole width.
             distance = np.abs(other - height)
             near = np.array(
                 [np.nanmin(distance[np.abs(across - at) < _HALF_WIDTH], initial=1.0) for at in across]

@@ -67,13 +67,13 @@ CURVES: Final = 81
 
 _TIMES: Final = 1361  # Times of a curve: more than a picture resolves
 _LEAN: Final = (0.19, 0.66)
-"""Offset of the last curve from the first curve, right and up, in units of the picture width."""
+"""Offset of the last curve relative to the first, to the right and up, in units of the picture width."""
 
 _ACROSS: Final = 0.80
 """Width of each displacement curve, in units of the picture width."""
 
 _TALL: Final = 0.22
-"""Height of a curve from the lowest to the highest position, in units of the picture width."""
+"""Height of a curve over the displacement range, in units of the picture width."""
 
 _TICK: Final = 0.008  # Length of a tick, in units of the picture width; arbitrary
 
@@ -198,7 +198,7 @@ def thinned(x: FloatArray, y: FloatArray, room: float) -> tuple[FloatArray, Floa
 
 
 def _above(x: FloatArray, y: FloatArray, level: float) -> tuple[FloatArray, FloatArray]:
-    """Return the portions of a curve above a level, separated by NaN."""
+    """Clip a curve to its portions above a level, separated by NaN."""
     crossing = np.flatnonzero((y[1:] - level) * (y[:-1] - level) < 0.0)
     share = (level - y[crossing]) / (y[crossing + 1] - y[crossing])
     x = np.insert(x, crossing + 1, x[crossing] + share * (x[crossing + 1] - x[crossing]))
@@ -266,7 +266,7 @@ def _mark(
     color: str = INK,
     **options: Any,
 ) -> None:
-    """Draw a tick at a position on an axis, and a text at its end."""
+    """Draw a tick at a position on an axis, with a text at its end."""
     end = at[0] + way[0], at[1] + way[1]
     ax.plot([at[0], end[0]], [at[1], end[1]], color=color, lw=HAIR, **options)
     _text(ax, text, end, shift, side, color=color)

@@ -116,7 +116,7 @@ def _heading(train: BuzzTrain) -> str:
 
 
 def _number(figure: Figure, motion: Motion, train: BuzzTrain, until: float) -> None:
-    """Label each dot of the run in the force range with its peak force, relative to the single pulse."""
+    """Label each counted dot with its peak force, relative to the single pulse."""
     panel = figure.axes[0]
     time, way = scale("time", until), scale("displacement", float(max(motion.maxima[1], default=0.0)))
     forces = dict(enumerate(train.forces, train.first))

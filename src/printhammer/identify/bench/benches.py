@@ -69,7 +69,7 @@ _MOST: Final = 2_000_000
 """Largest number of time steps in a record; limits the memory use."""
 
 _RUN_UP: Final = 10e-6
-"""Initial distance of the armature from the backstop, m; arbitrary, since no force acts on the way."""
+"""Initial distance of the armature from the backstop, m; arbitrary, as no force acts before the impact."""
 
 _LONGEST: Final = 30
 """Maximum number of doublings of the simulation time for a rebound; arbitrary."""
@@ -409,7 +409,7 @@ def _rebound(bare: Hammer, speed: float) -> float:
             return float(left)
         duration *= 2.0
     raise InputError(
-        f"{bare.path}: the armature does not come back from the backstop at {speed:.6g} m/s",
+        f"{bare.path}: the armature does not rebound from the backstop at {speed:.6g} m/s",
         file=bare.path,
         key="speeds",
     )

@@ -1,4 +1,4 @@
-"""The synthetic laboratory: simulated measurements of a hammer with realistic sensor errors.
+"""Synthetic laboratory: simulated measurements of a hammer with realistic sensor errors.
 
 True values are computed (`benches`), pass through the sensors (`sensor`), and become a table like those of a
 real laboratory. Each kind of measurement and each column has its own random number stream, so that a change
@@ -43,10 +43,10 @@ UNITS: Final = {
     "rebound speed": ("m/s", "m/s"),
     "time": ("s", "us"),
 }
-"""SI unit of each column, and its unit in files."""
+"""SI unit of each column, and its unit in files, by name of the column."""
 
 SI: Final = {name: si for name, (si, _unit) in UNITS.items()}
-"""SI unit of each column."""
+"""SI unit of each column, by name of the column."""
 
 SAMPLING_RATE: Final = 1e6
 BANDWIDTH: Final = 200e3
@@ -69,7 +69,7 @@ SENSORS: Final = {
 
 
 class Measurement(Result):
-    """One table of simulated measurements."""
+    """Table of one simulated measurement, with its true values and gross errors."""
 
     kind: str = scalar("", "kind of measurement", more=f"{', '.join(BENCHES)}")
     comments: dict[str, str] = scalar("", "description of measurement, hammer, sensors and seed")
@@ -81,7 +81,7 @@ class Measurement(Result):
 
     @property
     def title(self) -> str:
-        """One-line title of the table."""
+        """Title of the measurement: its kind and the name of the hammer."""
         return f"measurement of the {self.kind} of {self.hammer.name}"
 
     def entries(self) -> Entries:

@@ -34,7 +34,7 @@ class Amount:
     """Size of a sensor error: in SI units, or as a fraction of full scale or of the reading."""
 
     size: float = 0.0
-    """Number in SI units, or the fraction."""
+    """Size in SI units, or as a fraction if `of` is not empty."""
     of: str = ""
     """Reference of the fraction: "of full scale" (the largest true value) or "of reading"; else empty."""
 
@@ -122,7 +122,7 @@ class Channel(Declared):
 
 @dataclass(frozen=True)
 class Sensor:
-    """Sensors of one test bench."""
+    """Sensors of one test bench, with their errors."""
 
     channels: Mapping[str, Channel]
     """Errors of each quantity: displacement, indentation, current, force, impact speed or rebound speed."""
@@ -149,7 +149,7 @@ class Sensor:
 
 
 def full_scale(true: FloatArray) -> float:
-    """Return the largest absolute true value, SI."""
+    """Return the full scale of a sensor: the largest absolute true value, SI."""
     return float(np.abs(true).max()) if true.size else 0.0
 
 
@@ -213,7 +213,7 @@ def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, st
 
 
 def applicable(sensor: Sensor, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings that apply to a sensor, without sampling settings for a bench without records."""
+    """Select the settings that apply to a sensor: no sampling settings for a bench without records."""
     kept = dict(settings)
     for role in PARTS:
         if role in kept:

@@ -111,7 +111,7 @@ def fit_magnet(sheet: Sheet) -> SheetMagnet:
     known = {"turns": sheet.turns is not None, "leakage": sheet.inductance is None}
     known["residual_gap"] = sheet.residual_gap is not None
     names = [name for name in GUESSES if not known.get(name)]
-    # Pole area from the force at the widest gap, without fringe and iron.
+    # Estimate the pole area from the force at the widest gap, without fringe and iron.
     widest = int(np.argmax(sheet.gaps))
     open_gap = float(sheet.gaps[widest]) + GUESSES["residual_gap"].value
     turned = (sheet.turns or GUESSES["turns"].value) * sheet.current
@@ -194,12 +194,12 @@ def _classify(
     )
 
 
-IRON: Final = 7860.0  # Density, kg/m^3
-_HEAVY: Final = 3.0  # Factor on the stated mass above which an armature of iron is implausible; arbitrary
+IRON: Final = 7860.0  # Density of iron, kg/m^3
+_HEAVY: Final = 3.0  # Ratio of required to stated armature mass above which a fit is implausible; arbitrary
 
 
 def implausible(sheet: DataSheet, part: ReluctanceMagnet) -> list[str]:
-    """Return one sentence for each physically implausible property of a fitted magnet.
+    """List the physically implausible properties of a fitted magnet, one sentence each.
 
     Two properties are checked:
 
@@ -234,7 +234,7 @@ RESTITUTION: Final = 0.3
 INDENTATION: Final = 0.25
 """Fraction of the remaining gap by which the magnet's work indents the struck object; assumed."""
 
-_GRID: Final = 200  # Number of displacements sampled up to the front of the pack
+_GRID: Final = 200  # Number of sampled displacements from rest to the front of the pack; arbitrary
 
 
 def hammer_of(sheet: DataSheet) -> tuple[Hammer, SheetMagnet]:
@@ -283,7 +283,7 @@ def _hammer_of(sheet: DataSheet) -> tuple[Hammer, SheetMagnet]:
 
 
 def _head(sheet: DataSheet, magnet: SheetMagnet, current: float) -> str:
-    """Return the head of the hammer file: name, title, note and a placeholder mass."""
+    """Render the head of the hammer file as TOML: name, title, note and a placeholder mass."""
     import tomlkit
 
     points = len(sheet.force)
@@ -310,7 +310,7 @@ def _made(value: float, unit: str, status: str, source: str) -> dict[str, Any]:
 
 
 def _magnet(sheet: DataSheet, magnet: SheetMagnet) -> dict[str, Any]:
-    """Return the magnet table of the hammer file."""
+    """Build the magnet table of the hammer file."""
     count = len(sheet.force)
     guessed = "force" in sheet.assumed
     what = f"fitted to {count}{' assumed' * guessed} force{'s' if count > 1 else ''}"
@@ -390,7 +390,7 @@ def _restitution(sheet: DataSheet) -> dict[str, Any]:
 
 
 def _pack(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, Any]:
-    """Return the table of the pack, which models the object that the armature strikes."""
+    """Build the table of the pack, which models the struck object as a spring with a dashpot."""
     place = "target" if "target" in sheet.entries else "stroke"
     table: dict[str, Any] = {"law": "dashpot", "front": sheet.constant(place)}
     if "stop.stiffness" in sheet.entries:
@@ -449,7 +449,7 @@ def damping_ratio(restitution: float) -> float:
 
 
 def _waveform(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, Any]:
-    """Return the waveform table: the driver of the data sheet, or a pulse of the rail voltage."""
+    """Build the waveform table: the driver of the data sheet, or a pulse of the rail voltage."""
     from printhammer.drive.waveforms.shapes import SHAPES
 
     table: dict[str, Any] = {"shape": sheet.driver.get("shape", "rail"), "voltage": sheet.constant("rail")}
@@ -472,7 +472,7 @@ def _waveform(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str
     if "on_time" in sheet.entries:
         table["width"] = sheet.constant("on_time")
     elif "width" not in table:
-        # Twice the sum of the coil's time constant and the flight time under the mean force.
+        # Twice the sum of the coil's time constant and of the flight time under the mean force.
         work = _work(sheet, magnet, sheet.si("stroke"), current)
         flight = math.sqrt(2.0 * sheet.si("mass") * sheet.si("stroke") ** 2 / work)
         width = 2.0 * (magnet.inductance / sheet.si("resistance") + flight)

@@ -39,7 +39,7 @@ from printhammer.support.files import read_text
 from printhammer.units import describe, split, to_si
 
 TEXTS: Final = {"name": True, "source": True, "title": False, "note": False, "strike": False}
-"""Text keys of a data sheet, and whether they are required."""
+"""Text keys of a data sheet, each with whether it is required."""
 
 QUANTITIES: Final = {
     "rail": ("V", True),
@@ -54,23 +54,23 @@ QUANTITIES: Final = {
     "target": ("m", False),
     "on_time": ("s", False),
 }
-"""Quantities of a data sheet, their SI units, and whether they are required."""
+"""Quantities of a data sheet, each with its SI unit and whether it is required."""
 
 TABLES: Final = {
     "spring": {"preload": "N", "stiffness": "N/m"},
     "stop": {"restitution": "1", "stiffness": "N/m", "damping": "N s/m"},
 }
-"""Tables of a data sheet, and their quantities with SI units."""
+"""Tables of a data sheet, each with its quantities and their SI units."""
 
 _ZERO: Final = ("end_gap", "spring.preload", "spring.stiffness", "stop.restitution", "stop.damping")
 _OTHERS: Final = ("force", "inductance", "driver", "assumed", "why")
 _PAIR: Final = 2  # Length of a pair of gap and force
-_WHOLE: Final = 1e6  # Magnitude below which whole numbers are written without a decimal point
+_WHOLE: Final = 1e6  # Magnitude up to which whole numbers are written without a decimal point; arbitrary
 
 
 @dataclass(frozen=True)
 class Entry:
-    """Quantity of a data sheet, as written and in SI."""
+    """Quantity of a data sheet: value and unit as written, and value in SI."""
 
     key: str
     value: float
@@ -81,7 +81,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class DataSheet:
-    """Contents of a data sheet."""
+    """Contents of a data sheet: quantities, force table, inductance, and their sources."""
 
     where: str
     """File name of the data sheet, for error messages."""

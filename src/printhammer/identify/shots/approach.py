@@ -17,15 +17,15 @@ from printhammer.results import Declared, part
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 _WIDE: Final = 10.0
-"""Initial scale of the gap penalty, in units of the largest gap; such a gap costs as much as all data."""
+"""Initial width of the gap penalty, in largest gaps; a gap of that width costs as much as all data."""
 _NARROW: Final = 0.001
-"""Scale of the gap penalty, normalised by stroke and typical speed, below which the approach ends."""
-_RISE: Final = 0.3  # Factor on the width of the penalty after a successful step
+"""Width of the gap penalty, normalised by stroke and typical speed, at which the approach ends."""
+_RISE: Final = 0.3  # Factor on the width of the gap penalty after a successful step
 _LONGEST: Final = 0.3
 """Largest change per step: relative for a constant, normalised by stroke and typical speed for a state."""
-_HALVINGS: Final = 6  # Iteration limit of the step halving; arbitrary
+_HALVINGS: Final = 6  # Maximum number of step halvings; arbitrary
 _TRIES: Final = 2
-"""Number of Gauss-Newton steps for each value of the gap penalty."""
+"""Number of Gauss-Newton steps at each width of the gap penalty."""
 
 
 class Prior(Declared, eq=False):
@@ -92,7 +92,7 @@ class Approach:
         self.keep = [(~rows).astype(np.float64) for rows in spikes]
 
     def run(self, values: FloatArray, states: Sequence[FloatArray]) -> tuple[FloatArray, list[FloatArray]]:
-        """Compute parameters, SI, and joint states from which a fit with closed gaps can start."""
+        """Iterate to parameters, SI, and joint states from which a fit with closed gaps can start."""
         values, states = values.copy(), list(states)
         chains = self.shooting.chains(values, states, derivatives=True)
         width = 0.0 if chains is None else _WIDE * largest_gap(chains, self.shooting.units)
@@ -146,7 +146,7 @@ class Approach:
     def _step(
         self, values: FloatArray, chains: Sequence[Chain], scales: FloatArray, width: float
     ) -> FloatArray:
-        """Compute the Gauss-Newton step; parameters are in units of their scales, states in `units`."""
+        """Compute the Gauss-Newton step; parameters in units of their scales, joint states in `units`."""
         count = len(values)
         size = count + sum(chain.gaps.size for chain in chains)
         units = self.shooting.units

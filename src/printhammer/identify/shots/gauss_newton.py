@@ -27,9 +27,9 @@ from printhammer.support.arrays import BoolArray, FloatArray
 _DEGENERATE: Final = 1e5
 """Condition number above which difference quotients no longer separate the columns of a Jacobian."""
 _TIED: Final = 0.98
-"""Correlation above which two constants are hardly distinguished."""
+"""Absolute correlation above which two constants are reported as hardly separable."""
 _WEAK: Final = 0.1
-"""Relative standard error above which a constant is weakly determined."""
+"""Relative standard error above which a constant is reported as weakly determined."""
 _SHARE: Final = 0.02
 """Relative component in the degenerate direction above which a message names the constant."""
 
@@ -104,7 +104,7 @@ def weak(values: FloatArray, covariance: FloatArray) -> list[int]:
 def changes_if_fitted(
     design: FloatArray, columns: FloatArray, names: Sequence[str], residuals: FloatArray
 ) -> list[tuple[str, float, float]]:
-    """Estimate by how much each held constant would change if it alone were fitted in addition.
+    """Estimate the change of each held constant if that constant alone were fitted in addition.
 
     `design`, shape (m, p), `residuals`, and `columns`, shape (m, q), the derivatives per relative change of
     the further constants, are whitened by the standard errors of the data. Returned are, for each constant,
@@ -136,9 +136,9 @@ _LEAST: Final = 1e-16
 """Standard deviation assumed for the noise of exact data, m; sets their weight."""
 _REACH: Final = 3.0
 _POINTS: Final = 7
-"""Half-width of a profile, in standard errors, and number of its points."""
+"""Half-width of a profile, in standard errors, and number of its points; arbitrary."""
 _LOST: Final = 1e-7
-"""Relative singular value below which rounding errors dominate."""
+"""Relative singular value below which rounding errors dominate a direction."""
 _NO_MOTION: Final = "the simulated hammer does not move, so that the records cannot be compared"
 
 
@@ -160,7 +160,7 @@ class Solution(Declared, eq=False):
 
 
 class GaussNewton:
-    """Gauss-Newton fit of the parameters of a `Shooting`; with `robust`, outliers are excluded."""
+    """Gauss-Newton fit of the parameters of a `Shooting`; `robust` excludes outliers."""
 
     def __init__(self, shooting: Shooting, priors: Sequence[Prior], *, robust: bool) -> None:
         self.shooting = shooting
@@ -194,7 +194,7 @@ class GaussNewton:
         and noise scales are reused.
         """
         scales = self.shooting.parameters.scales
-        # A profile starts near its solution.
+        # Profiles pass the noise of a nearby solution and skip the approach.
         if noise is None:
             values, states = Approach(self.shooting, self.priors, self.spikes).run(values, states)
         free = np.ones(len(values), bool) if held is None else ~held
@@ -251,7 +251,7 @@ class GaussNewton:
         near: bool,
         noise: Solution | None = None,
     ) -> _Weighted:
-        """Return the whitened residuals and Jacobian of data and priors."""
+        """Linearise data and priors; return their whitened residuals and Jacobian."""
         rows, residuals, outliers, scales, memories = [], [], [], [], []
         for shot, (x, (shown, jacobian, *_rest)) in enumerate(zip(self.data, parts, strict=True)):
             left = x - shown

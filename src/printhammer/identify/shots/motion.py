@@ -44,7 +44,7 @@ _DEGREES: Final = 0.22
 """Degrees of freedom per sample of the noise estimate (median of third differences)."""
 _TOLD: Final = 0.05
 """Relative standard error below which a held constant is reported as one that could be fitted."""
-_OFF: Final = 5.0  # Standard errors from which a deviation is reported
+_OFF: Final = 5.0  # Number of standard errors above which a deviation is reported
 
 
 def tested(shots: Sequence[Shot], solution: Solution, count: int) -> tuple[float, str]:
@@ -81,7 +81,7 @@ def tested(shots: Sequence[Shot], solution: Solution, count: int) -> tuple[float
 
 
 def rests(shots: Sequence[Shot], solution: Solution) -> list[str]:
-    """Return remarks on records whose rest position differs from the hammer's."""
+    """Return remarks on records whose rest position deviates from the hammer's."""
     sentences = []
     for shot, shown, scale in zip(shots, solution.shown, solution.scales, strict=True):
         before = shot.t < 0.0
@@ -392,7 +392,7 @@ def _assemble(
 
 
 def _definite(covariance: FloatArray, values: FloatArray) -> FloatArray:
-    """Return a covariance matrix with a small diagonal added, so that the matrix can be inverted."""
+    """Regularise a covariance matrix by a small diagonal, so that it can be inverted."""
     return covariance + np.diag((1e-12 * values) ** 2 + 1e-13 * covariance.diagonal())
 
 

@@ -72,7 +72,7 @@ class Chain:
 
 @dataclass(frozen=True, eq=False)
 class _Plan:
-    """Time grid of a shot, with the grid indices of the samples and of the segment starts."""
+    """Time grid of a shot, with the grid indices of samples and segment starts."""
 
     grid: FloatArray
     samples: IntArray
@@ -82,7 +82,7 @@ class _Plan:
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """Run of the ensemble: one segment with hammer, drive, initial state and output times."""
+    """Ensemble run of one segment: hammer, drive, initial state and output times."""
 
     hammer: Hammer
     drive: PulseTrain
@@ -110,7 +110,7 @@ class Shooting:
         self.units = np.array([self.stroke, speed])
         self.steps = _STEP * self.units
         waveforms = [hammer.waveform if pulse is None else pulse.waveform for pulse in pulses]
-        # With a margin of 50 %, since a fit may make a pulse longer.
+        # The margin is 50 %, since the fit may lengthen a pulse.
         self.lasting = [0.0 if each is None else 1.5 * each.support for each in waveforms]
 
     def hammer_at(self, values: FloatArray) -> Hammer:
@@ -121,7 +121,7 @@ class Shooting:
     def _variants(
         self, values: FloatArray, derivatives: bool
     ) -> list[tuple[Hammer, float, list[PulseTrain]]]:
-        """Return hammer, rest position and drives for the nominal and for each perturbed parameter vector."""
+        """Build hammer, rest position and drives for the nominal and each perturbed parameter vector."""
         parameters = self.parameters
         count = len(parameters.keys)
         variants = []
@@ -239,7 +239,7 @@ class Shooting:
     def shown(self, shot: int, motion: FloatArray) -> FloatArray:
         """Apply the sensor model: return the readings at the samples of a shot, at rest before the firing.
 
-        `motion` holds displacement and velocity on the grid, or derivatives of them, shape (g, 2, ...); the
+        `motion` is displacement and velocity on the grid, or derivatives of them, shape (g, 2, ...); the
         readings have the shape (n, ...).
         """
         plan = self.plans[shot]

@@ -31,7 +31,7 @@ Surface = Literal["pack", "backstop"]
 FEWEST: Final = 5
 """Smallest number of samples in a detected contact."""
 _CLEAR: Final = 0.005
-"""Distance from a surface, as a fraction of the stroke, beyond which a contact has begun or ended."""
+"""Distance from a surface, as a fraction of the stroke, that confirms the beginning or end of a contact."""
 _WINDOW: Final = 15e-6
 """Longest averaging time for contact detection, s; shorter than any contact."""
 
@@ -145,7 +145,7 @@ def find_touches(
 
 
 def _visits(surface: Surface, depth: FloatArray, clear: float) -> list[Touch]:
-    """Return the sample intervals beyond a surface; crossings within the noise do not end an interval."""
+    """Find the sample intervals beyond a surface; crossings within the noise do not end an interval."""
     touches: list[Touch] = []
     inside, outside = np.flatnonzero(depth > clear), np.flatnonzero(depth < -clear)
     row = 0
@@ -346,7 +346,7 @@ def _fit_waveform(
 
 
 def _starts(t: FloatArray, current: FloatArray, values: dict[str, float], top: float) -> list[FloatArray]:
-    """Return two initial guesses: `values`, and `values` with amplitude and width taken from the record."""
+    """Build two initial guesses: `values`, and `values` with the amplitude and width of the record."""
     high = t[np.abs(current) > 0.5 * top]
     recorded = dict(values)
     recorded["amplitude"] = top
@@ -355,7 +355,7 @@ def _starts(t: FloatArray, current: FloatArray, values: dict[str, float], top: f
 
 
 def _sampled_pulse(t: FloatArray, current: FloatArray, noise: float, note: str) -> Pulse:
-    """Return the recorded current as a waveform, averaged over short bins."""
+    """Build a waveform from the recorded current, averaged over short bins."""
     after = np.flatnonzero(t >= 0.0)
     each = max(1, -(-len(after) // _INTERVALS))
     bins = [after[i : i + each] for i in range(0, len(after), each)]
@@ -363,6 +363,6 @@ def _sampled_pulse(t: FloatArray, current: FloatArray, noise: float, note: str) 
     values = np.array([current[rows].mean() for rows in bins])
     scale = robust_scale(current) or 1.0
     waveform = Sampled.from_samples(times, values, interpolation="linear")
-    # Error of the impulse of the current due to noise; the impulse is what moves the armature.
+    # Standard error of the current's time integral, which drives the armature, due to noise.
     error = noise / scale / np.sqrt(len(after))
     return Pulse(waveform, ("scale",), np.ones(1), np.array([[max(error, _FLOOR) ** 2]]), note)

@@ -39,7 +39,7 @@ _COPY: Final = 1e-6
 _TOGETHER: Final = "the excluded rows are consecutive: there the data deviate from the law"
 
 _HARD_TO_TELL: Final = 30.0
-"""Condition number above which the result names the constants that the data cannot separate."""
+"""Condition number above which the result names the constants that the data hardly separate."""
 
 
 def judge(
@@ -164,7 +164,7 @@ def inseparable(solution: Solution, names: Sequence[str]) -> list[str]:
 
 
 _WEAK: Final = 0.1
-"""Relative standard error above which the profile of a constant is computed."""
+"""Relative standard error above which the profile likelihood of a constant is computed."""
 
 _GRID: Final = 25  # Number of values of a profile likelihood
 

@@ -111,7 +111,7 @@ class Stiffness:
     standard_error: float = 0.0
     """Standard error of k, N/m^1.5; 0 if unknown."""
     how: str = ""
-    """Source text of k; empty if the stiffness is taken as known and is not a fit result."""
+    """Source text of k; empty for a known stiffness, which is not a fit result."""
 
     @classmethod
     def from_bodies(
@@ -286,7 +286,7 @@ def _constant(k: Stiffness) -> FittedConstant:
 
 
 def _of_bodies(k: Stiffness) -> Fit:
-    """Return a fit result without data, for a stiffness computed from the two bodies alone."""
+    """Build a fit result without data, for a stiffness computed from the two bodies alone."""
     none = np.empty(0)
     whole = np.empty(0, dtype=np.int64)
     return Fit(

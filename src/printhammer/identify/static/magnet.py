@@ -97,7 +97,7 @@ class TotalLaw:
 
 
 def start_of(table: Readings, levels: int, zero: float) -> FloatArray:
-    """Return initial guesses of C, Am, Bm and K, from a fit that is linear in Am^2, Am Bm and Bm^2.
+    """Compute initial guesses of C, Am, Bm and K by a fit that is linear in Am^2, Am Bm and Bm^2.
 
     `levels` is the number of distinct currents, 0 for a continuum; `zero` is the sensor reading at x = 0, m.
 
@@ -323,12 +323,12 @@ def _indistinct(with_spring: bool, levels: int) -> list[str]:
     if not with_spring:
         sentences.append(
             "F0, Bs and As cannot be told apart by forces of magnet and spring together: only"
-            f" {_COMBINED} and {_SLOPE} are found; a table of the spring alone would tell them apart"
+            f" {_COMBINED} and {_SLOPE} are determined; add a table of the spring alone"
         )
     if levels == 2:
         sentences.append(
-            "two currents do not tell a current that weakens the pull from one beyond Am / Bm, where the pull"
-            " grows again; it is taken as weakening"
+            "two currents cannot distinguish a current that weakens the pull from one beyond Am / Bm, where"
+            " the pull grows again; a weakening current is assumed"
         )
     return sentences
 
@@ -342,7 +342,7 @@ def clusters(values: FloatArray) -> int:
 
 
 def group_of(values: FloatArray) -> IntArray:
-    """Return the index of the cluster of each value, in ascending order of the clusters."""
+    """Assign each value to its cluster; return the cluster indices, ascending with the values."""
     order = np.argsort(values, kind="stable")
     apart = np.diff(values[order]) > 0.05 * float(np.ptp(values))
     group = np.empty(len(values), dtype=np.int64)

@@ -132,7 +132,7 @@ LOADING, UNLOADING = 2.7, 11.0
 _SPARE: Final = 4  # Smallest number of rows beyond the number of unknowns
 _LOADING_ROWS: Final = 4  # Smallest number of rows of a loading branch
 _MEETS: Final = 0.02
-"""Largest unreported error of a fitted turning point, as a fraction of the largest indentation."""
+"""Deviation of a fitted from a measured turning point, as a fraction of the latter, that is reported."""
 
 _FAR: Final = 1.0
 """Largest accepted absolute logarithm of the ratio of fitted to measured turning point."""
@@ -262,7 +262,7 @@ def fit_pack(
 
 
 def _start(law: PackLaw, table: Readings) -> FloatArray:
-    """Estimate the initial guess; raise `InputError` for too few or negative loading forces."""
+    """Estimate the initial guess from the loading rows; `InputError` for too few or negative forces."""
     force, cycles = table.values["force"], law.cycles
     rows = np.flatnonzero(law.inside & ~cycles.unloading)
     if len(rows) < _LOADING_ROWS:

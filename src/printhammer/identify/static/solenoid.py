@@ -123,7 +123,7 @@ def fit_solenoid(
     law = CircuitLaw(gap, currents, turns)
     start = _start(law, gap, force, linkage, data.values)
     least, most = start / _REACH, start * _REACH
-    # Values without fringe, iron or a limit of the leakage, for constants that the data do not show.
+    # Values without fringe, iron or a limit of the leakage, for constants that the data do not determine.
     rest = np.where([name in _ABSENT_HIGH for name in CONSTANTS], most, least)
     space = Parameters.of(start, low=least, high=most, size=0.0, rest=rest)
     solution = solved(data, law, space, robust=robust)
@@ -168,7 +168,7 @@ def _check_factor(
 
 
 class CircuitLaw:
-    """Logarithms of force and linkage at gaps, m, and currents, A, shape (2 m,); p holds the `CONSTANTS`."""
+    """Logarithms of force and linkage at gaps, m, and currents, A, shape (2 m,); p: the `CONSTANTS`."""
 
     def __init__(self, gap: FloatArray, current: FloatArray, turns: float) -> None:
         self.turns = turns
@@ -202,7 +202,7 @@ class CircuitLaw:
 def _start(
     law: CircuitLaw, gap: FloatArray, force: FloatArray, linkage: FloatArray, data: FloatArray
 ) -> FloatArray:
-    """Return the initial guess: the best of several least-squares searches in the logarithms."""
+    """Estimate the initial guess by a multi-start least-squares search in the logarithms."""
     from scipy.optimize import least_squares
 
     current = np.array([row[1] for row in law.rows])
