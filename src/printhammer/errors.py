@@ -64,7 +64,7 @@ class InputError(PrinthammerError, ValueError):
         written: str | None = None,
         unit: str = "",
     ) -> Self:
-        """Compose the error for an invalid value.
+        """Compose the error for an invalid value from its key, value and expectation.
 
         Parameters
         ----------

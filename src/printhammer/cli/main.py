@@ -140,10 +140,10 @@ def run_program(program: typer.Typer, name: str, arguments: Sequence[str] | None
             complain(f"{message.rstrip('.')} (see --help)")
         sys.exit(BAD_INPUT)
     except OSError as error:
-        # A path that is too long, or an output on a full disk.
+        # For example a path that is too long, or a full disk.
         complain(f"{error.filename or 'the output'}: {error.strerror or error}")
         if error.filename is None:
-            # The interpreter would write the rest once more, and fail again.
+            # At exit the interpreter would flush the remaining output, and fail again.
             with suppress(OSError, ValueError), Path(os.devnull).open("wb") as nowhere:
                 os.dup2(nowhere.fileno(), sys.stdout.fileno())
         sys.exit(BAD_INPUT)

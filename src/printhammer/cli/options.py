@@ -99,43 +99,43 @@ class Files(Option):
 
 
 def files(what: str, *endings: str, many: bool = True, **more: Any) -> Files:
-    """Return an option for output files: pictures and files with the endings listed."""
+    """Declare an option for output files: pictures, and files with the given endings."""
     return Files(what, "FILE", type=Path, many=many, endings=endings, **more)
 
 
 def results(what: str, *more: str, **options: Any) -> Files:
-    """Return the option `--out` that saves `what`: as data, as a picture, or with one of `more` endings."""
+    """Declare the option `--out` that saves `what`: as data, as a picture, or with one of `more` endings."""
     endings = (*DATA, *more)
     kinds = f"Output file for {what} ({', '.join(endings)}; SI)"
     return files(f"{kinds} or a picture (.svg, .png, .pdf); repeatable.", *endings, **options)
 
 
 def file(what: str, *endings: str, **more: Any) -> Files:
-    """Return an option for one output file that is not a picture; `many=True` makes it repeatable."""
+    """Declare an option for one output file that is not a picture; `many=True` makes it repeatable."""
     return files(what, *endings, **{"many": False, "pictures": False, **more})
 
 
-# The options below are defaults of parameters of any type; hence the return type Any. Further keywords are
-# attributes of `Option`.
+# The functions below return default values for parameters of any type; hence the return type Any. Further
+# # keywords are attributes of `Option`.
 
 
 def text(metavar: str, what: str, **more: Any) -> Any:
-    """Return an option whose text is used verbatim, or as typer converts it."""
+    """Declare an option whose text is passed verbatim, or converted by typer."""
     return Option(what, metavar, **more)
 
 
 def argument(metavar: str, what: str, **more: Any) -> Any:
-    """Return a positional argument."""
+    """Declare a positional argument."""
     return Option(what, metavar, argument=True, **more)
 
 
 def bounded(least: float, what: str, *, default: float, **more: Any) -> Any:
-    """Return a numeric option, of the type of its default value, with the lower bound `least`."""
+    """Declare a numeric option, of the type of its default value, with the lower bound `least`."""
     return Option(what, more.pop("metavar", None), default, type=type(default), least=least, **more)
 
 
 def choice(choices: str, what: str, **more: Any) -> Any:
-    """Return an option with a fixed set of values, such as "add|replace"."""
+    """Declare an option with a fixed set of values, such as "add|replace"."""
     words = choices.split("|")
 
     def read(written: str, name: str) -> str:
@@ -147,22 +147,22 @@ def choice(choices: str, what: str, **more: Any) -> Any:
 
 
 def switch(what: str, *, default: bool = False, **more: Any) -> Any:
-    """Return a Boolean flag."""
+    """Declare a Boolean flag."""
     return Option(what, default=default, type=bool, **more)
 
 
 def whole(what: str, **more: Any) -> Any:
-    """Return an integer option."""
+    """Declare an integer option."""
     return Option(what, "N", read=read_whole, **more)
 
 
 def number(what: str, metavar: str = "X", **more: Any) -> Any:
-    """Return an option for a number without a unit."""
+    """Declare an option for a number without a unit."""
     return Option(what, metavar, read=read_plain, **more)
 
 
 def quantity(si: str, metavar: str, what: str, *, positive: bool = False, **more: Any) -> Any:
-    """Return an option for a quantity with a unit of the dimension of `si`; above 0 if `positive`."""
+    """Declare an option for a quantity with a unit of the dimension of `si`; above 0 if `positive`."""
 
     def read(written: str, name: str) -> float:
         from printhammer.drive.input import read_number, read_positive
@@ -173,12 +173,12 @@ def quantity(si: str, metavar: str, what: str, *, positive: bool = False, **more
 
 
 def span(what: str, **more: Any) -> Any:
-    """Return an option for a range: two ends with units, and a number of values."""
+    """Declare an option for a range: two ends with units, and a number of values."""
     return Option(what, "LOW, HIGH, N", read=read_span, **more)
 
 
 def rates_between(what: str, most: int) -> Any:
-    """Return an option for evenly spaced rates: lowest, highest and their number, at most `most`."""
+    """Declare an option for evenly spaced rates: lowest, highest and their number, at most `most`."""
 
     def read(written: str, name: str) -> list[float]:
         import numpy as np
@@ -207,17 +207,17 @@ def rates_between(what: str, most: int) -> Any:
 
 
 def source(what: str, **more: Any) -> Any:
-    """Return an option for an input file, or several with `many=True`."""
+    """Declare an option for an input file, or several with `many=True`."""
     return Option(what, "FILE", type=Path, is_input=True, **more)
 
 
 def folder(what: str, **more: Any) -> Any:
-    """Return an option for an output folder (or, with another placeholder, a single output file)."""
+    """Declare an option for an output folder (or, with another placeholder, a single output file)."""
     return Option(what, **{"metavar": "FOLDER", "type": Path, "writes": True, **more})
 
 
 def read_whole(written: str, name: str) -> int:
-    """Parse an integer."""
+    """Parse an integer; `name` is the option in error messages."""
     try:
         return int(written)
     except ValueError:
@@ -225,7 +225,7 @@ def read_whole(written: str, name: str) -> int:
 
 
 def read_plain(written: str, name: str) -> float:
-    """Parse a number without a unit."""
+    """Parse a number without a unit; `name` is the option in error messages."""
     try:
         return float(written)
     except ValueError:
@@ -289,7 +289,7 @@ _TRAIN: Final = "Train (one of --period and --rate)"
 
 
 def overlapping(panel: str = _TRAIN) -> Any:
-    """Return the option `--overlap`, the rule for pulses that overlap."""
+    """Declare the option `--overlap`, the rule for pulses that overlap."""
     return choice(
         "add|replace",
         "Rule for overlapping pulses: add the currents, or use the current of the latest pulse only.",

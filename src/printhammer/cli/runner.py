@@ -1,8 +1,8 @@
 """Runner of the verbs: parses the options, calls the verb, and outputs its `Answer`.
 
-A verb is a function of its options, and of a `Job` if it has a parameter `job`, declared with `verb`. The
-runner parses the options, checks before the computation that every output file is new and writable, loads the
-hammer, and announces compilation; the verb computes and returns an `Answer`; the runner shows the answer,
+A verb is a function declared with `verb`; its parameters are its options and, optionally, a `Job`. The runner
+parses the options, checks before the computation that every output file is new and writable, loads the
+hammer, and announces compilation. The verb computes and returns an `Answer`. The runner prints the answer,
 writes the files, prints complaints, and sets the exit status. `firing_of` parses the periodic drive of the
 verbs that analyse chaos: period, rate, or drive file.
 """
@@ -60,7 +60,7 @@ class Content:
 
     @classmethod
     def of(cls, result: Any, **options: Any) -> Content:
-        """Return data and picture of a result as content of a file; `options` are passed to `result.plot`."""
+        """Build the content from a result: data, or the picture of `result.plot` with `options`."""
         return cls(result.save, lambda: result.plot(**options))
 
     def write(self, path: Path) -> None:
@@ -229,10 +229,10 @@ def verb(
     """Decorate a function as the verb `name`, with a runnable example.
 
     The function declares options as defaults of its parameters, and receives the `Job` in a parameter `job`
-    if it has one. `passed` are options of the library function under the same names: those that are set
-    arrive as further keywords, and the library supplies the other defaults. `files` declare output files, in
-    the order of writing. A verb that writes new files has the option --force; a verb that reads a hammer or a
-    spec, or names `part` among `passed`, has the option --part.
+    if it has one. `passed` are options with the names of the library function's parameters: options that are
+    set arrive as further keywords; the library supplies the defaults of the others. `files` declare output
+    files, in the order of writing. A verb that writes new files has the option --force; a verb that reads a
+    hammer or a spec, or names `part` among `passed`, has the option --part.
     """
 
     def made(function: Callable[..., Answer]) -> Verb:
@@ -264,7 +264,7 @@ def verb(
                 raise
             return job.end(answer)
 
-        # Typer reads docstring, signature and annotations.
+        # Typer derives the help and the options from docstring, signature and annotations.
         typed: Any = call
         typed.__doc__ = function.__doc__
         typed.__signature__ = inspect.Signature(
@@ -341,7 +341,7 @@ def tables_beside(path: Path, *parts: object) -> list[Path]:
 
 
 def announce_compiling() -> None:
-    """Announce on the standard error that code is compiled, which takes a while the first time."""
+    """Print a remark on the standard error before each compilation of machine code."""
     from printhammer.run.simulate import announce_compiling as announce
 
     announce(say)
@@ -367,14 +367,14 @@ def ended_early(statuses: Iterable[object], total: int | None = None) -> list[st
 
 
 def period_text(hammer: Hammer, period: float) -> str:
-    """Scale a firing period of the paper's hammer, s, to the time scale of a device, as text."""
+    """Format a firing period of the paper's hammer, s, scaled to a device, such as "1.05 ms"."""
     from printhammer.run.window import time_scale
 
     return f"{1e3 * period * time_scale(hammer):.4g} ms"
 
 
 def rate_text(hammer: Hammer, rate: float) -> str:
-    """Scale a firing rate of the paper's hammer, Hz, to the time scale of a device, as text."""
+    """Format a firing rate of the paper's hammer, Hz, scaled to a device, such as "952 Hz"."""
     from printhammer.run.window import scaled_rate
 
     return f"{scaled_rate(hammer, rate):.4g} Hz"

@@ -53,10 +53,10 @@ class Column(Generic[Row]):
 
 
 class Sheet(Table):
-    """Table that a narrow terminal shows in blocks of columns, so that no digit is cut off.
+    """Table that is split into blocks of columns on a narrow terminal, so that no digit is cut off.
 
-    The blocks follow one below the other, each with the first column. Right-aligned columns hold numbers,
-    which never wrap; left-aligned texts wrap between words.
+    The blocks are printed one below the other, each with the first column. Right-aligned columns hold
+    numbers, which never wrap; left-aligned columns hold text, which wraps between words.
     """
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
@@ -96,7 +96,7 @@ def table(
     title: str = "",
     most: int | None = None,
 ) -> Table:
-    """Return a frameless table; if the table has more than `most` rows, only its first and last rows."""
+    """Build a frameless table; a table of more than `most` rows shows its first and last rows only."""
     from printhammer.results.summary import Cells, Grid
 
     every = list(rows)

@@ -17,13 +17,13 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import Progress, ProgressColumn, Task
 
-_WIDTH: Final = 120  # Columns of output that is not a terminal; arbitrary
+_WIDTH: Final = 120  # Line length, in characters, of output that is not a terminal; arbitrary
 _PLAIN: Final = {"µ": "u", "–": "-", "…": "...", "·": " ", "×": "x", "°": "deg", "→": "->"}
 """Plain-text replacements of characters that the output encoding may lack."""
 
 
 def _plain(error: UnicodeError) -> tuple[str, int]:
-    """Replace characters that a stream cannot encode by plain text, or else by their code points."""
+    """Error handler of an encoder: replace characters by plain text, or else by their code points."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     signs = error.object[error.start : error.end]
@@ -142,7 +142,7 @@ def _shown(*columns: ProgressColumn) -> Iterator[Progress]:
     from rich.progress import Progress
 
     console = Console(stderr=True, highlight=False, emoji=False)
-    # Without a terminal, rich would print an empty line at the end.
+    # If the output is not a terminal, rich would print an empty line at the end.
     bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
     with above(console), bar:
         yield bar

@@ -63,7 +63,7 @@ def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, sour
         raise InputError(f"the key {shown(key)} is not known", key=key, expected=expected)
     if note is None or value is None:
         return key, value
-    # A bare number takes the unit of the constant that it replaces, in case several dimensions are allowed.
+    # Where several dimensions are allowed, a bare number has the unit of the constant that it replaces.
     before = document.get(section, {}).get(name) if note.also else None
     unit = before.get("unit") if isinstance(before, Mapping) else None
     si = note.si if unit is None else si_unit_of(note, unit)
@@ -191,7 +191,7 @@ def _put(document: MutableMapping[str, Any], key: str, value: Any, table: Callab
     if value is None:
         holder.pop(name, None)
     elif isinstance(value, Mapping) and isinstance(holder.get(name), Mapping) and name not in SELECTORS:
-        # Edit in place, which keeps a comment behind the constant.
+        # The value is edited in place, which keeps the comment at the end of the line.
         for part, entry in value.items():
             holder[name][part] = entry
     else:

@@ -1,9 +1,9 @@
 """Statics of a hammer: equilibria of the armature, their stability, and the holding margin.
 
 An equilibrium is a displacement at which the static forces cancel: magnet at a constant current, spring,
-elastic force of the backstop, and the loading branch of the pack (as when fresh paper is pressed slowly; its
-equilibria are held up to the hysteresis of the paper). The paper finds the rest state "by an iteration on x
-such that Ft = 0" at zero current, with the armature compressing the backstop.
+elastic force of the backstop, and the loading branch of the pack (as when fresh paper is pressed slowly;
+equilibria inside the pack neglect the hysteresis of the paper). The paper finds the rest state "by an
+iteration on x such that Ft = 0" at zero current, with the armature compressing the backstop.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ from printhammer.hammer.statics import (
 from printhammer.support.arrays import FloatArray
 from printhammer.support.roots import MOST_POINTS, Root, roots
 
-_PLACES: Final = 401  # Number of grid points of the search for sign changes of the pull
-_LARGEST_CURRENT: Final = 1e6  # Range of currents of a law that states none, A; arbitrary
+_PLACES: Final = 401  # Number of grid points of the search for sign changes of the pull; arbitrary
+_LARGEST_CURRENT: Final = 1e6  # Current limit of magnet laws without a stated range, A; arbitrary
 
 NO_REST: Final = {
     CRUSHED: (
@@ -239,7 +239,7 @@ def pull_reversals(hammer: HammerLike) -> list[float]:
 
 
 def equilibrium_picture(hammer: HammerLike, points: int = 241) -> EquilibriumPicture:
-    """Return the statics of a hammer, with the holding margin on a uniform grid."""
+    """Compute the statics of a hammer, with the holding margin on a uniform grid of `points` points."""
     force = StaticForce(hammer)
     try:
         rest, reason = rest_state(hammer), ""
@@ -266,7 +266,7 @@ def equilibrium_picture(hammer: HammerLike, points: int = 241) -> EquilibriumPic
 
 
 def _work() -> Work:
-    """Return working space for a search; lists are faster than arrays where Python runs the search."""
+    """Allocate the working space of a search; lists, since they are faster than arrays in Python code."""
     room = MOST_POINTS * MOST_PLACES
     return Work([0.0] * MOST_PLACES, [0.0] * room, [0.0] * room, np.empty((room, 3)), _ascending)
 

@@ -279,7 +279,7 @@ class Hammer:
             content["coil.resistance"] = self.coil_resistance.hex()
         models: dict[str, tuple[str, Any]] = {role: (part.law, part) for role, part in self.parts.items()}
         if not _physics(self.coil).keys() - {"resistance"}:
-            # A resistance alone is not a circuit.
+            # A resistance alone does not make a circuit: it only affects the heat.
             models.pop("coil", None)
         if self.waveform is not None:
             models["waveform"] = (self.waveform.shape, self.waveform)

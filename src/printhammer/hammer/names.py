@@ -1,4 +1,4 @@
-"""Names of constants: one vocabulary for files, edits, sweeps, regimes, derivatives, tolerances and controls.
+"""Names of constants, common to files, edits, sweeps, regimes, derivatives, tolerances and controls.
 
 =====================  ========================================================================
 name                   meaning
@@ -49,7 +49,7 @@ PLACES: Final = ("platen", "pack.front", "backstop.position")
 """Constants that are positions on the axis of the armature, such as "backstop.position"."""
 
 _ZERO: Final = {"m": 100e-6, "s": 500e-6, "kg": 1e-3, "N": 10.0}
-"""Upper end of the control range of a constant whose value is zero, by SI unit; typical of print hammers."""
+"""Upper end of the control range of a zero constant, by SI unit; arbitrary, the size of print hammers."""
 
 
 @dataclass(frozen=True)

@@ -53,9 +53,9 @@ class StaticForce:
 
     Magnet, spring and the elastic force of the backstop are functions of x; the pack acts on its loading
     branch, as when fresh paper is pressed slowly. A `rigid` backstop excludes positions below its surface.
-    Within `limits`, m, the magnet's law is valid and a rigid backstop admits the armature; `low` and `high`,
-    m, bound the default search for equilibria: from the lower limit, at most 1 m off the origin, up to the
-    platen, or to the end of the pack, or to the upper limit.
+    `limits`, m, is the range in which the magnet's law is valid and no rigid backstop is penetrated. `low`
+    and `high`, m, bound the default search for equilibria: from the lower limit, but at most 1 m below the
+    origin, to the platen, the end of the pack, or the upper limit.
     """
 
     def __init__(self, hammer: HammerLike) -> None:

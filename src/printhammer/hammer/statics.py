@@ -1,7 +1,7 @@
 """Static force on the armature as plain functions, which can be compiled as entry points.
 
-The law functions of the parts are fields of `Statics`, beside the constants that they take: Python passes the
-functions of the modules of the parts, compiled code those of the kernel.
+`Statics` holds the law functions of the parts with their constants: in Python the functions are those of the
+part modules, in compiled code those of the kernel.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ LEAST_NORMAL: Final = 2.2250738585072014e-308
 """Smallest normal number of double precision."""
 
 FARTHER: Final = (1.0, 10.0, 100.0, 1000.0)
-"""Search radii for equilibria about the origin, m, tried in turn if the hammer sets no limit; arbitrary."""
+"""Search radii about the origin, m, used in turn if the hammer sets no limit; arbitrary."""
 
 EVEN: Final = 1025
-"""Number of evenly spaced points of the search grid for equilibria."""
+"""Number of evenly spaced points of the search grid for equilibria; arbitrary."""
 
 DECADE: Final = 12.0
-"""Number of grid points per decade of distance from an anchor, where the search grid is refined."""
+"""Number of grid points per decade of distance from an anchor (see `StaticForce.anchors`); arbitrary."""
 
 RESTS, CRUSHED, LIFTED, UNSTABLE, EMPTY = range(5)
 """Outcomes of the search for a rest position: found; the backstop is compressed beyond the range of the
@@ -107,16 +107,16 @@ def reach_of(far: float, s: Statics) -> tuple[float, float]:
     if not math.isnan(s.platen):
         high = min(high, s.platen)
     elif s.front < math.inf:
-        # Search a pack without thickness to a depth equal to the distance of its front from the origin.
+        # A pack without thickness is searched to a depth equal to the distance of its front from the origin.
         depth = abs(s.front - origin) if math.isnan(s.thickness) else s.thickness
         high = min(high, s.front + depth)
     return max(low, origin - far), min(high, origin + far)
 
 
 def compressed(current: float, low: float, s: Statics) -> float:
-    """Return the equilibrium nearest to the surface of an elastic backstop that the armature compresses, m.
+    """Return the equilibrium in a compressed elastic backstop that is nearest to the surface, m.
 
-    The result is NaN if there is none down to `low`, m.
+    The result is NaN without an equilibrium above `low`, m.
     """
     depth = max(NEAREST, spacing(s.position))
     above = s.position
@@ -166,7 +166,7 @@ def put_cluster(anchor: float, sign: float, limit: float, grid: Any, count: int)
 
 
 def fill_grid(low: float, high: float, s: Statics, grid: Any) -> int:
-    """Write a search grid between two limits, not sorted: even points, and clusters around the anchors.
+    """Write an unsorted search grid between two limits, m: even points, and clusters around the anchors.
 
     Returns
     -------
@@ -226,8 +226,8 @@ def rest_position(s: Statics, work: Work, out: Any) -> int:
     Returns
     -------
     int
-        Outcome, such as `RESTS`; ``out[0]`` is then the position, m, otherwise ``out[1]`` the number that the
-        message needs: end of the range, m, or force at the backstop, N.
+        Outcome, such as `RESTS`. For `RESTS`, ``out[0]`` is the position, m; otherwise ``out[1]`` is the
+        number stated in the error message: end of the range, m, or force at the backstop, N.
     """
     first, last = reach_of(FARTHER[0], s)
     if s.position > -math.inf:

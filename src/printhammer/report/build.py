@@ -1,6 +1,6 @@
-"""Write a report: evaluate the claims, draw the figures, and publish page and files atomically.
+"""Write a report: evaluate the claims, draw the figures, and publish page and files.
 
-A report appears atomically: it is written to a hidden folder, which is moved to its place at the end.
+A report is written to a hidden folder, whose contents are moved to their place at the end.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def check_place(out: str | Path) -> None:
 
 
 def _is_report(folder: Path) -> bool:
-    """Whether a folder holds a report, even an incompletely published one."""
+    """Whether a folder holds a report, complete or not."""
     try:
         claims = json.loads((folder / CLAIMS).read_bytes())
     except (OSError, ValueError):
@@ -225,7 +225,7 @@ def _draw(
     options: dict[str, Any] = {}
     try:
         if number == _BUZZ:
-            # The claim has already searched for the train of Fig. 7.
+            # The evaluation of the claim has already found the pulse train of Fig. 7.
             options["search"] = buzz_search(context)
         elif number == _POINCARE:
             options["printed"] = printed_verdicts()
@@ -244,7 +244,7 @@ def _draw(
 
 
 def _provenance(hammer: Hammer, context: Context) -> dict[str, Any]:
-    """Return software versions and settings of the report, and the provenance of one sample motion."""
+    """Return the provenance of the report: hammer, settings and software versions."""
     import platform
 
     import matplotlib as mpl

@@ -102,7 +102,7 @@ def _limit_text(value: float, unit: str) -> str:
 
 
 def typeset(text: str) -> str:
-    """Return a sentence with typographic characters."""
+    """Replace "us", ">=", "<=" and "->" in a sentence by µs, ≥, ≤ and →."""
     text = re.sub(r"(?<=\d) u([ms])\b", "\N{NO-BREAK SPACE}µ\\1", text)
     return text.replace(">=", "≥").replace("<=", "≤").replace(" -> ", " → ")
 
@@ -163,7 +163,7 @@ class Report(Declared):
 
     @property
     def statements(self) -> tuple[int, int]:
-        """Numbers of the paper's statements that hold and of all statements; Fig. 11 counts one per panel."""
+        """Number of the paper's statements that hold, and number of all; Fig. 11 has one per panel."""
         pairs = [result.statements for result in self.results]
         return sum(held for held, _ in pairs), sum(made for _, made in pairs)
 
@@ -240,7 +240,7 @@ def misses(claim: Claim, value: Mapping[str, Any] | None) -> list[Miss]:
 
 
 def agreement(value: Any, band: list[str]) -> str:
-    """Format the number of classifications that agree with the paper, such as "9 of 12 as printed"."""
+    """Format the number of panels classified as in the paper, such as "9 of 12 as printed"."""
     words = value if isinstance(value, (list, tuple)) else []
     same = sum(one == other for one, other in zip(words, band, strict=False))
     return f"{same} of {len(band)} as printed"

@@ -29,7 +29,7 @@ from printhammer.report.contents import (
 from printhammer.report.reconstruction.results import BestFor, Family, FamilyMember, Share
 
 SAME: Final = 1e-9
-"""Relative difference up to which two constants count as equal; above rounding errors of unit conversion."""
+"""Relative tolerance for equal constants; larger than the rounding errors of unit conversions."""
 
 
 def share_view(share: Share, floor: float | None = None) -> dict[str, Any]:
@@ -58,7 +58,7 @@ def rates_view(report: Report) -> dict[str, Any] | None:
         return None
     shares = [(result, rates.share(result.claim.name)) for result in report.results]
     known = [(result, share) for result, share in shares if share is not None]
-    # A rate of zero is drawn at the left end.
+    # A rate of zero is drawn at the left end of the logarithmic axis.
     positive = [share.rate or share.interval[1] for _, share in known]
     decades = max(1, math.ceil(-math.log10(min(positive)) - 1e-12)) if positive else 1
     floor = 10.0**-decades
@@ -252,7 +252,7 @@ def _conclusions(family: Family) -> list[dict[str, Any]]:
     for name, conclusion in family.conclusions.items():
         words, unit = split_name(name)
         values = [member.conclusions.get(name) for member in family.hammers]
-        # Statements have no value per member; their range is that of margins, of no interest to readers.
+        # Statements have no value per hammer; their range is that of margins, which the page does not show.
         is_statement = not any(name in member.conclusions for member in family.hammers)
         ends = ("", "") if is_statement else (conclusion.low, conclusion.high)
         low, high = (value_text(end, unit, other=False) for end in ends)
@@ -289,7 +289,7 @@ def _member(member: FamilyMember, names: list[str]) -> dict[str, Any]:
 
 
 def _spread(family: Family, hammer: Hammer) -> dict[str, Any]:
-    """Return the ratios of the family's constants to those of the shipped hammer, on a logarithmic axis."""
+    """Return the family's constants as ratios to the shipped hammer's, on a logarithmic axis."""
     ratios: dict[str, list[float]] = {}
     for key, constant in hammer.constants.items():
         values = [member.constants[key] for member in family.hammers if key in member.constants]
@@ -388,7 +388,7 @@ def view(report: Report) -> dict[str, Any]:
 
 
 def _parts(hammer: Hammer) -> list[dict[str, Any]]:
-    """Group the constants of a hammer by part, each group with the part's law."""
+    """Group the constants of a hammer by part, with the law of each part."""
     laws = {role: part.law for role, part in hammer.parts.items()}
     if hammer.waveform is not None:
         laws["waveform"] = hammer.waveform.shape

@@ -43,7 +43,7 @@ def check_typesetter() -> None:
 
 
 def write_pdf(report: Report, path: Path) -> None:
-    """Write a report as a PDF beside its folder of figures; equal reports yield equal bytes."""
+    """Write a report as PDF next to its folder of figures; equal reports give identical files."""
     check_typesetter()
     import matplotlib as mpl
     import typst
@@ -103,7 +103,7 @@ def _plain(entry: Any) -> Any:
 
 
 def _typeset(data: Any) -> Any:
-    """Return data with typographic characters in all texts."""
+    """Apply `typeset` to all texts of the report's data."""
     if isinstance(data, dict):
         return {key: _typeset(value) for key, value in data.items()}
     if isinstance(data, list | tuple):

@@ -52,7 +52,7 @@ def extent(values: Any) -> str:
 
 
 def span(values: Any) -> str:
-    """Format the range of an array, from the smallest to the largest number; empty without numbers."""
+    """Format the range of an array as "least to largest"; empty if the array has no finite number."""
     array = np.asarray(values)
     if array.dtype.kind not in "fiu":
         return ""
@@ -144,7 +144,7 @@ def heading(name: str, unit: str) -> str:
 
 
 class More(TypedDict, total=False):
-    """Optional keyword arguments of a declaration, as described for `Column`."""
+    """Optional keyword arguments of `column` and related functions, as described for `Column`."""
 
     more: str
     name: str
@@ -291,5 +291,5 @@ class Declared:
 
 
 def public_names(names: Iterable[str]) -> list[str]:
-    """Return the public attribute names of an object, without constants of its class."""
+    """Filter the names of an object's attributes: public names, without class constants."""
     return sorted(name for name in names if not name.startswith("_") and not name.isupper())

@@ -2,7 +2,7 @@
 
 | ending | content |
 |---|---|
-| `.nc` | the Dataset, NetCDF in the classic format, which everything reads |
+| `.nc` | the Dataset, in the classic NetCDF format, which every NetCDF reader supports |
 | `.zarr` | the Dataset, a Zarr v3 store (needs the extra ``sweep``) |
 | `.json` | the Dataset: its attributes, and under ``columns`` every array with dimensions, unit and meaning |
 | `.csv` | the table, below lines ``# key: value`` with the attributes |
@@ -268,7 +268,7 @@ def _flat(attributes: Mapping[Any, Any]) -> dict[str, Any]:
     flat = {}
     for key, value in attributes.items():
         kept = plain(value)
-        # An array of one number would be read back as a number.
+        # NetCDF readers return an array of one number as a number.
         entries = kept if isinstance(kept, list) and len(kept) > 1 else [kept]
         numbers = all(
             isinstance(entry, float) or (isinstance(entry, int) and abs(entry) < _MOST_INT)
@@ -285,7 +285,7 @@ def _save_zarr(dataset: xr.Dataset, target: Path) -> None:
     try:
         draft = Path(tempfile.mkdtemp(prefix=f".{target.name}.", dir=target.parent))
         with catch_warnings():
-            # Consolidated metadata avoid a warning in readers; each array has its own as well.
+            # Consolidated metadata, in addition to the metadata of each array, avoid a warning in readers.
             simplefilter("ignore")
             dataset.assign_attrs(_flat(dataset.attrs)).to_zarr(
                 draft / target.name, mode="w", zarr_format=3, consolidated=True

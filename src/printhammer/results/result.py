@@ -8,13 +8,13 @@
 ...     time: FloatArray = column("s", "time of the fall", "fall", more="nan where it did not land")
 ...     tolerance: float = scalar("1", "error allowed in one step")
 
-makes a frozen dataclass whose Dataset, table, files, docstring and HTML repr follow from the declaration, and
-whose picture `printhammer.figures.plots` knows by the name of the class. Units that depend on the instance,
-and arrays that are no fields, come from a class's own `entries`; further attributes from its `notes`.
+defines a frozen dataclass whose Dataset, table, files, docstring and HTML repr follow from the declaration;
+`printhammer.figures.plots` registers its plot function by the name of the class. A class overrides `entries`
+for units that depend on the instance and for arrays that are not fields, and `notes` for further attributes.
 
 `stacked` combines results of one class along a new dimension.
 
-`Rows` are objects of one declared class, as a tuple and as a table.
+`Rows` is a tuple of objects of one declared class, with a table view.
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ class Result:
             known["waveform"] = regime.fired
         for name in ("hammer", "drive", "waveform", "overlap", "period", "scheme", "tolerance", "status"):
             value = getattr(self, name, None)
-            # A chart of many runs has a status for each.
+            # A result of many runs has one status per run, which does not belong to the provenance.
             if value is not None and np.ndim(value) == 0:
                 known[name] = value
         return provenance(**known)
@@ -196,7 +196,7 @@ class Result:
         Options are those of the plot function that `printhammer.figures.plots` registers for the class;
         `picture` selects an alternative figure.
         """
-        # By name, so that physics does not depend on pictures.
+        # Imported by name, so that the physics does not depend on the figures.
         figure: Figure = import_module("printhammer.figures.plots").plot(self, **options)
         return figure
 
@@ -247,7 +247,7 @@ class Result:
 
 
 def _worded(summary: Callable[..., Summary]) -> Callable[..., Summary]:
-    """Decorate `summary` to write the hammer's noun for the result of a pulse instead of "dot"."""
+    """Decorate `summary`: replace "dot" by the hammer's noun for the result of a pulse."""
 
     @wraps(summary)
     def said(self: Result, *args: Any, **options: Any) -> Summary:

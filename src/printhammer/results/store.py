@@ -2,8 +2,8 @@
 
 All arrays are laid out before the first result. A block of members is one chunk of every array, so that
 stored data are never rewritten. Each file is written to a temporary name, flushed to disk, and renamed; the
-chunk of the array `MARK` is written last, so that a block is done if and only if that file exists. The lock
-of a store is released when the process that holds it ends.
+chunk of the array `MARK` is written last, so that a block is done if and only if that file exists. The
+operating system releases the lock of a store when the process ends.
 """
 
 from __future__ import annotations
@@ -316,7 +316,7 @@ def _make(folder: Path) -> list[Path]:
 
 
 def _flush(paths: Collection[Path]) -> None:
-    """Flush files and directory entries to disk in parallel, which takes hardly longer than one flush."""
+    """Flush files and directory entries to disk, in parallel since a flush mostly waits for the disk."""
     with ThreadPoolExecutor(min(_FLUSHES, len(paths))) as pool:
         list(pool.map(_flush_one, paths))
 

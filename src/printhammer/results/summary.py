@@ -24,7 +24,7 @@ Style = Literal["good", "poor", "bad", "strong", "best", "dim", "cyan", "magenta
 FactRow = tuple[str, str | None]
 
 NONE: Final = "–"
-"""Text shown for a missing quantity."""
+"""Text shown in place of a missing quantity, a dash."""
 
 SHOWN: Final[dict[str, dict[str, tuple[str, str]]]] = {
     "s": {"si": ("us", ".1f"), "inch": ("us", ".1f")},
@@ -45,12 +45,12 @@ _STYLED: Final = re.compile("⟪([a-z]+) ([^⟪⟫]*)⟫")
 
 
 def quantity(value: float | None, unit: str, *, bare: bool = False) -> str:
-    """Return the mark of a quantity in SI, with a unit in `SHOWN`; `bare` hides the unit; a dash for None."""
+    """Return the mark of an SI quantity with a unit from `SHOWN`, or a dash; `bare` hides the unit."""
     return NONE if value is None else f"⟦{float(value)!r} {unit}{'!' * bare}⟧"
 
 
 def interval(values: npt.NDArray[Any], unit: str) -> str | None:
-    """Return the range of an array in SI as text, with marked quantities; None for an empty array."""
+    """Return the text "least to largest" for an SI array, with marked quantities; None if empty."""
     return f"{quantity(values.min(), unit)} to {quantity(values.max(), unit)}" if values.size else None
 
 
@@ -60,7 +60,7 @@ def styled(style: Style, said: object) -> str:
 
 
 def judged(good: bool, said: object, otherwise: Style = "poor") -> str:
-    """Return a text with the style "good" or, if `good` is false, with the style `otherwise`."""
+    """Return a text marked with the style "good" if `good`, else with the style `otherwise`."""
     return styled("good" if good else otherwise, said)
 
 

@@ -44,10 +44,9 @@ class Contact(Declared):
 
 
 class Dot(Declared):
-    """Dot that one firing makes on the paper.
+    """Dot of one firing: its first pack contact; see `printhammer.kernel.model.dots`.
 
-    The first pack contact after a firing makes its dot; see `printhammer.kernel.model.dots`; a firing without
-    one is a lost dot.
+    A firing without a pack contact is a lost dot.
     """
 
     index: int = part("index of the firing, from 0")

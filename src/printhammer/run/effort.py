@@ -126,10 +126,10 @@ _TYPES: Final = {"tolerance": "float", "threads": "int | None", "progress": "Pro
 def computation(function: F) -> F:
     """Decorate a public function to accept tolerance, threads and progress, and pass one `Effort`.
 
-    The function has a parameter `effort`, whose default supplies the defaults of the keywords; the type of
-    its `**` names the keywords it accepts: `Unpack[Keywords]`, or a dictionary with further keys, which stay
-    in its `**`. Signature and docstring show the keywords instead of the parameter `effort`, which functions
-    of the package use among themselves. Entries already present in the docstring are kept.
+    The function has a parameter `effort`, whose default supplies the defaults of the keywords. The type of
+    its `**` parameter names the accepted keywords: `Unpack[Keywords]`, or a dictionary type with further
+    keys, which are passed on in `**`. Public signature and docstring show the keywords; functions of the
+    package pass `effort` to each other. Entries already present in the docstring are kept.
     """
     signature = inspect.signature(function)
     *own, rest = signature.parameters.values()

@@ -1,6 +1,6 @@
 """Energies of a run: work of the coil, and the ledger of work, losses and stored energies.
 
-The ledger sums the work of the coil, the losses in pack and backstop, and the stored energy.
+The ledger balances the work of the coil with the losses in pack and backstop and the stored energy.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from printhammer.run.supply import linkage, winding_of
 from printhammer.support.arrays import FloatArray
 
 _SAMPLES: Final = np.array([*np.linspace(0.0, 1.0, 9)[:-1], 1.0 - 1e-9])
-_BISECTIONS: Final = 52  # Bisections that exhaust the bits of a float
+_BISECTIONS: Final = 52  # Number of bisections: the bits of a double's mantissa
 _HALVINGS: Final = 12  # Iteration limit of the step halving; arbitrary
 _HEAT_ERROR: Final = 1e-13  # Relative error at which the heat integral has converged
 
@@ -47,12 +47,12 @@ class CoilWork(Declared):
 
     @property
     def given_back(self) -> float:
-        """Work that the armature does on the coil, J: positive minus net work."""
+        """Energy that the armature returns to the coil, J: positive minus net work."""
         return self.positive - self.net
 
 
 def coil_power(hammer: Hammer, x: FloatArray, v: FloatArray, magnet: FloatArray) -> FloatArray:
-    """Return the power of the coil, W, from displacement, m, velocity, m/s, and force of the magnet, N."""
+    """Return the power of the coil, W, from displacement, m, velocity, m/s, and magnet force, N."""
     static = StaticForce(hammer)
     unexcited = np.array([static.magnet(place) for place in x.ravel().tolist()]).reshape(x.shape)
     return np.asarray((magnet - unexcited) * v)
@@ -61,8 +61,8 @@ def coil_power(hammer: Hammer, x: FloatArray, v: FloatArray, magnet: FloatArray)
 def coil_work_of(problem: Problem, record: Record) -> CoilWork:
     """Integrate the coil power along a run, separately over intervals of positive and negative power.
 
-    The quadrature is the same as for the ledger. Steps in which the power changes sign are split there, so
-    that every integrand is smooth.
+    The quadrature is that of the ledger. Steps in which the power changes sign are split at the zero, so that
+    every integrand is smooth.
     """
     start, end = float(record.nodes[0, 0]), float(record.nodes[-1, 0])
     resistance = problem.hammer.coil_resistance

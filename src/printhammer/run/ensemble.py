@@ -1,8 +1,8 @@
 """Ensembles: many runs, integrated together on all cores.
 
-Every member has its own hammer, drive, state, steps and contacts. Only requested results of a run are stored,
-so that memory does not grow with its length. The results of a member do not depend on the other members or on
-the number of threads.
+Every member has its own hammer, drive, state, steps and contacts. Only requested results are stored, so that
+memory does not grow with the length of the runs. The results of a member do not depend on the other members
+or on the number of threads.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ __all__ = [
 ]
 
 DISPLAY_TOLERANCE: Final = 5e-7
-"""Tolerance for plots: displacements are accurate to about 1e-4 of the stroke."""
+"""Integration tolerance for plots: displacements are accurate to about 1e-4 of the stroke."""
 
 Engine = Literal["auto", "plain", "lanes"]
 ENGINES: Final = get_args(Engine)
@@ -368,7 +368,7 @@ class Ensemble:
         moments = self._moments(strobes)
         jobs = [Job(group, bool(dots), bool(extra), moments, grid, x) for group in self.groups]
         _integrate(jobs, engine, workers, progress)
-        # Members with more extra contacts than available rows run once more.
+        # Members with more extra contacts than rows are integrated again with more rows.
         _integrate([job for job in jobs if job.make_room()], engine, workers, None)
         for job in jobs:
             job.finish(x)
@@ -391,7 +391,7 @@ class Ensemble:
         return whole
 
     def _spread(self, rows: Sequence[Ragged]) -> FloatArray:
-        """Merge the groups' rows into one array, shape (members, rows, columns), padded with NaN."""
+        """Scatter the rows of the groups into one array, shape (members, rows, columns), padded with NaN."""
         most = max((own.longest for own in rows), default=0)
         width = max((own.values.shape[1] for own in rows), default=MOST_COLUMNS)
         whole = np.full((self.size, most, width), np.nan)

@@ -1,6 +1,6 @@
-"""Groups of ensemble members with the same laws: input arrays for the kernel, and its results.
+"""Groups of ensemble members with the same laws: arrays passed to and filled by the kernel.
 
-The drives of an ensemble are arrays, too: a few forms of pulses, and many firing times.
+The drives of an ensemble are stored as arrays: a few forms of pulses, and many firing times.
 """
 
 from __future__ import annotations
@@ -47,8 +47,7 @@ _NODES: Final = 2048  # Initial number of rows for nodes; arbitrary, enlarged on
 _CONTACTS: Final = 256  # Initial number of rows for contacts; arbitrary, likewise
 MOST_COLUMNS: Final = 6
 _EXTRA: Final = 4
-"""Rows for extra contacts of a member, in addition to one per firing, before their number is known;
-arbitrary."""
+"""Initial number of rows for extra contacts of a member, in addition to one per firing; arbitrary."""
 _STROBE_WIDTH: Final = 4  # As in `printhammer.kernel.single.stretch`
 _ELECTRIC_WIDTH: Final = 3
 _PIECE: Final = 4 * lane_layout.LANES
@@ -58,7 +57,7 @@ _PIECE: Final = 4 * lane_layout.LANES
 class Group:
     """Ensemble members with the same laws, overlap rule, kinds of waveform pieces and kind of start.
 
-    The assignment depends on each member alone, so that its kernel does not depend on the other members.
+    The group of a member depends on that member only, so that its kernel does not depend on other members.
     `members` are their indices in the ensemble; `hammers` and `hammer_of` hold the distinct hammers and the
     index for each member, and `fired` the drives of all members. Each member of the ensemble has a row of
     `states` (time, displacement, velocity and further components at the start) and an end, s. No run takes
@@ -76,7 +75,7 @@ class Group:
         tolerance: float,
         max_steps: int,
     ) -> None:
-        # Imported late, since it imports numba.
+        # Imported here, since the module imports numba.
         from printhammer.kernel.compile.specialise import specialise
         from printhammer.kernel.lanes.batch import Batch
 
@@ -165,7 +164,7 @@ def _posed(
     for places in map(alike.__getitem__, range(len(alike))):
         own = members[places]
         drive = fired.drives[own[0]]
-        # Sorted by hammer first.
+        # Rows are sorted by hammer first.
         if hammer is not hammers[hammer_of[own[0]]]:
             hammer = hammers[hammer_of[own[0]]]
             static, packed = StaticForce(hammer), constants_of(hammer)
@@ -293,9 +292,9 @@ class Job:
         return True
 
     def share_out(self, threads: int) -> int:
-        """Distribute neighbouring members over different units of work; return the size of a unit in members.
+        """Distribute neighbouring members over different units of work; return the members per unit.
 
-        Neighbours take about the same time, and a unit takes as long as its slowest member.
+        Neighbouring members have similar computation times, so units of mixed members are balanced.
         """
         count = self.order.size
         pieces = threads * max(1, round(count / (_PIECE * threads)))
@@ -303,7 +302,7 @@ class Job:
         return -(-count // pieces)
 
     def prepare(self, lanes: bool) -> None:
-        """Load the machine code in this thread, before other threads need it."""
+        """Load the machine code of the kernel in this thread, before worker threads call it."""
         if lanes:
             self.lane_piece(0, 0)
         else:
@@ -411,7 +410,7 @@ class Fired:
             self.form_of = places[drives.pulse_of]
             self.begins = np.zeros(self.firings.values.size, np.int64)
         else:
-            # Many members often share one drive object.
+            # A cache by identity, since many members often share one drive object.
             known = {id(drive): drive for drive in drives}
             added = {key: (self._add(drive), drive.kernel_arrays()[1]) for key, drive in known.items()}
             self.form_of = np.array([added[id(drive)][0] for drive in drives], dtype=np.int64)

@@ -50,11 +50,11 @@ PATHS: Final = ("supply", "chopped", "blocked", "backward")
 """Paths of the coil current: through the supply, through the diode of a chopper, none, and decay of a
 negative current."""
 
-_BISECTIONS: Final = 52  # Bisections that exhaust the bits of a float
+_BISECTIONS: Final = 52  # Number of bisections: the bits of a double's mantissa
 
 
 MOST_DOTS: Final = 40
-"""Largest number of dots listed in a summary; of more dots, only the first and last are listed. Arbitrary."""
+"""Largest number of dots in a summary; a longer list shows its first and last dots. Arbitrary."""
 
 
 def _remark(dot: Dot) -> str:
@@ -295,7 +295,7 @@ class Motion(Result, fields=False):
 
     @cached_property
     def strobe(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Times of the firings inside the run, s, and displacement, m, and velocity, m/s, at each."""
+        """Firing times inside the run, s, with displacement, m, and velocity, m/s, at each firing."""
         times = self.drive.times
         times = np.array(times[(times >= self.start) & (times <= self.end)])
         return times, *self.at(times)

@@ -33,14 +33,14 @@ T = TypeVar("T")
 TOLERANCE: Final = 2e-11
 """Default tolerance: error of one step, in units of the stroke and of a typical speed."""
 
-LEAST_TOLERANCE: Final = 1e-15  # Smallest tolerance, near the rounding of the arithmetic
+LEAST_TOLERANCE: Final = 1e-15  # Smallest accepted tolerance, near the rounding error of doubles
 LARGEST_TOLERANCE: Final = 1e-5
-"""Largest accepted tolerance; above it, the curves between the ends of steps would be inaccurate."""
+"""Largest accepted tolerance; with larger steps the dense output would be inaccurate."""
 
 MAX_STEPS: Final = 50_000_000  # Default largest number of steps of a run
 _NODES: Final = 2048  # Rows of nodes in the smallest working space
 _CONTACTS: Final = 256  # Rows of contacts in the smallest working space
-_NODES_A_FLIGHT: Final = 40  # Rows of nodes per flight in the initial guess of the memory
+_NODES_A_FLIGHT: Final = 40  # Nodes per flight in the initial guess of the array size
 _MOST_FLIGHTS: Final = 1e6  # Largest number of flights of that guess; arbitrary
 
 
@@ -93,7 +93,7 @@ class _TooLong(Exception):
 def fresh_carry(
     start: float, state: tuple[float, float], pause_after: float = math.inf, beyond: Beyond = AT_REST
 ) -> FloatArray:
-    """Return the initial state array of the kernel's `run`, which pauses after `pause_after` nodes."""
+    """Build the initial carry array of the kernel's `run`, which pauses after `pause_after` nodes."""
     array = np.zeros(carry.SIZE)
     array[carry.TIME] = start
     array[carry.POSITION_NOW], array[carry.VELOCITY] = state
@@ -115,7 +115,7 @@ def check_tolerance(tolerance: object) -> None:
 
 
 def laws_of(hammer: Hammer, drive: Drive | str) -> Laws:
-    """Return the laws of a hammer's parts, and of a drive or its quantity, that select the kernel."""
+    """Return the laws of a hammer's parts and of its drive, which select the compiled kernel."""
     quantity = drive if isinstance(drive, str) else drive.quantity
     return Laws(
         magnet=_module(hammer.magnet),
@@ -162,10 +162,10 @@ def scales_of(
     """Return a typical displacement [m] and speed [m/s] of a hammer, the units of tolerances.
 
     The displacement is the distance from backstop to pack. If backstop or pack is missing, the displacement
-    is the largest of three: the distance that the forces would move the mass in one period (of the drive or
-    of the hammer, over 2 pi), the distance of the initial state from the origin, and the distance covered in
-    that time at the initial velocity. The speed is the one that the largest force imparts to the mass over
-    that displacement. `static` is the static force of the hammer, computed if not passed.
+    is the largest of three: the distance that the forces would move the mass in 1 / (2 pi) of a period of the
+    drive or of the hammer, the distance of the initial state from the origin, and the distance covered in
+    that time at the initial velocity. The typical speed is that imparted to the mass by the largest force
+    over that displacement. `static` is the static force of the hammer, computed if not passed.
     """
     if static is None:
         static = StaticForce(hammer)
@@ -182,7 +182,7 @@ def control_of(scales: tuple[float, float], tolerance: float) -> tuple[float, fl
 
 
 def bounds_of(hammer: Hammer, scales: tuple[float, float]) -> tuple[float, float, float, float]:
-    """Return the displacement range of the force law, the origin, and the distance that counts as runaway."""
+    """Return the displacement range of the force law, the origin, and the runaway distance, all in m."""
     low, high = hammer.magnet.domain if hammer.magnet is not None else (-math.inf, math.inf)
     return (low, high, hammer.origin, FAR * scales[0])
 
@@ -218,7 +218,7 @@ class Problem:
         if self.laws.circuit:
             take_supply(self.constants, hammer, drive)
         firings, begins, pieces, self.replace, _force = drive.kernel_arrays()
-        # The kernel is compiled for writable arrays.
+        # A copy, since the kernel is compiled for writable arrays.
         self.firings = np.array(firings, dtype=np.float64)
         self.begins = np.array(begins, dtype=np.int64)
         self.pieces = np.array(pieces, dtype=np.float64)
@@ -268,7 +268,7 @@ class Problem:
 
     def run(self, end: float) -> Record:
         """Integrate from the initial state to time `end`, s; return the record of the run."""
-        # A generous guess: unused memory costs nothing, a repeated run does.
+        # A generous size: unused memory costs nothing, but a repeated run does.
         flights = min(max(end - self.start, 0.0) * self.scales[1] / self.scales[0], _MOST_FLIGHTS)
         capacity = _NODES + int(_NODES_A_FLIGHT * flights)
         contact_capacity = _CONTACTS + int(flights)

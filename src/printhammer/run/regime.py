@@ -134,7 +134,7 @@ class Regime(Declared):
         overlap: Overlap | None = None,
         phase: float | None = None,
     ) -> Regime:
-        """Return the regime described by the arguments of a public function.
+        """Build a regime from the arguments of a public function.
 
         Parameters
         ----------
@@ -189,7 +189,7 @@ class Regime(Declared):
 
     @classmethod
     def of_firing(cls, hammer: Hammer | Regime, firing: Firing) -> Regime:
-        """Return the regime described by the keywords of a public function; see `of`."""
+        """Build a regime from a hammer and the keywords `Firing` of a public function; see `of`."""
         return cls.of(hammer, **firing)
 
     @property
@@ -208,7 +208,8 @@ class Regime(Declared):
     def is_planar(self) -> bool:
         """Whether displacement and velocity are the complete state at a section without coil current.
 
-        Under a voltage they are not if the coil has a shorted turn, or the supply a capacitor.
+        The state has further components under a voltage, if the coil has a shorted turn or the supply a
+        capacitor.
         """
         if self.fired.quantity != "voltage":
             return True
@@ -242,7 +243,7 @@ class Regime(Declared):
         return self if self.phase == 0.0 else replace(self, phase=0.0)
 
     def pulses(self, count: int) -> Drive:
-        """Return a drive of `count` pulses from time 0, none before; or the continuous periodic force."""
+        """Return a drive of `count` pulses that begins at time 0, or the continuous periodic force."""
         if self.drive is not None:
             return self.drive
         return PulseTrain(self.fired, period=self.period, pulses=count, overlap=self.overlap)
@@ -250,8 +251,8 @@ class Regime(Declared):
     def train(self, firings: int) -> tuple[Drive, float]:
         """Return a drive with the same history at each of `firings` firings, and the first firing time, s.
 
-        All earlier pulses are active at the first firing; one more pulse is fired at the end, so that no
-        state depends on the position of the end.
+        The drive includes all earlier pulses that are still active at the first firing, and one more pulse at
+        the end, so that the states do not depend on the end of the drive.
         """
         if self.drive is not None:
             return self.drive, float(self.drive.times[0])
@@ -260,7 +261,7 @@ class Regime(Declared):
         return train, float(train.times[before])
 
     def moments(self, train: Drive, firings: int, phase: float | None = None) -> FloatArray:
-        """Return the times of the sections, s, shape (firings + 1,), in a train made by `train`.
+        """Return the section times, s, shape (firings + 1,), of a drive returned by `train`.
 
         A section lies `phase` periods after each firing, by default the phase of the regime.
         """

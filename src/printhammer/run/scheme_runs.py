@@ -1,8 +1,8 @@
 """Runs of the paper's two integrators, recorded in the format of the default integrator.
 
-Between the ends of fixed steps the schemes define no motion; it is replaced by the cubic through position and
-velocity at both ends. A touch is recorded at the first step end inside a contact, since the schemes locate no
-discontinuity.
+The schemes define no motion between the ends of their fixed steps; the record uses the cubic Hermite
+interpolant of position and velocity. A touch is recorded at the first step end inside a contact, since the
+schemes locate no discontinuity.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ class SchemeProblem(Problem):
         return t, x, v, mode, memory, run.status
 
     def run(self, end: float) -> Record:
-        """Integrate to time `end`, s; a diverged run has the status of a step underflow."""
+        """Integrate to time `end`, s; a diverged run has the status "step underflow"."""
         run = self.integrate(end)
         nodes = self._nodes(run.t, run.x, run.v)
         return Record(

@@ -28,7 +28,7 @@ Scheme = Literal["default", "trapezoid", "runge-kutta-4"]
 SCHEMES: Final = get_args(Scheme)
 """Integrators: the default, with located contacts and high order, and the two schemes of the paper."""
 
-# Limits of the number of output points, and points per time scale
+# Limits on the number of output points, and number of points per time scale of the hammer
 _FEWEST, _MOST, _PER_SCALE = 1001, 400_001, 100
 
 
@@ -104,11 +104,11 @@ def simulate(
 
 
 def announce_compiling(callback: Callable[[str], None], *, helped: bool = True) -> Callable[[], None]:
-    """Register a callback that receives a message before compilation; return a function to unregister it.
+    """Register a callback for messages before compilation; return a function that unregisters it.
 
-    The sentence names what is compiled and the expected duration. Further sentences report, once, that
-    machine code cannot be cached, or why cached code does not fit. If `helped`, a second process compiles as
-    well.
+    A message names the compiled functions and the expected duration. Further messages report, once each, that
+    machine code cannot be cached, or why cached code is invalid. If `helped`, a second process compiles the
+        code that evaluates finished runs (`printhammer.run.ahead`).
     """
     from printhammer.kernel.compile import cache, specialise
     from printhammer.run import ahead
@@ -169,7 +169,7 @@ def _grid(problem: Problem, end: float, points: int | None, times: npt.ArrayLike
 Surface = Literal["pack", "backstop"]
 CODES: Final = {"pack": PACK_SURFACE, "backstop": BACKSTOP_SURFACE}
 
-_STRETCH: Final = 4096  # Nodes of a record in one stretch, which bounds the memory
+_STRETCH: Final = 4096  # Number of nodes of a record processed at once, which bounds the memory; arbitrary
 _SURFACE, _IN, _OUT, _INITIAL = 0, 1, 3, 6
 """Columns of a contact in the kernel's record: surface, touch, departure, open at the start."""
 
@@ -186,10 +186,10 @@ class Touches(Declared):
 
 
 def touches_of(problem: Problem, surface: Surface, after: float, end: float, most: int) -> Touches:
-    """Integrate until a surface has been touched `most` times, or to the end; return the touches.
+    """Integrate up to `most` touches of a surface, or to the end of the run; return the touches.
 
-    Touches count from the time `after`, s, up to the `end` of the run, s; a contact open at its start does
-    not count.
+    Touches count from the time `after`, s, up to the `end` of the run, s; a contact that is open at the start
+    of the run does not count.
     """
 
     def take(stretches: Iterator[Stretch]) -> Touches:

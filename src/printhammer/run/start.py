@@ -1,7 +1,6 @@
 """Initial state of a run: the rest state, or a validated state.
 
-In the pack, branch and memory belong to the state; under a voltage, the currents of the coil do: see
-`Beyond`.
+The state includes branch and memory in the pack, and the coil currents under a voltage; see `Beyond`.
 """
 
 from __future__ import annotations
@@ -148,9 +147,9 @@ def state_beyond(hammer: Hammer, state: Sequence[float] | None, quantity: str) -
 def state_to_begin(
     hammer: Hammer, x: float, v: float, mode: int, memory: float
 ) -> tuple[float, float, float, float] | None:
-    """Return displacement, velocity, branch and memory from which another run can continue.
+    """Convert a state (x, v, mode, memory) to an initial state (x, v, branch, memory) of another run.
 
-    The result is None if no run can continue, since the pack has released the armature.
+    The result is None if no run can continue from the state, since the pack has just released the armature.
     """
     branch = HELD_BRANCHES.get(mode, mode)
     if mode == PACK_RELEASED:

@@ -147,7 +147,7 @@ def current_scale(hammer: Hammer, drive: Drive) -> float:
 
 
 def take_supply(constants: FloatArray, hammer: Hammer, drive: Drive) -> None:
-    """Write the supply, and the scales of current and flux linkage, into the parameter array.
+    """Write the supply, and the scales of current and flux linkage, into the kernel's parameter array.
 
     Raises
     ------

@@ -5,8 +5,8 @@ doubled until it holds `FLIGHTS` flight times of the single pulse and ends with 
 dot of a run is then complete, including its extra contacts. The window of the paper's hammer, with a flight
 time of 0.28 ms, is 4 ms. For many devices, see `printhammer.run.waits`.
 
-The same pulse gives the time scale of a device, by which the default rates and times of all verbs, those of
-the paper's hammer, are multiplied.
+The same pulse gives the time scale of a device: default times, stated for the paper's hammer, are multiplied
+by the time scale, and default rates are divided by it.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ MOST_STEPS: Final = 500_000  # Largest number of steps of a single pulse; arbitr
 _MOST_KEPT: Final = 512  # Number of cached windows at which the cache is emptied
 
 _FLIGHT: Final = 0.28e-3  # Flight time of the paper's hammer, for which default rates and times are stated, s
-# Pulses that cover more than this fraction of a period at the default rates would run into each other.
+# Fraction of a period at the default rates that a pulse may cover; longer pulses would overlap
 _ON: Final = 0.5
 
 _known: dict[tuple[str, str], Window] = {}
@@ -66,7 +66,7 @@ def wait_of(hammer: Hammer, waveform: Waveform | None = None) -> float:
 
 
 def time_scale(hammer: Hammer, waveform: Waveform | None = None) -> float:
-    """Compute the factor by which a device is slower than the paper's hammer: 1, 2, 5, 10, 20, ...
+    """Compute the time scale of a device relative to the paper's hammer: 1, 2, 5, 10, 20, ...
 
     The factor is the larger of the flight time of a single pulse and half the width of the pulse, divided by
     the flight time of the paper's hammer, 0.28 ms, and rounded on a logarithmic scale; 1 for an endless
@@ -85,7 +85,7 @@ def time_scale(hammer: Hammer, waveform: Waveform | None = None) -> float:
 
 
 def scaled_rate(hammer: Hammer, rate: float, waveform: Waveform | None = None) -> float:
-    """Scale a rate, Hz, of the paper's hammer to a device."""
+    """Divide a rate, Hz, stated for the paper's hammer, by the time scale of a device."""
     return rate / time_scale(hammer, waveform)
 
 
@@ -103,7 +103,7 @@ def _window_of(hammer: Hammer, pulse: Waveform) -> Window:
             if wait >= last:
                 break
             wait *= 2.0
-        # Threads share the cache: emptying it leaves the windows that others return as they are.
+        # Threads share the cache; clearing it does not affect windows already returned.
         if len(_known) >= _MOST_KEPT:
             _known.clear()
         window = _known[key] = Window(wait, seen.flight)
@@ -149,6 +149,6 @@ def is_enough(hammer: Hammer, seen: Single, wait: float) -> bool:
 
 
 def last_wait(hammer: Hammer, waveform: Waveform) -> float:
-    """Return the largest window, s; the search for a window does not double a window beyond it."""
+    """Return the upper bound on the window, s, at which the search by doubling stops."""
     way, speed = scales_of(hammer, PulseTrain(waveform), (hammer.rest, 0.0))
     return last_window(least_wait(waveform), way, speed)

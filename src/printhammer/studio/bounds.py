@@ -41,10 +41,10 @@ MOST_STEPS: Final = 50_000
 """Step limit of the single run that the curves show."""
 
 MOST_MAP_STEPS: Final = 20_000
-"""Step limit of each run of a view that needs many runs, such as the map."""
+"""Step limit per run of views that consist of many runs, such as the map."""
 
 MOST_SECTION_STEPS: Final = 60_000
-"""Step limit of the run to the first points of a strobe section."""
+"""Step limit of the run that computes the first points of a strobe section."""
 
 MOST_WORK: Final = 20_000_000
 """Limit on the total number of steps of all runs of a printed line."""
@@ -59,7 +59,7 @@ POINTS: Final = 1600
 """Smallest number of points of a plotted curve."""
 
 MOST_ENDS: Final = 20_000
-"""Largest number of ends of integration steps among the points of a curve."""
+"""Largest number of step ends of the integrator among the points of a plotted curve."""
 
 PREVIEW: Final = {"false": (64, 128), "true": (32, 128)}
 """Numbers of rates and times of the coarse map, by whether a voltage drives the coil.

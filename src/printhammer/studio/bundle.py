@@ -16,7 +16,7 @@ _EXPORT: Final = re.compile(r"^export (?=(async )?function|const|let|class)", re
 
 _BLOCK: Final = 16
 _SHORTEST: Final = 32
-"""Length of a hashed block and of the shortest copy, bytes; smaller lengths give no smaller page."""
+"""Length of hashed blocks, and least length of a copy, bytes; shorter blocks do not compress better."""
 
 
 @lru_cache
@@ -28,7 +28,7 @@ def page_files() -> dict[str, bytes]:
         for entry in root.joinpath(place).iterdir():
             if entry.name.endswith(_ENDINGS):
                 contents[place + entry.name] = entry.read_bytes()
-    # Vendored files stay unmodified; their definitions are exported as modules here.
+    # Vendored files are stored unmodified; the `export` statements of modules are added here.
     contents["vendor/uPlot.js"] = contents["vendor/uPlot.iife.min.js"] + b"\nexport default uPlot;\n"
     toml = root.joinpath("vendor", "smol-toml.min.cjs").read_bytes()
     module = b"export const parseToml = ((exports) => {\n%b\nreturn exports.parse;\n})({});\n" % toml
@@ -38,7 +38,7 @@ def page_files() -> dict[str, bytes]:
 
 
 def inside(content: object) -> str:
-    """Return JSON in which "<" is escaped, so that no text ends the enclosing script element."""
+    """Escape "<" in JSON text, so that no text ends the enclosing script element."""
     return json.dumps(content).replace("<", "\\u003c")
 
 
@@ -65,7 +65,7 @@ def sources(wanted: str) -> list[tuple[str, str]]:
         ordered[name] = _IMPORT.sub(place, texts[name])
 
     add(wanted)
-    # A module is entered after those that it imports.
+    # A module follows the modules that it imports.
     return list(ordered.items())
 
 
@@ -110,7 +110,7 @@ def deltas(content: bytes) -> bytes:
 
 
 def _common_end(content: bytes, at: int, distance: int) -> int:
-    """Return the end of the longest match between the bytes from `at` on and those `distance` earlier."""
+    """Return the end index of the longest match of the bytes at `at` with those `distance` bytes earlier."""
     step = 4096
     while step and at < len(content):
         step = min(step, len(content) - at)

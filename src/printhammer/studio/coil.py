@@ -1,7 +1,7 @@
 """Coil constants that a hammer file does not specify: the temperature, or all constants of the winding.
 
-A hammer whose file states no resistance is driven by a current. If the user selects a driver by voltage for
-it, winding and rail are chosen such that the current rises to about the same peak in the same time.
+A hammer whose file states no resistance is driven by a current. If the user selects a voltage driver for such
+a hammer, winding and rail are chosen such that the current rises to about the same peak in the same time.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _REACH: Final = 1.0 / (1.0 - math.exp(-1.0 / _LAST))
 """Rail voltage divided by R × peak current, where R is the resistance, for exponential rise."""
 
 _PULSE: Final = (1.97, 177e-6)
-"""Current, A, and width, s, of the pulse if the hammer has no current pulse; as for the shipped hammer."""
+"""Default peak, A, and width, s, of a current pulse, from the hammer `hendriks-1983`."""
 
 
 def has_rail(hammer: Hammer) -> bool:
@@ -88,12 +88,12 @@ def span_of(hammer: Hammer, key: str, factor: float) -> Range | None:
 
 
 def rail_of(hammer: Hammer) -> dict[str, Any] | None:
-    """Return the default rail driver for a hammer without a driver; None if no voltage can drive the coil."""
+    """Build the default rail driver of a hammer without a driver; None if no voltage can drive the coil."""
     if not has_rail(hammer):
         return None
     current, width = _pulse(hammer)
     resistance = getattr(hammer.coil, "resistance", None) or _RESISTANCE
-    # With a resistor the current decays about as fast as it rises.
+    # With this resistor the current decays about as fast as it rises.
     voltage, decay = (float(f"{value:.3g}") for value in (_REACH * resistance * current, 5.56 * resistance))
     return Rail(voltage=voltage, width=width, decay_resistance=decay).model_dump()
 
@@ -114,7 +114,7 @@ def _inductance(hammer: Hammer) -> float:
 
 
 def _pulse(hammer: Hammer) -> tuple[float, float]:
-    """Return peak and width of the current pulse of a hammer."""
+    """Return peak, A, and width, s, of the current pulse of a hammer, or of `_PULSE`."""
     waveform = hammer.waveform
     width = getattr(waveform, "width", None)
     if waveform is None or waveform.quantity != "current" or width is None:

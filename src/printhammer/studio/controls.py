@@ -56,7 +56,7 @@ EQUATIONS: Final = {
 }
 """Equations of the laws of the paper; other laws show the first line of their module docstring."""
 
-# A hop of the ball lasts about one period.
+# Period chosen such that a hop of the ball lasts about one period.
 _HOPS: Final[dict[str, Any]] = {
     "waveform": {"shape": "half-sine", "amplitude": 0.5, "width": 3e-4, "quantity": "force"},
     "rate": 50.0,
@@ -76,7 +76,7 @@ _PUSHES: Final[dict[str, Any]] = {
 def _shaken(
     amplitude: float, angular: float, phase: float, low: float, high: float, pulses: int = 20
 ) -> dict[str, Any]:
-    """Return the opening state of an oscillator under a sinusoidal force, with angular frequencies, rad/s."""
+    """Build the initial page state of an oscillator under a sinusoidal force; frequencies in rad/s."""
     wave = {"shape": "sine", "amplitude": amplitude, "phase": phase, "quantity": "force"}
     rates = {"rate": angular, "low": low, "high": high}
     return {"waveform": wave, "pulses": pulses} | {
@@ -115,10 +115,10 @@ def describe(hammer: Hammer) -> dict[str, Any]:
     -------
     dict
         `name`, `title`, `note`, `constants` (a list), `open` (coil constants that the file leaves open),
-        `rail` (default rail driver, or None), `combined` (controls that move several constants),
-        `waveform` (shape and constants, or None), `start` (entries of the opening state that differ from the
-        default), `places`, `strike`, `struck`, `mover`, `views` (those that the file lists), `rigid` (whether
-        the backstop acts in no time).
+        `rail` (default rail driver, or None), `combined` (controls that change several constants),
+        `waveform` (shape and constants, or None), `start` (entries of the initial state that differ from the
+        default), `places` (positions), the nouns `strike`, `struck` and `mover`, `views` (those listed in
+        the hammer file), and `rigid` (whether the backstop is rigid).
     """
     constants = []
     for key, constant in hammer.constants.items():
@@ -187,8 +187,8 @@ def equation_of(section: str, law: str) -> str:
 def combined_of(hammer: Hammer) -> list[dict[str, Any]]:
     """Return the combined controls, each of which changes several constants, as on the terminal of the paper.
 
-    Of platen, front of the pack and thickness two are independent, since the pack lies on the platen: the
-    platen distance moves platen and front, the forms thickness moves the front toward the hammer.
+    Two of platen position, pack front and pack thickness are independent, since the pack lies on the platen:
+    the platen distance moves platen and front; the forms thickness moves the front toward the hammer.
     """
     keys = hammer.constants
     if not {"platen", "pack.front", "pack.thickness"} <= set(keys):

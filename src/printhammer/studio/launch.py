@@ -1,4 +1,4 @@
-"""Studio page in a file: the state with which the page opens, and the cache folder of written pages."""
+"""Studio page in a file: initial state of the page, and cache folder of written pages."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _KEPT: Final = 8
 
 
 def read_start(written: str) -> tuple[dict[str, Any] | str, Hammer | None]:
-    """Return the state with which a page opens, and the hammer that a state file contains.
+    """Read the initial state of a page, and the hammer embedded in a state file, if any.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def read_start(written: str) -> tuple[dict[str, Any] | str, Hammer | None]:
     InputError
         The file is not a state file, or its hammer is invalid.
     """
-    # The text of an address may be longer than any path, for which `Path.is_file` raises an error.
+    # `Path.is_file` raises an error for texts longer than any path.
     if "=" in written and not os.path.isfile(written):
         return written.rpartition("#")[2], None
     path = Path(written)
@@ -79,7 +79,7 @@ def hammer_inside(text: str, where: str) -> Hammer:
     InputError
         The text is not a hammer file, or refers to a table.
     """
-    # The parse time of a key with many dots grows with the square of their number.
+    # The parse time of a key grows with the square of the number of its dots.
     dots = max(part.count(".") for part in re.split(r"[\n,=\[\]{}]", text))
     if len(text) > LARGEST_FILE or dots > MOST_DOTS:
         raise InputError(

@@ -214,8 +214,8 @@ def _hammer(shelf: Shelf, name: str, modules: dict[Laws, str]) -> dict[str, Any]
 def _add_modules(hammer: Hammer, described: dict[str, Any], first: bool, modules: dict[Laws, str]) -> None:
     """Add the modules of a hammer by laws.
 
-    All hammers have that of their pulse, or of the pulse with which they open; the first hammer also those of
-    a current and of a voltage.
+    Every hammer has the module of its pulse, or of the pulse that the page initially shows; the first hammer
+    also has the modules of a current and of a voltage.
     """
     pulse = described["waveform"] or described["start"]["waveform"]
     further = ["current", "voltage"] if first and described["rail"] is not None else []
@@ -226,7 +226,7 @@ def _add_modules(hammer: Hammer, described: dict[str, Any], first: bool, modules
         try:
             content = page_module(laws).content()
         except InputError:
-            # Without the linker, what another quantity needs is left out.
+            # Without the linker, modules of other driving quantities are omitted.
             if quantity == pulse["quantity"]:
                 raise
             continue
@@ -234,10 +234,7 @@ def _add_modules(hammer: Hammer, described: dict[str, Any], first: bool, modules
 
 
 def _places(hammer: Hammer, described: dict[str, Any], modules: dict[Laws, str]) -> dict[str, int]:
-    """Return the indices of the modules of a hammer by the quantity that drives the hammer.
-
-    Hammers of the same laws share modules.
-    """
+    """Return the module indices of a hammer by driving quantity; hammers with equal laws share modules."""
     possible = {
         "current": hammer.magnet is not None,
         "force": True,

@@ -15,19 +15,19 @@ DEFAULT: Final = "hendriks-1983"
 
 
 class Shelf:
-    """Hammers that a page offers, in the order of its list; the page opens with the first.
+    """Hammers of a studio page, in the order of its list; the page opens with the first hammer.
 
     Parameters
     ----------
     *own : Hammer
         Hammers that come first; each may replace a shipped hammer of the same name.
     only : bool, optional
-        Whether the shipped hammers are left out; a shelf without hammers of its own has them all.
+        Whether to omit the shipped hammers; without `own`, all shipped hammers are included.
 
     Raises
     ------
     InputError
-        Two different hammers of one's own have the same name.
+        Two different hammers among `own` have the same name.
     """
 
     def __init__(self, *own: Hammer, only: bool = False) -> None:
@@ -47,13 +47,13 @@ class Shelf:
         """Names of all hammers."""
 
     def is_shipped(self, name: str) -> bool:
-        """Whether the hammer of a name is an unmodified shipped hammer."""
+        """Whether the hammer with the name `name` is an unmodified shipped hammer."""
         from printhammer.hammer.hammer import shipped
 
         return name in shipped() and self.hammer(name).fingerprint == _shipped(name).fingerprint
 
     def hammer(self, name: str) -> Hammer:
-        """Return the hammer of a name."""
+        """Return the hammer with the name `name`."""
         return self.own.get(name) or _shipped(name)
 
 

@@ -24,7 +24,7 @@ def write_file(path: str | Path, content: str | bytes) -> None:
         handle, draft = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
         with os.fdopen(handle, "wb") as file:
             file.write(data)
-        # mkstemp makes the file readable by its owner only.
+        # Restore the usual permissions, since mkstemp creates files that only the owner can read.
         mask = os.umask(0)
         os.umask(mask)
         Path(draft).chmod(0o666 & ~mask)

@@ -18,7 +18,7 @@ def html_table(rows: Sequence[Sequence[str]], heads: Sequence[str] = ()) -> str:
 
 
 def titled(title: str, *parts: str) -> str:
-    """Return HTML blocks under a bold title."""
+    """Join HTML blocks below a title in bold type."""
     return f"<div><b>{escape(title)}</b>{''.join(parts)}</div>"
 
 

@@ -17,10 +17,10 @@ from typing import Any, Final
 import numpy as np
 
 _PIECES: Final = 16  # Number of subintervals per round of refinement; arbitrary
-_ROUNDS: Final = 16  # Number of rounds: 16 rounds of 16 subintervals exhaust the bits of a float
+_ROUNDS: Final = 16  # Number of rounds: 16^16 subintervals resolve all bits of a double
 _PROBE: Final = 1e-6  # Distance of a probe from a root at a grid point, as a fraction of the cell; arbitrary
 _SLOPE: Final = 1e-3  # Step of the slope at the ends of a cell, as a fraction of the cell; arbitrary
-# Rounding turns a root into a short stretch of zeros.
+# Largest length of an interval of zeros that counts as one root, since rounding widens a root
 _FLAT: Final = 1e-12
 
 
@@ -140,7 +140,7 @@ def with_probes(function: Any, about: Any, grid: Any, count: int, places: Any, v
 def in_stretch(
     function: Any, about: Any, places: Any, values: Any, begin: int, last: int, found: Any, count: int
 ) -> int:
-    """Append the roots between two points without NaN in between; return the new number of roots."""
+    """Append the roots between two indices, without NaN in between; return the new number of roots."""
     k = begin
     while k <= last:
         x, value = places[k], values[k]
@@ -195,7 +195,7 @@ def dip_of(
             if height < lowest:
                 lowest, k = height, piece
         best = left + (right - left) * k / _PIECES
-        # Sample a dip that reaches zero far below its rims.
+        # Refine only where the smallest height is at most half of the largest.
         if lowest <= 0.0 or lowest > highest - lowest:
             return best, lowest
         width = right - left

@@ -1,4 +1,4 @@
-"""Thread pools over index ranges, and coroutines that evaluate their queries in common batches.
+"""Thread pools over index ranges, and coroutines whose queries are answered in common batches.
 
 `in_threads` splits ranges of indices into chunks, which threads fetch one at a time.
 
@@ -22,7 +22,7 @@ B = TypeVar("B")
 Progress = Callable[[int, int], None]
 Piece = Callable[[int, int], None]
 
-PIECES_A_THREAD: Final = 32  # Pieces per thread: enough to balance pieces of unequal cost; arbitrary
+PIECES_A_THREAD: Final = 32  # Number of chunks per thread, to balance chunks of unequal cost; arbitrary
 _INTERVAL: Final = 0.1  # Interval between progress reports, s; arbitrary
 
 
@@ -169,7 +169,7 @@ def together(works: Sequence[Work[A, B, T]]) -> Work[A, B, list[T]]:
 
 
 def translated(work: Work[A, B, T], answer: Callable[[list[A]], Work[C, D, list[B]]]) -> Work[C, D, T]:
-    """Run a `Work` coroutine; `answer` converts its queries to a coroutine with queries of another kind."""
+    """Adapt a `Work` coroutine: `answer` answers its queries by a coroutine with queries of another kind."""
     answers: list[B] | None = None
     while True:
         try:

@@ -39,8 +39,8 @@ def sweep(
     """Run many hammers under many drives and store the results.
 
     The results are written block by block. After an interruption of any kind, the same call resumes the
-    sweep, and the complete store is identical, time stamps apart, to that of an uninterrupted sweep; the
-    number of threads and the use of dask do not matter either.
+    sweep. Apart from time stamps, the complete store is identical to that of an uninterrupted sweep,
+    whatever the number of threads, with or without dask.
 
     Parameters
     ----------

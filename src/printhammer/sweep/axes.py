@@ -1,4 +1,4 @@
-"""Axes of a sweep: the parameter that varies, its unit and meaning, and its values."""
+"""Axes of a sweep: varying parameter with unit, meaning and values; parsing of axis tables."""
 
 from __future__ import annotations
 

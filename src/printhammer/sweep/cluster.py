@@ -32,12 +32,12 @@ NO_WORKERS: Final = 60.0
 _INTERVAL: Final = 0.5  # Interval between checks of the cluster, s; arbitrary
 _COUNT_EVERY: Final = 2.0  # Interval between counts of the workers' threads, s; arbitrary
 _ALIVE: Final = ("running", "connecting")
-_TASKS_A_THREAD: Final = 3  # Tasks submitted per thread: enough that no worker waits; arbitrary
-_PARTS: Final = 8  # Pieces of a block that kills its worker; arbitrary
+_TASKS_A_THREAD: Final = 3  # Number of tasks submitted per thread, so that no worker idles; arbitrary
+_PARTS: Final = 8  # Number of pieces into which a block that kills its worker is split; arbitrary
 
 
 class _GoneError(Exception):
-    """Raised when the scheduler has lost a task."""
+    """Raised when the scheduler no longer knows a task."""
 
 
 def run_dask(
@@ -47,7 +47,7 @@ def run_dask(
     tell: Callable[[float], None],
     client: Any,
 ) -> None:
-    """Compute blocks on a cluster, and write each block in this process when the block is done.
+    """Compute blocks on a cluster, and write each finished block in this process.
 
     The scheduler repeats a task whose worker is killed. A task that it abandons because it killed several
     workers is postponed until all other tasks are done, then computed alone on the cluster, in ever smaller
@@ -177,7 +177,7 @@ class _Tasks:
             try:
                 self._count = sum(self._client.nthreads().values())
             except OSError:
-                # The scheduler is closing; the futures report the consequence for the tasks.
+                # The scheduler is closing; the futures report the loss of their tasks.
                 self._count = 0
         return self._count
 

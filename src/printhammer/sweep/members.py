@@ -1,4 +1,4 @@
-"""Members of a sweep: from a row of axis values to hammer, drive, initial state and end."""
+"""Members of a sweep: hammer, drive, initial state and end time, from a row of axis values."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _OF_DRIVE: Final = ("waveform", "drive", "at")
 
 @dataclass(frozen=True)
 class Member:
-    """One run of a sweep: hammer, drive, end [s], and initial displacement [m] and velocity [m/s]."""
+    """One run of a sweep: hammer, drive, end time, s, and initial displacement, m, and velocity, m/s."""
 
     hammer: Hammer
     drive: Drive
@@ -138,7 +138,7 @@ class Maker:
             overlap, start = first.overlap, float(first.times[0])
             return PulseTrains.at_rates(fired, rates, len(first.times), overlap, start)
         except InputError:
-            # Fall back to rows one by one, to keep the valid ones.
+            # If the batch is invalid, rows are built one by one, to keep the valid rows.
             return None
 
     def _state(self, row: Sequence[float], hammer: Hammer) -> tuple[float, float]:

@@ -127,7 +127,7 @@ class Outputs(Declared):
         return any(output in self.arrays for output in outputs)
 
     def length(self, output: Output) -> tuple[int, ...]:
-        """Return the dimensions of an output array that follow the member dimensions."""
+        """Return the shape of an output array for one member: () for a scalar."""
         return {"": (), FIRING: (self.firings,), TIME: (self.times.size,)}[output.dim]
 
     def empty(self, members: int) -> dict[str, Any]:

@@ -43,7 +43,7 @@ def latin_hypercube(members: int, seed: int, axes: int) -> FloatArray:
 
 
 def between(share: FloatArray, low: float, high: float, geometric: bool) -> FloatArray:
-    """Return the values at given fractions, 0 to 1, of a range, on a linear or geometric scale."""
+    """Interpolate a range at given fractions, 0 to 1, on a linear or geometric scale."""
     values: FloatArray
     if geometric:
         values = np.exp(np.log(low) + share * (np.log(high) - np.log(low)))
@@ -106,8 +106,8 @@ MEMBER: Final = "member"
 
 _MOST_MEMBERS: Final = 1_000_000_000  # Largest number of members; arbitrary, to refuse typing errors
 _BLOCKS: Final = 128  # Number of blocks aimed at, for progress and resumption; arbitrary
-_FEWEST_IN_BLOCK: Final = 16  # Smallest block: one block of lanes
-_MOST_IN_BLOCK: Final = 256  # Largest block: the lanes of a thread
+_FEWEST_IN_BLOCK: Final = 16  # Smallest number of members of a block: the lanes integrated together
+_MOST_IN_BLOCK: Final = 256  # Largest number of members of a block: the lanes of one thread
 _MOST_BYTES: Final = 2**25  # Largest size of the results of a block; arbitrary
 
 

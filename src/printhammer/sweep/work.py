@@ -133,7 +133,7 @@ def _from_ensemble(
 
 
 def _moments(members: Members, outputs: Outputs) -> tuple[list[FloatArray] | None, list[Any], list[int]]:
-    """Return each member's output times, and the indices of the firings and of the end time in the array."""
+    """Return each member's output times, s, and the array indices of the firings and of the end time."""
     strobes, final = outputs.wants(*STROBES), outputs.wants(*FINAL)
     if not strobes and not final:
         return None, [], []
@@ -150,13 +150,13 @@ def _moments(members: Members, outputs: Outputs) -> tuple[list[FloatArray] | Non
 
 
 def _scalars(dots: DotTable, wanted: Collection[str]) -> dict[str, Any]:
-    """Return the selected scalars that follow from the dots of each member, shape (members,)."""
+    """Compute the selected scalar outputs from the dots of each member, arrays of shape (members,)."""
     struck, counts = dots.struck, dots.struck.sum(axis=1)
     scalars: dict[str, Any] = {"struck_dots": counts, "lost_dots": (dots.fired & ~struck).sum(axis=1)}
     for name in ("flight_time", "peak_force"):
         values = getattr(dots, name)
         if f"{name}_mean" in wanted:
-            # math.fsum rounds once, so that a mean does not depend on the number of padded entries.
+            # math.fsum rounds only once, so that a mean does not depend on the number of padded entries.
             sums = [math.fsum(row[made]) for row, made in zip(values, struck, strict=True)]
             scalars[f"{name}_mean"] = np.where(counts > 0, sums, np.nan) / np.maximum(counts, 1)
         if f"{name}_spread" in wanted:

@@ -108,7 +108,7 @@ def bifurcation(
 def _axis(
     hammer: Hammer, parameter: str, ends: tuple[str | None, str | None], count: int, firing: Firing
 ) -> dict[str, Any]:
-    """Return the name and the values of the parameter, as arguments of `printhammer.bifurcation`."""
+    """Return the parameter's name and values as keyword arguments of `printhammer.bifurcation`."""
     import numpy as np
 
     from printhammer.drive.input import read_number

@@ -224,7 +224,7 @@ def duty(
 
 
 def _heat(hammer: Hammer, passed: dict[str, Any]) -> Any:
-    """Return the coil heat per dot, J, as a function of the winding temperature."""
+    """Return the heat argument of `thermal_duty`, from the hammer, or from --heat and --feed."""
     from printhammer.control.duty import heat_of
 
     if "feed" in passed:

@@ -155,7 +155,7 @@ def continue_(
 
 
 def both(low: str | None, high: str | None, first: str, last: str, parameter: str) -> tuple[str, str]:
-    """Return both ends of a range; raise InputError if an end is missing."""
+    """Check that both ends of a range are set, and return them; `first` and `last` are their flags."""
     if low is None or high is None:
         raise InputError(
             f"{first if low is None else last} is missing",
@@ -179,7 +179,7 @@ def _follow_orbit(
 
 
 def read_event(written: str, name: str) -> int | str:
-    """Parse the event of a branch: its index or its kind."""
+    """Parse an event of a branch, given as its index, its kind, or "first" or "last"."""
     from printhammer.chaos.curves.starts import FIRST, LAST
     from printhammer.chaos.curves.systems import KINDS
 

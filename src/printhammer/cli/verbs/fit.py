@@ -29,7 +29,7 @@ EXAMPLE: Final = (
 )
 
 _RESULTS: Final = "Results"
-# In the order of writing.
+# Options that name output files, in the order in which the files are written.
 _FILES: Final = {
     "out": opt.files(
         "Output file for the fitted constants as a fragment of a hammer file (.toml), or a picture of data"

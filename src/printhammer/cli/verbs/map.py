@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
 
 _BURST: Final = "Bursts"
-_FEW: Final = 6  # Rates named in a complaint; arbitrary
+_FEW: Final = 6  # Largest number of rates named in a complaint; arbitrary
 _count = partial(opt.whole, panel=_BURST)
 
 
@@ -114,7 +114,7 @@ def _axes(
     rates: int | None,
     times: int | None,
 ) -> tuple[FloatArray, FloatArray | int]:
-    """Return the rates, Hz, and the times, s, or their numbers; a measured map supplies the defaults."""
+    """Return rates, Hz, and times, s, or the number of times; a measured map supplies the defaults."""
     import numpy as np
 
     from printhammer.maps.frequency import MOST_CELLS, RATES, TIMES, default_rates

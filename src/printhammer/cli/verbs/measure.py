@@ -98,7 +98,7 @@ def measure(
 
 
 def _output_files(kind: str, out: Path | None, job: Job) -> tuple[list[str], dict[str, Path]]:
-    """Check the output; return the requested kinds of measurement, and the file of each kind."""
+    """Check the output path; return the requested kinds of measurement, and the file of each kind."""
     from printhammer.identify.bench.laboratory import KINDS
     from printhammer.support.files import check_outputs
 

@@ -165,7 +165,7 @@ def quality(
     common: dict[str, Any] = {"limits": bounds, **opt.given(tolerance=tolerance), **strategy}
     many: dict[str, Any] = {**common, **of_grid, "threads": threads}
     if loaded_table is not None:
-        # The table covers no other rates.
+        # The safe rate is computed on the rates of the table, which covers no other rates.
         many = {"first": float(loaded_table.rates[0]), "last": float(loaded_table.rates[-1]), **many}
     result: Any
     bad: list[str] = []
@@ -227,7 +227,7 @@ def _check_options(task: str, options: set[str]) -> None:
 
 
 def _spreads(hammer: Hammer, texts: list[str]) -> dict[str, Any]:
-    """Parse the relative spreads: one number for all constants, and exceptions by key."""
+    """Parse the texts of --spread: one relative spread for all constants, or one per key."""
     from printhammer.printing.rates.tolerance import spreads_of
 
     if not texts:
@@ -345,7 +345,7 @@ def print_(
         job.check()
     asked = _pattern(text, pattern, font, wires, columns)
     if line_gap is None and pattern is not None and pattern.suffix.lower() in BITMAPS:
-        # A bitmap continues across print lines.
+        # The drawing of a bitmap continues from print line to print line, without a gap.
         line_gap = 0.0
     head = head_of(
         asked.wires,

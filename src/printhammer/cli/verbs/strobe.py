@@ -86,7 +86,7 @@ def orbits(job: Job, hammer: Hammer = opt.HAMMER, units: Units = opt.UNITS, **pa
     )
 
 
-_STEPS: Final = 100  # Default number of times between firings; arbitrary
+_STEPS: Final = 100  # Default number of firing periods in a range; arbitrary
 _TRAINS: Final = "Trains (--period, --rate, or --from and --to)"
 _trains = partial(opt.text, panel=_TRAINS)
 
@@ -161,7 +161,7 @@ def lyapunov(
 def _periods(
     period: str | None, rate: str | None, lowest: str | None, highest: str | None, steps: int | None
 ) -> FloatArray:
-    """Return the times between firings, s."""
+    """Return the firing periods, s, selected by the options --period, --rate, or --from and --to."""
     import numpy as np
 
     from printhammer.drive.input import read_positive

@@ -94,7 +94,7 @@ _KERNELS: Final[dict[str, Callable[[Hammer], None]]] = {
     "runs, their dots and peaks": _runs,
     "maps and sweeps": _lanes,
     "exponents, orbits, sensitivities": _exponents,
-    # Last: it shares most code with maps, which two processes would otherwise compile at once.
+    # Last, since it shares most code with maps: two processes would otherwise compile the same functions.
     "strobe points": _strobes,
 }
 
@@ -149,7 +149,8 @@ def warm(job: Job, hammer: Hammer = opt.FIRED) -> Answer:
         _print_messages(sentences),
         ProcessPoolExecutor(2, spawn, _announce, (sentences,)) as pool,
     ):
-        # In the order of `_KERNELS`: the longest compilation and the one needed first start first.
+        # Started in the order of `_KERNELS`: the longest compilation, and that of the code needed first,
+        # lead.
         tasks = [pool.submit(_compile_code, name, hammer) for name in _KERNELS]
         tell(0, len(tasks))
         for done, task in enumerate(as_completed(tasks), 1):

@@ -76,7 +76,7 @@ def sweep(
 
 
 def ended(result: xr.Dataset, new: float, seconds: float) -> str:
-    """Return a line with the number of sweep members for each status."""
+    """Format the outcome of a sweep on one line: number of members by status, and computation time."""
     from collections import Counter
 
     from printhammer.sweep.outputs import STATUSES

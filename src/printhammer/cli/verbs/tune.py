@@ -44,7 +44,7 @@ def tuned_along(
 
 
 def _show_table(job: Job, made: Any, header: dict[str, Any], budget: int | None, units: Units) -> Any:
-    """Show the table, rounded to the tick if any; check its size against the budget; return the table."""
+    """Round a table to the timer tick, if any; print its summary and check its size; return the table."""
     made = made.quantised(header["tick"]) if header else made
     made.to_header(budget=budget, **header)
     size = f", {made.size(**header)} bytes in a C header"
@@ -62,7 +62,7 @@ def _read(written: str) -> tuple[str, list[float]]:
     return axis, opt.between(opt.read_span(rest, f"--along {axis}"), AXES[axis].unit, f"--along {axis}")
 
 
-_MOST_RATES: Final = 2000  # Largest number of rates; arbitrary
+_MOST_RATES: Final = 2000  # Largest number of rates of a table; arbitrary
 
 
 @verb(
@@ -326,7 +326,7 @@ def learn(
 
 
 def _from_coil(job: Job, hammer: Hammer, signal: Any, noise: str | None) -> dict[str, float]:
-    """Return the error model of impact times estimated from coil samples: noise, offset, fraction missed."""
+    """Compute the errors of impact times estimated from coil samples: noise, offset, fraction missed."""
     from dataclasses import asdict
 
     from printhammer.control.impact_time import impact_time

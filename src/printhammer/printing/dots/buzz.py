@@ -1,14 +1,12 @@
 """Buzz printing: a train of pulses that prints while the armature stays clear of the backstop.
 
 F. Hendriks (1983), Fig. 7: "Instead of allowing the armature to return fully to the backstop, current pulses
-can be issued that are synchronized with the return of the armature from the paper." No such train is known
-beforehand for a hammer; `find_buzz_train` searches with the hammer's own waveform in two families:
-even trains, and trains in which each pulse follows the armature's departure from the pack by a constant
-delay.
-A delayed train needs a sensor, and can hold a motion that no even train holds because the motion is unstable
-under a constant period. Each train starts from rest; where its first excursions are too strong for a steady
-buzz, the armature may touch the backstop once before the dots that count, and settles into the buzz
-afterwards.
+can be issued that are synchronized with the return of the armature from the paper." `find_buzz_train`
+searches for such a train of the hammer's own pulses in two families: even trains, and trains in which each
+pulse follows the armature's departure from the pack by a constant delay.
+A delayed train needs a sensor, and can stabilise a motion that is unstable at a constant period. Each train
+starts from rest; if the first excursions are too large for a steady buzz, the armature may touch the backstop
+once before the dots that count.
 """
 
 from __future__ import annotations
@@ -30,21 +28,21 @@ from printhammer.run.motion import Motion
 from printhammer.run.simulate import simulate
 from printhammer.support.arrays import BoolArray
 
-MAX_CURRENT: Final = 2.0  # Largest coil current of a train, A: the range of the paper's Fig. 2
+MAX_CURRENT: Final = 2.0  # Default limit on the coil current of a train, A: the range of the paper's Fig. 2
 
 FORCES: Final = (0.3, 0.95)  # Range of peak forces that count, as fractions of the single-pulse force
 
-FEWEST: Final = 6  # Consecutive dots without a backstop touch that count as buzz printing
+FEWEST: Final = 6  # Smallest number of consecutive dots, without a backstop touch, that is buzz printing
 
 _PULSES: Final = 9  # Number of pulses of a train, as in the paper
-_PERIODS: Final = 96  # Number of even intervals tried
+_PERIODS: Final = 96  # Number of trial periods of even trains
 _DELAY_STEP: Final = 2e-6
 """Spacing of the grid of trial delays, s."""
 
 _DELAYS: Final = 400  # Maximum number of delays searched; a slow hammer gets a wider spacing instead
 
 PATIENCE: Final = 3.0
-"""Waiting time for a dot, as a multiple of the single pulse's time from firing to the end of contact."""
+"""Time limit for a dot, as a multiple of the single pulse's time from firing to the end of contact."""
 
 _ZOOMS, _PER_ZOOM = 2, 4  # Number of refinements, and factor on the spacing of each
 
@@ -52,7 +50,7 @@ _ZOOMS, _PER_ZOOM = 2, 4  # Number of refinements, and factor on the spacing of 
 class Run(Declared):
     """Longest run of consecutive dots within the force range, without a backstop touch in between.
 
-    Each firing of the run makes one dot.
+    Every firing of the run prints exactly one dot.
     """
 
     first: int = part("index of the firing that made the first dot of the run")
@@ -125,10 +123,10 @@ def find_buzz_train(
     values. Even trains come first, since they need no sensor: periods from half the flight time of a single
     pulse up to its return to the backstop. If no even train both prints enough dots and stays clear after its
     first dot, delayed trains follow: delays from 0, at the departure from the pack, up to the return, every 2
-    us or 400 delays, whichever is coarser. A delayed train is built firing by firing. A dot is waited for
-    three times as long as a single pulse takes from firing to departure. Trains are ranked by whether they
-    have enough dots, then whether they stay clear, then by the number of dots, then by the weakest dot. The
-    search is deterministic.
+    us or 400 delays, whichever is coarser. A delayed train is built firing by firing; a dot counts as missing
+    after three times the single pulse's time from firing to departure. Trains are ranked by four criteria in
+    order: enough dots, clear of the backstop, number of dots, force of the weakest dot. The search is
+    deterministic.
 
     Parameters
     ----------
@@ -193,7 +191,7 @@ def longest_run(motion: Motion, reference_force: float, forces: tuple[float, flo
 
 
 def delayed_train(hammer: Hammer, delay: float, pulses: int = _PULSES) -> tuple[float, ...]:
-    """Compute the firing times, s, of a train that fires a constant delay after each departure from the pack.
+    """Compute the firing times, s, of a train with a constant delay, s, after each departure from the pack.
 
     The train has fewer than `pulses` firings if a firing makes no dot, since no departure follows.
     """
@@ -211,7 +209,9 @@ def delayed_trains(
     hopeless: Callable[[DotTable, list[int]], BoolArray] | None = None,
     **options: Any,
 ) -> list[tuple[float, ...]]:
-    """Compute delayed trains for many hammers and delays, s, in one ensemble per firing; see `delayed_train`.
+    """Compute firing times of delayed trains for many hammers, in one ensemble per firing.
+
+    Each hammer has its own delay, s; see `delayed_train`.
 
     `patience` is the time, s, to wait for a departure after each firing, and `pulses` the number of firings
     of a complete train. The trains start from rest, or from `states`: displacement, m, and velocity, m/s.
@@ -261,7 +261,7 @@ def _departure(motion: Motion) -> float | None:
 
 
 class _Search:
-    """Search for a buzz printing train of one hammer: settings of the search, and the best train found."""
+    """Search for a buzz-printing train of one hammer: settings, and the best train so far."""
 
     def __init__(
         self, hammer: Hammer, pulses: int, fewest: int, forces: tuple[float, float], max_current: float
@@ -318,7 +318,7 @@ class _Search:
         return self.best is not None and self.best.clear and self.best.count >= self.fewest
 
     def _scan(self, grid: np.ndarray, trial: Callable[[Sequence[float]], list[BuzzTrain]]) -> None:
-        """Simulate a grid of trains and, unless a train is good enough, finer grids around the best three."""
+        """Simulate a grid of trains and, unless `_is_done`, finer grids around the best three."""
         trains = {train.interval: train for train in trial(grid.tolist())}
         step, known = float(grid[1] - grid[0]), set(grid.tolist())
         for _ in range(_ZOOMS):

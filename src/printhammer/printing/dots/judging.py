@@ -80,8 +80,8 @@ def judge(
     `wanted`, shape (members, firings), is the mask of dots to evaluate; the dots of a lead-in, for instance,
     are excluded. `slot_times`, s, of the same shape, may differ from the firing times, and are ignored where
     no dot is evaluated. `nominal` is the single-pulse dot: one for all members, or one for each. `ok`, shape
-    (members,), is the mask of simulations that reached their ends; in the others the last dot counts as "not
-    run", since its contact may be open.
+    (members,), is the mask of simulations that reached their ends; the last dot of an incomplete simulation
+    counts as "not run", since its contact may still be open.
     """
     shape = dots.fired.shape
     for name, values in (("wanted", wanted), ("slot_times", slot_times)):
@@ -167,8 +167,8 @@ PRESETS: Final = {
     "dot-matrix": Limits(arrival=0.5 * DOT_MATRIX_SPREAD),
     "engraved": Limits(arrival=0.5 * ENGRAVED_SPREAD),
 }
-"""Presets of the limits, by name. The paper's spreads are peak to peak, so half of each is allowed to either
-side; "slots" is the default, with which drives are compared."""
+"""Presets of the limits, by name. The paper's spreads are peak to peak: the limit is half of each, to either
+side. "slots" is the default of all comparisons of drives."""
 
 
 def limits_named(name: str) -> Limits:

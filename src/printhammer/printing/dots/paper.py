@@ -107,7 +107,7 @@ class Paper(Declared):
         return np.asarray(np.clip(off, -_WIDEST, _WIDEST))
 
     def hammers(self, hammer: Hammer, slots: int, pitch: float) -> tuple[Hammer, ...]:
-        """Return one hammer per slot, with the slot's pack, for a slot pitch in m; the platen is fixed."""
+        """Return one hammer per slot, with the pack of that slot, for a slot `pitch`, m."""
         spread = {"pack.stiffness": self.stiffness, "pack.front": self.front}
         for key, value in spread.items():
             if value and key not in hammer.constants:
@@ -195,7 +195,7 @@ class PiecewiseMotion:
 def simulate_pieces(
     hammers: Sequence[Hammer], drive: Drive, duration: float, tolerance: float
 ) -> PiecewiseMotion:
-    """Simulate a drive on a hammer that changes at each firing, from the rest state of the first hammer.
+    """Simulate a drive on a hammer whose pack changes at each firing, from rest.
 
     Parameters
     ----------
@@ -250,7 +250,7 @@ def simulate_pieces(
 
 
 def _merge(first: Contact, then: Contact) -> Contact:
-    """Merge the two pieces of a contact that was split between two segments."""
+    """Merge the two records of a contact that extends over two segments."""
     higher = then if then.depth > first.depth else first
     return replace(
         first,

@@ -58,7 +58,7 @@ class Trial(Declared):
         return np.asarray(self.judgement.passed.reshape(len(self.cases), -1).all(axis=1))
 
     def rows(self, case: int) -> slice:
-        """Return the member indices of a case, as a slice with one member per pattern."""
+        """Return the slice of ensemble members that belong to a case, one member per pattern."""
         return slice(case * len(self.patterns), (case + 1) * len(self.patterns))
 
 
@@ -117,7 +117,7 @@ def attempt(
 
 
 def fired_of(strategy: Strategy, hammer: Hammer, drive: Drive) -> Waveform:
-    """Return the waveform whose length sets the simulation time: from the strategy, hammer or drive."""
+    """Return the pulse whose width sets the simulation time: that of the strategy, hammer or drive."""
     own = getattr(strategy, "waveform", None)
     return own if isinstance(own, Waveform) else hammer.waveform or longest_of(drive)
 

@@ -1,4 +1,4 @@
-"""Shipped results of the reconstruction: base rates, predictions, search, family, schemes of 1983.
+"""Results of the reconstruction: base rates, predictions, search, family, schemes of 1983.
 
 Five JSON files in the folder `data` beside this module, each with ``"format": 1``; any of them may be absent.
 All values are SI.
@@ -25,7 +25,7 @@ from printhammer.errors import InputError
 from printhammer.results import Declared, part
 from printhammer.support.constants import shown
 
-CONFIDENCE: Final = 0.95  # Normal quantile of the 95 % interval.
+CONFIDENCE: Final = 0.95  # Confidence level of the intervals; conventional
 
 _Z: Final = NormalDist().inv_cdf(0.5 + 0.5 * CONFIDENCE)
 
@@ -45,8 +45,8 @@ class Share(Declared):
     def interval(self) -> tuple[float, float]:
         """Wilson 95 % interval of the fraction; E. B. Wilson, J. Amer. Statist. Assoc. 22 (1927) 209.
 
-        It is the set of probabilities p with ``|rate - p| <= z sqrt(p (1 - p) / n)``; it stays within 0 and
-        1, and has a width even if none or all hold.
+        The interval consists of the probabilities p with ``|rate - p| <= z sqrt(p (1 - p) / n)``. It lies
+        within 0 to 1, and its width is not zero even if the statement holds for none or all hammers.
         """
         n, p = self.measured, self.rate
         middle = p + _Z**2 / (2.0 * n)
@@ -126,7 +126,7 @@ class BaseRates(_Table):
 
 
 class Predictions(_Table):
-    """Hammers found by searching on the stated claims alone, and the other claims that they satisfy."""
+    """Predictions: the other claims that hold for hammers fitted to the stated claims alone."""
 
     format: Literal[1] = Field(description="1, the version of the format")
     seed: int = Field(description="the seed of the search")
@@ -141,7 +141,7 @@ class Predictions(_Table):
 
 
 class Searched(_Table):
-    """One search for a hammer: the claims it aimed at, its seed, and the number of hammers tried."""
+    """One search for a hammer: target claims, seed, and number of hammers tried."""
 
     aim: Literal["stated", "all", "panels", "buzz", "claims"] = Field(
         description="the claims that the search aimed at"
@@ -181,7 +181,7 @@ class Search(_Table):
 
 
 class FamilyMember(_Table):
-    """One hammer of the family: its constants, verdicts and consequences."""
+    """Hammer of the family: constants, verdicts on the claims, and derived quantities."""
 
     name: str = Field(description="its name")
     constants: dict[str, _Number] = Field(description="its constants by file key, SI")
@@ -296,7 +296,7 @@ class Results:
             getattr(self, name)
 
     def read(self, name: str, model: type[_Model]) -> _Model | None:
-        """Read one of `FILES`; errors as for `check`."""
+        """Read and validate the result file `name`, one of `FILES`; None if the file is absent."""
         path = self.folder / f"{name}.json"
         try:
             text = path.read_text(encoding="utf-8")

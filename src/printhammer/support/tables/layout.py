@@ -220,12 +220,12 @@ def layout_of(text: str, where: str, words: Collection[str] = ()) -> Table:
         )
     rows, beside = _without_facts_beside(rows)
     facts = {_key(key): [value] for key, value in split.comments.items()} | beside
-    # If no row is numeric, each cell reports its own fault.
+    # If no row is numeric, the parser of the cells reports the faulty cell.
     begin = next((k for k, (_line, row) in enumerate(rows) if _is_data(row, words)), 1)
     above, data = rows[:begin], rows[begin:]
     if len(above) > 1 and is_unit_row(above[-1][1]):
         line, units = above[-1]
-        # Columns at the right without a unit.
+        # Columns without a unit, at the right of the table.
         above[-1] = line, [*units, *[""] * (min(whole[line], len(above[-2][1])) - len(units))]
     width = _width(data, above)
     for line, row in data:
@@ -253,14 +253,14 @@ def layout_of(text: str, where: str, words: Collection[str] = ()) -> Table:
         facts.setdefault("start", ["0 s"])
     clock = _clock(where, facts, columns, cells, numbered=any(extra))
     if clock and clock.numbers is None and lines[-1] - lines[0] >= len(lines):
-        # Rows may be missing.
+        # Rows may be missing, so times follow from the sample numbers.
         clock = None
     head = heading[0][0] if heading else 0
     return Table(where, head, columns, lines, cells, split.comments, clock)
 
 
 def _separator(text: str) -> str:
-    """Determine the separator that makes most lines rows of numbers, or else splits most lines."""
+    """Determine the separator with which most lines are rows of numbers, or else most lines are split."""
     lines = [line for line in text.split("\n", _LINES)[:_LINES] if line.strip() and line.strip()[0] != "#"]
     best, chosen = 0, ""
     for sign in _SEPARATORS:
@@ -305,7 +305,7 @@ def _is_clock_entry(cell: str) -> bool:
 
 
 def _commented(notes: list[tuple[int, str]], separator: str, width: int, first: int) -> list[Row]:
-    """Return the heading in the last comment above the numbers, where NumPy writes headings."""
+    """Return the heading from the last comment above the numbers, as `numpy.savetxt` writes headings."""
     above = [
         (line, spaced(note).split() if separator == " " else note.split(separator))
         for line, note in notes

@@ -292,7 +292,7 @@ def _by_heading(
         elif name in numbers:
             sources[name] = Source(place + 1)
         elif name and "time" in numbers:
-            # Another quantity of the same record is ignored.
+            # A column of a known quantity that is not requested is ignored.
             continue
         elif (table.clock is None or place != table.clock.numbers) and (
             heading.shown or not any(each.name for each in table.columns)

@@ -1,9 +1,10 @@
 """Text of table files: encodings, line ends, comments, and cells.
 
-Blank lines are skipped. Lines that begin with #, and those of sigrok and Matlab that begin with ; or %, are
-comments; a comment such as ``# sampling rate: 1 MHz`` is stored as key and text.
+Blank lines are skipped. Lines that begin with #, or with ; (sigrok) or % (Matlab), are comments; a comment
+such as ``# sampling rate: 1 MHz`` is stored as key and text.
 
-Numbers are parsed with their decimal marks, thousands separators, gaps, and out-of-range readings.
+Cells are classified as numbers, gaps or out-of-range readings; decimal marks and thousands separators are
+converted.
 """
 
 from __future__ import annotations
