@@ -348,7 +348,7 @@ def announce_compiling() -> None:
 
 
 def check_endings(paths: Iterable[Path], endings: Sequence[str], option: str = "--out") -> None:
-    """Raise InputError unless each name has one of the endings; an empty list accepts any."""
+    """Raise InputError unless each file name has one of the endings; an empty list accepts any ending."""
     for path in paths:
         if endings and path.suffix.lower() not in endings:
             raise InputError(

@@ -85,7 +85,7 @@ class StaticForce:
         return float(self.statics.spring_force(self.statics.spring, x))
 
     def elastic(self, depth: float) -> float:
-        """Compute the elastic force of the backstop at a compression depth, m; in N."""
+        """Compute the elastic force of the backstop, N, at a compression depth, m."""
         if depth <= 0.0 or self.rigid:
             return 0.0
         return float(self.statics.backstop_elastic(self.statics.backstop, math.sqrt(depth)))

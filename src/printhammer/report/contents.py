@@ -188,7 +188,7 @@ CITATION: Final = re.compile(r"Figs?\. (?:[\d, and]*\d)")
 """Regular expression that matches a citation of figures, such as "Figs. 3 and 4"."""
 
 SECTIONS: Final = {"Poincaré plots": 11}
-"""Figure number of each section of the paper that is about a single figure."""
+"""Figure number by section of the paper, for sections about a single figure."""
 
 
 def cited_figures(source: str) -> set[int]:

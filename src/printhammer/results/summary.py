@@ -55,7 +55,7 @@ def interval(values: npt.NDArray[Any], unit: str) -> str | None:
 
 
 def styled(style: Style, said: object) -> str:
-    """Return a text marked with a display style."""
+    """Mark a text with a display style, such as "strong"."""
     return f"⟪{style} {said}⟫"
 
 
@@ -161,7 +161,7 @@ class Facts:
 
     @property
     def known(self) -> list[tuple[str, str]]:
-        """Facts whose value is not None."""
+        """Names and values of the facts whose value is not None."""
         return [(name, said) for name, said in self.rows if said is not None]
 
 

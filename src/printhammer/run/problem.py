@@ -45,7 +45,7 @@ _MOST_FLIGHTS: Final = 1e6  # Largest number of flights of that guess; arbitrary
 
 
 def live_size(firings: int) -> int:
-    """Return the length of the kernel's working array `live` for a number of firings."""
+    """Return the length of the kernel's working array of active pulses, for a number of firings."""
     return 3 + 7 * firings
 
 

@@ -108,7 +108,7 @@ def announce_compiling(callback: Callable[[str], None], *, helped: bool = True) 
 
     A message names the compiled functions and the expected duration. Further messages report, once each, that
     machine code cannot be cached, or why cached code is invalid. If `helped`, a second process compiles the
-        code that evaluates finished runs (`printhammer.run.ahead`).
+    code that evaluates finished runs (`printhammer.run.ahead`).
     """
     from printhammer.kernel.compile import cache, specialise
     from printhammer.run import ahead

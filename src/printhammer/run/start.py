@@ -65,7 +65,7 @@ def read_state(state: Sequence[Any]) -> tuple[float, ...]:
     Raises
     ------
     InputError
-        The state has none of these forms, or a text has no unit.
+        The number of components is not in `FORMS`, or a text has no unit.
     """
     units = (*_UNITS, *(_UNITS_BEYOND[place] for place in FORMS.get(len(state), ())))
     if len(units) != len(state):

@@ -69,7 +69,7 @@ def winding_of(hammer: Hammer) -> Winding:
 
 
 def coil_of(hammer: Hammer) -> Coil:
-    """Return the functions and constants of the coil of a voltage-driven hammer."""
+    """Return the coil of a voltage-driven hammer: its law functions and packed constants."""
     winding = winding_of(hammer)
     return Coil(
         _law(hammer, "magnet_linkage"),

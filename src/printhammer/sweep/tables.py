@@ -43,10 +43,10 @@ _MANY: Final[dict[str, Any]] = {
 }
 
 OneQuantity = Annotated[Any, WithJsonSchema(_ONE)]
-"""Type of a field that holds one quantity."""
+"""Annotation of a spec field that holds one quantity, with its JSON schema."""
 
 ManyQuantities = Annotated[Any, WithJsonSchema(_MANY)]
-"""Type of a field that holds several quantities."""
+"""Annotation of a spec field that holds several quantities, with its JSON schema."""
 
 
 def read_quantity(written: Any, si: str, where: str) -> float:

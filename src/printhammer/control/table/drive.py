@@ -304,7 +304,7 @@ def checked_driver(driver: str) -> Driver:
 
 
 def driven_by(hammer: Hammer, driver: str, largest: float) -> Hammer:
-    """Return the hammer with the pulse of a driver, at the width that gives the same print force.
+    """Return a copy of the hammer with another driver's pulse, whose width gives the same print force.
 
     `largest` is the current of a switch or an H-bridge, A.
 

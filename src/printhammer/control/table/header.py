@@ -30,7 +30,7 @@ NANOSECOND: Final = 1e-9
 """Default unit of the times in a header, s."""
 
 _PLACE_BYTES: Final = 4
-"""Size of a rate or an axis value in a header, bytes (a 32-bit integer)."""
+"""Size of a rate, or of an axis value, in a C header, bytes: 32-bit integers."""
 
 _ADVANCE, _, _DELAY, _BRAKE = range(len(COLUMNS))
 

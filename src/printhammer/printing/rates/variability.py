@@ -27,7 +27,7 @@ from printhammer.support.arrays import FloatArray
 
 
 class Perturbation(Declared):
-    """Perturbation of a hammer: changes of current, travel, paper forms, magnet and damping (default: 0)."""
+    """Deviation of a hammer from its design: current, travel, forms, magnet and damping (default: 0)."""
 
     current: float = part(
         "relative change of every current, e.g. by the supply voltage: 0.03 for 3 % more", default=0.0

@@ -31,10 +31,7 @@ _EQUAL: Final = 1e-6
 
 
 def words_of(patterns: Iterable[Sequence[int]], gap: int) -> list[tuple[int, ...]]:
-    """Split patterns into words of dots less than `gap` slots apart; return the distinct words, from slot 0.
-
-    A split is where consecutive dots are `gap` slots or more apart.
-    """
+    """Split patterns at gaps of `gap` slots or more; return the distinct words, each from slot 0."""
     words = set()
     for slots in patterns:
         ends = [k + 1 for k, (a, b) in enumerate(itertools.pairwise(slots)) if b - a >= gap]

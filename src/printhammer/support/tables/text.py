@@ -175,7 +175,7 @@ def is_reading(cell: str) -> bool:
 def with_points(
     where: str, text: str, separator: str, lines: Sequence[int], rows: list[list[str]]
 ) -> list[list[str]]:
-    """Convert the numbers in rows to a decimal point and no thousands separators.
+    """Rewrite the numbers in rows with a decimal point and without thousands separators.
 
     Parameters
     ----------
