@@ -416,8 +416,8 @@ def _copper_loss(hammer: Hammer, drive: PulseTrain) -> tuple[float, float]:
             return motion.energy.copper_loss, float(motion.t[flowing[-1]]) if flowing.size else 0.0
         span *= 2.0
     raise InputError(
-        f"{hammer.path}: the current lasts for ever",
+        f"{hammer.path}: the current does not decay",
         file=hammer.path,
         key="waveform",
-        expected="one that ends for the heat of a dot",
+        expected="a current that decays, so that a dot has a finite heat",
     )

@@ -114,11 +114,11 @@ class ImpactTime(Result, rows=_CELLS):
         """
         if self.bias.size != 1:
             raise InputError(
-                f"{self.bias.size} ways to sample were studied", key="index", expected="one for a sensor"
+                f"{self.bias.size} sampling settings were studied", key="index", expected="one for a sensor"
             )
         noise, units = float(self.deviation[0, 0, 0]), float(self.unit_deviation[0, 0, 0])
         if not np.isfinite(noise + units):
-            raise InputError("no impact was seen in the samples", expected="less noise for a sensor")
+            raise InputError("no impact was detected in the samples", expected="less noise for a sensor")
         # The study yields the mean error over units, which can be subtracted.
         offset = float(np.sqrt(max(units**2 - noise**2, 0.0)))
         # Flagged estimates count as missed.

@@ -132,7 +132,7 @@ def recorded_impacts(
                 f"{table.path}: a record from {t[0]:.4g} to {t[-1]:.4g} s",
                 file=table.path,
                 key="time",
-                expected=f"one from the firing at 0 s to {last:.4g} s",
+                expected=f"a record from the firing at 0 s to {last:.4g} s",
             )
         samples = estimator.sampling.clipped(np.interp(estimator.times, t, values))
         estimate = estimator.estimate(samples)

@@ -100,7 +100,7 @@ def _publish(draft: Path, folder: Path) -> None:
     pictures = folder / PICTURES
     pictures.mkdir(exist_ok=True)
     (folder / PAGE).unlink(missing_ok=True)
-    # Remove pictures of an earlier report, which readers could take for new ones.
+    # Remove pictures of an earlier report, which readers could mistake for pictures of this report.
     for path in pictures.iterdir():
         if _is_picture(path) and path.relative_to(folder) not in made:
             path.unlink()

@@ -61,7 +61,7 @@ def span(values: Any) -> str:
 
 
 def shortened(rows: Sequence[Sequence[str]], most: int = MOST_ROWS) -> list[Sequence[str]]:
-    """Return at most `most` rows: the first and last rows, and between them the number of omitted rows."""
+    """Shorten a table to `most` rows: first rows, a row with the number of omitted rows, last rows."""
     hidden, half = len(rows) - most, most // 2
     if hidden <= 0:
         return list(rows)

@@ -44,7 +44,7 @@ from printhammer.run.supply import take_supply
 from printhammer.support.arrays import FloatArray, IntArray
 
 _NODES: Final = 2048  # Initial number of rows for nodes; arbitrary, enlarged on demand
-_CONTACTS: Final = 256  # Initial number of rows for contacts; arbitrary, likewise
+_CONTACTS: Final = 256  # Initial number of rows for contacts; arbitrary, enlarged on demand
 MOST_COLUMNS: Final = 6
 _EXTRA: Final = 4
 """Initial number of rows for extra contacts of a member, in addition to one per firing; arbitrary."""

@@ -306,7 +306,8 @@ class Problem:
         """Integrate to time `end`, s, and process the record in stretches, so that memory does not grow.
 
         `take` receives an iterator of stretches of at most `capacity` nodes, and need not consume all; if a
-        single contact has more nodes, it is called again with longer stretches. Returns the result of `take`.
+        single contact has more nodes, `take` is called again with longer stretches. Returns the result of
+        `take`.
         """
         while True:
             try:

@@ -139,7 +139,7 @@ class Regime(Declared):
         Parameters
         ----------
         hammer : Hammer or Regime
-            The hammer. A regime is returned as it is; only a phase may accompany it.
+            A hammer; or a regime, which is returned unchanged or, if a phase is passed, with this phase.
         period, rate : float or str
             Time between firings, s, or firings per second, Hz; one of the two. Text with a unit is accepted.
         waveform : Waveform, optional

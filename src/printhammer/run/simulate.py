@@ -68,7 +68,7 @@ def simulate(
     points : int, optional
         Number of points of a uniform output grid; by default about a hundred in the time of one flight.
     times : array, optional
-        The output grid itself, ascending, s. The motion does not depend on it.
+        The output grid itself, ascending, s. The motion does not depend on the grid.
     scheme : str, optional
         "default", or one of the paper's: "trapezoid", "runge-kutta-4", in fixed steps on its schedule.
     step_scale : float, optional

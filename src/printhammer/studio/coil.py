@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
 
-_SOURCE: Final = "not in the file of the hammer; taken where a voltage drives the coil"
+_SOURCE: Final = "not in the hammer file; assumed where a voltage drives the coil"
 
 _RESISTANCE: Final = 28.6
 """Resistance of a coil if the hammer file states none, ohm; arbitrary."""

@@ -30,7 +30,7 @@ DRIVE: Final[dict[str, Quantity]] = {
     "bursts": Quantity("1", "nb", "number of bursts", ge=1.0),
     **FORCE,
 }
-"""Quantities of a drive that an axis may vary, besides its firing times."""
+"""Quantities of a drive that an axis may vary, in addition to firing times."""
 
 COUNTS: Final = ("pulses", "bursts")
 

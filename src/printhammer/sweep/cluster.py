@@ -49,10 +49,10 @@ def run_dask(
 ) -> None:
     """Compute blocks on a cluster, and write each finished block in this process.
 
-    The scheduler repeats a task whose worker is killed. A task that it abandons because it killed several
-    workers is postponed until all other tasks are done, then computed alone on the cluster, in ever smaller
-    pieces; a member that still kills its worker is recorded as lost. The arguments are those of `run_local`,
-    and a `distributed.Client` of the scheduler.
+    The scheduler repeats a task whose worker is killed. A task that has killed several workers is abandoned
+    by the scheduler; it is postponed until all other tasks are done, then computed alone on the cluster, in
+    ever smaller pieces; a member that still kills its worker is recorded as lost. The arguments are those of
+    `run_local`, and a `distributed.Client` of the scheduler.
 
     Raises
     ------
@@ -159,7 +159,7 @@ class _Tasks:
                 # The task returns its own errors as text.
                 raise _GoneError from None
             except Exception as late:  # noqa: BLE001 - told as a sentence
-                # The worker was killed before it returned the results, and so were its successors.
+                # Several workers were killed before they returned the results.
                 error = late
             else:
                 if isinstance(answer, str):

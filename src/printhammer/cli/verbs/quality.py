@@ -132,7 +132,7 @@ def quality(
     threads: int | None = opt.THREADS,
     units: Units = opt.UNITS,
 ) -> Answer:
-    """Report the print quality at a rate; or the safe rate, the yield, or the effect of other materials.
+    """Report the print quality at a rate, the safe rate, the yield, or the effect of other materials.
 
     The exit status is 1 if a run stopped early.
     """

@@ -42,7 +42,7 @@ def studio(
 ) -> Answer:
     """Write the studio as one self-contained HTML file, and open the file in the browser.
 
-    The file needs neither a server nor a network. Without --out it lies in the user's cache.
+    The page needs neither a server nor a network. Without --out the file is written to the user's cache.
     """
     from printhammer.studio.launch import keep_page, read_start
     from printhammer.studio.live import live_page

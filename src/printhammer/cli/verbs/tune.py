@@ -158,7 +158,7 @@ def tune(
         with job.progress_bar("judging") as tell:
             report = judge_table(hammer, made, progress=tell, **options)
     except PrinthammerError as error:
-        # The table may have taken hours of tuning: write it even if its evaluation fails.
+        # Tuning may take hours: the table is written even if its evaluation fails.
         return Answer(files=files, complaints=[f"the table is not validated: {error}"])
     files["report"] = Content.of(report)
     good = report.passed[1, 0]

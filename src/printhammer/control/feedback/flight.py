@@ -197,7 +197,7 @@ def least_squares(
     precision is the inverse of the covariance of the step.
     """
     precision, pull = prior.copy(), np.empty(expected.shape)
-    # Explicit sums, so that a run's bits do not depend on the other runs, as they may in a matrix product.
+    # Explicit sums: in a matrix product, the last bits of a run may depend on the other runs.
     for i, slope in enumerate(slopes):
         pull[:, i] = (prior[:, i] * expected).sum(axis=1)
         pull[:, i] += np.where(weight > 0.0, weight * slope * rest, 0.0).sum(axis=1)

@@ -170,7 +170,7 @@ def impact_map(
     flight = dots.flight_time[:, 1]
     pushed = width[ways] == ALWAYS
     with np.errstate(invalid="ignore"):
-        # A free touch requires that the current has decayed, a pushed one that it has risen.
+        # Before a free touch the current must have decayed; before a pushed touch it must have risen.
         settled = np.where(pushed, flight, flight - width[ways]) > _FADED * driver.edge
         good = ok & dots.struck[:, 0] & dots.struck[:, 1] & (dots.extra_contacts[:, 0] == 0) & settled
         good &= dots.peak_force[:, 0] < _LARGEST_FORCE * single.force

@@ -242,7 +242,7 @@ class Loop:
     rests: bool = False  # Whether the armature comes to rest and has not been launched yet
     learned: Learned = field(default_factory=Learned)  # Estimates of the driven hammer
     touched: Touched | None = None  # Latest touch, from which the front is estimated
-    # Latest touch, if the throw after it is decided again when the contact is over
+    # Latest touch, if the throw after this touch is decided again at the end of the contact
     printed: Printed | None = None
     # Sensor readings used at each decision: times, s, and displacements, m
     seen: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)

@@ -122,12 +122,12 @@ NEVER: Final = 50.0  # Cost of an inadmissible action
 # Standard deviation of the pack front, as a fraction of the stroke, above which a penalty applies
 KNOWN: Final = 0.01
 _DISCOUNT: Final = 0.9  # Discount factor per dot
-_ROUNDS: Final = 8  # Number of dots before a rest after which the cost-to-go is taken as converged
+_ROUNDS: Final = 8  # Number of dots before a rest after which the cost-to-go counts as converged
 _LATENESS: Final = np.linspace(-0.9, 0.9, 13)  # Nodes of the lateness, as fractions of the limit
 _SPEED_DOUBT: Final = 0.04  # Standard deviation of the estimated speed of a touch, m/s
 # Derivative of the next touch time with respect to speed, s / (m/s), where no finite difference is available
 _STEEPEST: Final = 2e-3
-_NEAR: Final = 2  # Number of speed nodes to either side over which the steepest slope is taken
+_NEAR: Final = 2  # Number of speed nodes to either side among which the steepest slope is searched
 _FAST: Final = 0.3  # Residual speed after a landing that costs 1, m/s
 _STEEP: Final = 8.0  # Weight of the sixth power of a deviation relative to its square
 _EFFORT: Final = 0.1  # Cost of the largest return current over a whole period
@@ -232,7 +232,7 @@ class Policy:
             open_ways = self.table.back == done.back[:, np.newaxis]
             open_ways &= self.table.fire > done.time[:, np.newaxis]
             cost = np.where(open_ways, cost, np.inf)
-        # An action that is inadmissible after the actions taken may still have a known force.
+        # An action that is inadmissible after the previous decisions may still have a known force.
         cost = np.where(np.isnan(cost) | np.isnan(choice.next_touch), np.inf, cost)
         way = np.argmin(cost, axis=1)
         return way, np.take_along_axis(cost, way[:, np.newaxis], axis=1)[:, 0], choice

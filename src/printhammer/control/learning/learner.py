@@ -37,7 +37,7 @@ _LATE: Final = (
 class Mean(NamedTuple):
     """Mean normalised readings of dots, and the numbers of readings, shape (measured, dots)."""
 
-    value: FloatArray  # NaN where no dot was seen
+    value: FloatArray  # Mean readings; NaN where no dot was detected
     seen: FloatArray  # Number of readings in each mean
 
 

@@ -67,7 +67,7 @@ class PulsePlan:
         width = getattr(waveform, "width", None)
         if not isinstance(width, float):
             raise InputError(
-                f"{task.hammer.path}: a {waveform.shape} waveform has no width to be sought",
+                f"{task.hammer.path}: a {waveform.shape} waveform has no width to optimise",
                 file=task.hammer.path,
                 key="waveform",
             )

@@ -233,8 +233,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         Parameters
         ----------
         hammer : Hammer
-            The hammer that the table is made for. The strategy may then drive other hammers that differ from
-            it.
+            The hammer for which the table was tuned. The strategy may then drive hammers that differ from it.
         serial : str, optional
             Serial number of the driven unit; `ANY_UNIT` drives any unit with a table that was learned on one
             unit. A table that was not learned is valid for every unit.

@@ -112,7 +112,7 @@ def look_ahead(times: Mapping[str, FloatArray], rates: FloatArray, gaps: int, re
 def prefix_of(head: Mapping[str, Any], rates: FloatArray, axis: str = "") -> str:
     """Return the prefix of all C names in a header: hammer, unit, driver, rates and axis.
 
-    The driver is omitted if it is the hammer's own, the unit if the table is valid for every unit.
+    The driver "own" is omitted, as is the unit if the table is valid for every unit.
     """
     driver = "" if head["driver"] == "own" else head["driver"]
     span = "_".join(f"{rate:g}" for rate in sorted({float(rates[0]), float(rates[-1])}))

@@ -109,7 +109,7 @@ def _opened(path: Path, size: int) -> FreeTypeFont:
     try:
         return ImageFont.truetype(str(path), size, layout_engine=ImageFont.Layout.BASIC)
     except (OSError, ValueError):
-        what = "a TrueType font" if path.is_file() else "a TrueType font file that is there"
+        what = "a TrueType font" if path.is_file() else "a TrueType font file that exists"
         raise InputError(f"{path}: expected {what}", file=path) from None
 
 

@@ -51,7 +51,7 @@ def nominal(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: floa
             f"{hammer.path}: the hammer has no pack",
             file=hammer.path,
             key="pack",
-            expected="one that a dot is made on",
+            expected="a pack, on which a pulse prints a dot",
         )
     motion = simulate(
         hammer, PulseTrain(pulse), duration=wait_of(hammer, pulse), points=2, tolerance=tolerance

@@ -165,7 +165,7 @@ def settled_from(away: BoolArray) -> int:
 def _settle_time(motion: Motion, rest: float, limit: float) -> float | None:
     """Locate by bisection the time, s, of the last departure from within `limit` (m) of the rest position.
 
-    The time counts from the firing; None if the armature never leaves the limit, or is outside it at the end.
+    The time counts from the firing; None if the armature never leaves the limit, or ends outside the limit.
     """
     count = round((motion.end - motion.start) / _SPACING) + 1
     grid = np.union1d(np.linspace(motion.start, motion.end, count), motion.maxima[0])

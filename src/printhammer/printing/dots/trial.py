@@ -89,7 +89,7 @@ def attempt(
         row[: len(pattern)] = pattern
     rates = np.repeat([case.rate for case in cases], len(patterns))
     due = FIRST_SLOT + slots / rates[:, np.newaxis]
-    # A drive may fire its last dot ahead of the slot or after it.
+    # A drive may fire its last dot before or after the slot.
     fired = [fired_of(strategy, case.hammer, each[0]) for case, each in zip(cases, own, strict=True)]
     waits = waits_of([case.hammer for case in cases], fired, effort.threads)
     ends = np.maximum(firings_of(drives).last, due.max(axis=1)) + np.repeat(waits, len(patterns))

@@ -383,7 +383,9 @@ def print_page(
         raise InputError(f"{what!r}", expected="a pattern or a text", value=what, key="pattern")
     slot_rate = read_positive(rate, "Hz", "rate")
     if pattern.wanted > _MOST_DOTS:
-        raise InputError(f"{pattern.wanted} dots are wanted", key="pattern", expected=f"{_MOST_DOTS} at most")
+        raise InputError(
+            f"{pattern.wanted} dots are requested", key="pattern", expected=f"{_MOST_DOTS} at most"
+        )
     print_head = head_of(pattern.wires) if head is None else head
     if print_head.wires != pattern.wires:
         raise InputError(

@@ -215,7 +215,9 @@ class Pattern(Declared):
                 expected=f"print lines, up to {MOST_WIRES} wires and slots, {MOST_CELLS} cells at most",
             )
         if not dots.any():
-            raise InputError(f"pattern {self.name!r}: no dot is wanted", key="dots", expected="at least one")
+            raise InputError(
+                f"pattern {self.name!r}: no dot is requested", key="dots", expected="at least one"
+            )
         dots.flags.writeable = False
         object.__setattr__(self, "dots", dots)
 

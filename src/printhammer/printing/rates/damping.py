@@ -310,7 +310,7 @@ def damping_study(
         driven.append(made[k].replace("waveform", larger, source="the same print force"))
     dots = single_pulses(driven, effort=effort.quiet)
     for k, exchanged, dot in zip(left.tolist(), driven, dots, strict=True):
-        # At the default tolerance: the energies of single runs need it and cost little.
+        # At the default tolerance, which the energies require; single runs are cheap.
         settling = settle(exchanged)
         wear = settling.wear
         if settling.status != "ok" or dot is None:
