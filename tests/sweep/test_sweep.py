@@ -180,6 +180,22 @@ def test_members_that_fail_are_rows(tmp_path: Path, hammer: ph.Hammer) -> None:
     assert not found.fired[1].any()
 
 
+def test_a_failed_member_is_a_row_of_the_table_with_its_status(tmp_path: Path) -> None:
+    spec = {
+        "format": 1,
+        "hammer": "hendriks-1983",
+        "drive": {"train": {"rate": "1 kHz", "pulses": 2}},
+        "axis": [{"key": "pack.front", "values": ["7 mil", "0 mil"]}],
+        "outputs": {"dots": ["struck"], "scalars": ["lost_dots"]},
+    }
+    ph.sweep(spec, tmp_path / "r.csv")
+    rows = (tmp_path / "r.csv").read_text(encoding="utf-8").splitlines()
+    assert rows[0] == "pack_front [m],status,reached [s],steps,struck_1,struck_2,lost_dots"
+    assert rows[1].split(",")[1] == "ok"
+    assert rows[1].split(",")[4:] == ["True", "True", "0"]
+    assert rows[2].split(",")[1:] == ["no such hammer", "", "", "", "", ""]
+
+
 def test_provenance_and_units(tmp_path: Path, hammer: ph.Hammer) -> None:
     found = run(
         tmp_path,

@@ -118,7 +118,8 @@ def sweep(
 def _member_table(result: xr.Dataset) -> pd.DataFrame:
     """Convert a sweep to a table with one row per member.
 
-    The columns are the status and the elements of every other array, one column for each firing or time.
+    The columns are the status in words and the elements of every other array, one column for each firing or
+    time. The other cells of a member that was not run are empty.
     """
     wide = result[["status"]]
     for name, variable in result.data_vars.items():
@@ -126,7 +127,13 @@ def _member_table(result: xr.Dataset) -> pd.DataFrame:
         for place in np.ndindex(*(result.sizes[dim] for dim in further)):
             column = variable.isel(dict(zip(further, place, strict=True))).drop_vars(further, errors="ignore")
             wide["_".join([str(name), *(str(k + 1) for k in place)])] = column
-    return frame_of(wide, {})
+    table = frame_of(wide, {})
+    attrs = result["status"].attrs
+    codes = dict(zip(attrs["flag_values"], str(attrs["flag_meanings"]).split(), strict=True))
+    table["status"] = [codes[code].replace("_", " ") for code in table["status"]]
+    own = list(table.columns)[list(table.columns).index("status") + 1 :]
+    table[own] = table[own].astype(object).where(table["reached [s]"].notna(), None)
+    return table
 
 
 def _now() -> str:
