@@ -70,12 +70,12 @@ def test_the_header_compiles_and_says_the_same(table: DeadTime, tmp_path: Path) 
     name = "printhammer_impact_wire"
     lines = ['#include "dead.h"', "#include <stdio.h>", "int main(void) {"]
     for volts, tenths in at:
-        calls = ", ".join(
-            f"(int){name}_between({name}_{each}, {volts}, {tenths})" for each in ("width", "dead_time")
-        )
+        calls = ", ".join(f"(int){name}_{each}_at({volts}, {tenths})" for each in ("width", "dead_time"))
         lines.append(f'  printf("%d %d\\n", {calls});')
     (tmp_path / "main.c").write_text("\n".join([*lines, "  return 0;", "}"]) + "\n")
-    command = ["cc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-o", "main", "main.c"]
+    command = ["cc", "-std=c99", "-Wall", "-Wextra", "-Wunused-const-variable", "-Werror"]
+    subprocess.run([*command, "-c", "-x", "c", "dead.h", "-o", "dead.o"], cwd=tmp_path, check=True)
+    command += ["-o", "main", "main.c"]
     subprocess.run(command, cwd=tmp_path, check=True)
     said = subprocess.run([tmp_path / "main"], check=True, capture_output=True, text=True).stdout.splitlines()
     for (volts, tenths), line in zip(at, said, strict=True):
@@ -83,6 +83,13 @@ def test_the_header_compiles_and_says_the_same(table: DeadTime, tmp_path: Path) 
             along = [np.interp(volts / 1e3, table.voltage, column) for column in values.T]
             wanted = 1e9 * np.interp(tenths / 10.0, table.temperature, along)
             assert int(word) == pytest.approx(wanted, abs=4.0)
+
+
+def test_a_pair_without_any_impact_is_not_among_those_that_reach_a_blow() -> None:
+    table = ph.dead_time(ph.load("relay-5v"), voltage=[2.0, 5.0], temperature=[20.0])
+    assert np.isnan(table.strongest[0, 0])
+    assert table.reached == 0.0
+    assert "strongest blow" not in str(table.summary())
 
 
 def test_one_pair_makes_a_header_too(table: DeadTime, tmp_path: Path) -> None:

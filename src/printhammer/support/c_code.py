@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import zlib
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +18,27 @@ def comment(text: str) -> str:
     """Return a text that is safe inside a C comment: printable ASCII without "*/"."""
     plain = text.encode("ascii", "replace").decode().replace("*/", "* /").replace("\\", "/")
     return "".join(letter if letter.isprintable() else " " for letter in plain)
+
+
+def guarded(guard: str, body: str) -> str:
+    """Return a C header with an include guard that holds a checksum of the body.
+
+    Two headers with one name and different contents stop the compiler; without the checksum, the guard would
+    skip the second one without a message.
+    """
+    checksum = f"0x{zlib.crc32(body.encode()):08x}u"
+    return f"""\
+/* SPDX-License-Identifier: MIT */
+#ifdef {guard}
+#if {guard} != {checksum}
+#error "two headers with different tables have the name {guard}"
+#endif
+#else
+#define {guard} {checksum}
+
+{body}
+#endif
+"""
 
 
 def numbers(values: npt.ArrayLike) -> str:

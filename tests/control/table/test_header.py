@@ -213,6 +213,20 @@ def test_two_tables_go_into_one_program(tmp_path: Path) -> None:
     assert '_DRIVER "switch"' in tables[2].to_header()
 
 
+def test_two_different_tables_of_one_name_stop_the_compiler(tmp_path: Path) -> None:
+    """The guard of the first header must not skip a second, different table without a word."""
+    for number, table in enumerate([braked(), braked(), braked(largest_current=3.0)]):
+        (tmp_path / f"{number}.h").write_text(table.to_header())
+    for other, compiles in ((1, True), (2, False)):
+        (tmp_path / "main.c").write_text(
+            f'#include "0.h"\n#include "{other}.h"\nint main(void) {{ return 0; }}\n'
+        )
+        command = ["cc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-c", "main.c"]
+        done = subprocess.run(command, cwd=tmp_path, check=False, capture_output=True, text=True)
+        assert (done.returncode == 0) is compiles, done.stderr
+        assert compiles or "two headers with different tables" in done.stderr
+
+
 def test_the_example_of_the_page_fires_what_python_fires(tmp_path: Path) -> None:
     table = braked()
     (tmp_path / "table.h").write_text(table.to_header("1 us"))

@@ -24,7 +24,7 @@ from printhammer.control.table.drive import (
     shared_numbers,
 )
 from printhammer.support.arrays import FloatArray, IntArray
-from printhammer.support.c_code import comment, identifier, nested, numbers
+from printhammer.support.c_code import comment, guarded, identifier, nested, numbers
 
 NANOSECOND: Final = 1e-9
 """Default unit of the times in a header, s."""
@@ -163,11 +163,7 @@ def header_text(
     ahead = nested(look_ahead(times, rates, gaps, reach))
     arrays += "\n/* Look-ahead: number of slots in advance at which a dot must be known. */\n"
     arrays += f"static const uint8_t {prefix}_look_ahead{shape} = {ahead};\n"
-    return f"""\
-/* SPDX-License-Identifier: MIT */
-#ifndef {upper}_TABLE_H
-#define {upper}_TABLE_H
-
+    body = f"""\
 /* Compensation table for the hammer {comment(head["hammer"])},
    fingerprint {fingerprint},
    {unit_of}, driver {comment(head["driver"])}, current limit {head["largest_current"]:g} A;
@@ -221,9 +217,8 @@ static inline unsigned {prefix}_slots_ahead(unsigned rate)
 {_most(prefix, values, entries)}
   return most;
 }}
-{_between(prefix, tick, between)}
-#endif
-"""
+{_between(prefix, tick, between)}"""
+    return guarded(f"{upper}_TABLE_H", body)
 
 
 def _quote(text: str) -> str:
