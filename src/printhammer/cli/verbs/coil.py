@@ -97,7 +97,8 @@ def impact_time(
     ),
     columns: str | None = opt.text(
         "COLUMNS",
-        "Column numbers (from 1) of the records, e.g. 'time=1, current=2*-10 A/V' (default: from headings).",
+        "Column numbers (from 1) of the records, e.g. 'time=1, current=2*-10 A/V' (default: from the file"
+        " RECORD.toml beside a record, else from its heading).",
     ),
     units: Units = opt.UNITS,
     **passed: Any,

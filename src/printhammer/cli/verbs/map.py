@@ -61,7 +61,7 @@ def map_(
     columns: str | None = opt.text(
         "COLUMNS",
         "Column numbers (from 1) of the measured table, with factors, e.g. 'time=1, 500 Hz=2*50 um/V'"
-        " (default: from its heading).",
+        " (default: from the file TABLE.toml beside the table, else from its heading).",
     ),
     figure: str | None = opt.choice("8|9", "Figure of the paper whose style the plot follows (default: 9)."),
     **passed: Any,
