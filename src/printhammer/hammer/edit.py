@@ -17,12 +17,14 @@ from printhammer.hammer.file import (
     TEXTS,
     UNSAID,
     Body,
+    entries_of,
     file_options,
     kinds_of,
     model_of,
     si_unit_of,
 )
 from printhammer.hammer.uncertainty import UNCERTAINTY
+from printhammer.parts.spring.forces import TERMS
 from printhammer.support.constants import Constant, quantities, shown
 
 Edit = tuple[str, Any]
@@ -40,6 +42,8 @@ def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, sour
     section, _, name = key.rpartition(".")
     if key in SELECTORS:
         return key, None if value is None else _table(key, value, status, source)
+    if key.partition(".")[0] in TERMS:
+        return _term_edit(document, key, value, status, source)
     if key == UNCERTAINTY:
         return key, value
     if not section:
@@ -68,6 +72,46 @@ def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, sour
     unit = before.get("unit") if isinstance(before, Mapping) else None
     si = note.si if unit is None else si_unit_of(note, unit)
     return key, _constant(key, si, value, status, source)
+
+
+def _term_edit(document: Mapping[str, Any], key: str, value: Any, status: str, source: str) -> Edit:
+    """Convert a key such as "contact.pole.stiffness", or "contact.pole" for the whole entry, to an edit."""
+    section, _, place = key.partition(".")
+    label, _, name = place.partition(".")
+    entry = next((entry for entry in entries_of(document, section) if entry["name"] == label), None)
+    if not label:
+        expected = f"the name of an entry, such as '{section}.weight'"
+        raise InputError.of(key, value, expected, written=shown(value))
+    if not name:
+        if value is None and entry is not None:
+            return key, None
+        if not isinstance(value, Mapping):
+            raise InputError.of(key, value, f"a table of [[{section}]], or None", written=shown(value))
+        content = {"name": label, "law": value.get("law")}
+        for each, item in value.items():
+            if each not in content:
+                made = _term_item(section, content["law"], f"{key}.{each}", item, status, source)
+                content |= {} if made is None else {each: made}
+        return key, content
+    if entry is None:
+        names = [f"{section}.{other['name']}.{name}" for other in entries_of(document, section)]
+        expected = nearest(key, names, f"an entry of [[{section}]]")
+        raise InputError(f"the key {shown(key)} is not known", key=key, expected=expected)
+    return key, _term_item(section, entry.get("law"), key, value, status, source)
+
+
+def _term_item(section: str, law: Any, key: str, value: Any, status: str, source: str) -> Any:
+    """Convert a constant or option of an entry of ``[[force]]`` or ``[[contact]]`` to its TOML value."""
+    model = TERMS[section].get(law)
+    if model is None:
+        place = key.rpartition(".")[0]
+        raise InputError.of(f"{place}.law", law, f"one of {', '.join(TERMS[section])}", written=shown(law))
+    name = key.rpartition(".")[2]
+    note = quantities(model).get(name)
+    if note is None and name not in file_options(model):
+        expected = nearest(name, [*quantities(model), *file_options(model)])
+        raise InputError(f"the key {shown(key)} is not known", key=key, expected=expected)
+    return value if note is None or value is None else _constant(key, note.si, value, status, source)
 
 
 def _constant(key: str, si_unit: str, value: Any, status: str, source: str) -> dict[str, Any]:
@@ -142,6 +186,11 @@ def changed(document: Mapping[str, Any], edits: Iterable[Edit]) -> dict[str, Any
     for key, value in edits:
         section, _, name = key.rpartition(".")
         holder = result
+        listed = key.partition(".")[0]
+        if listed in TERMS:
+            result[listed] = _copy(result.get(listed, []))
+            _put_entry(result, key, _copy(value), dict)
+            continue
         if section:
             holder = result[section] = dict(result.get(section, {}))
         if isinstance(holder.get(name), Mapping):
@@ -175,7 +224,11 @@ def changed_text(text: str, edits: Iterable[Edit]) -> str:
     document = tomlkit.parse(text)
     for key, value in edits:
         section, _, name = key.rpartition(".")
-        if key in (*SELECTORS, UNCERTAINTY) and isinstance(value, Mapping):
+        if key.partition(".")[0] in TERMS:
+            if key.partition(".")[0] not in document:
+                document[key.partition(".")[0]] = tomlkit.aot()
+            _put_entry(document, key, value, table if key.count(".") == 1 else inline)
+        elif key in (*SELECTORS, UNCERTAINTY) and isinstance(value, Mapping):
             document[key] = table(value)
         elif section in SELECTORS and section not in document:
             document[section] = table({name: value})
@@ -183,6 +236,23 @@ def changed_text(text: str, edits: Iterable[Edit]) -> str:
             multiline = isinstance(value, str) and "\n" in value
             _put(document, key, tomlkit.string(value, multiline=True) if multiline else value, inline)
     return tomlkit.dumps(document)
+
+
+def _put_entry(document: MutableMapping[str, Any], key: str, value: Any, table: Callable[..., Any]) -> None:
+    """Put a value at a key such as "contact.pole" or "contact.pole.stiffness"; None deletes the key."""
+    section, label, *rest = key.split(".")
+    entries = document[section]
+    at = next((k for k, entry in enumerate(entries) if entry["name"] == label), len(entries))
+    if rest:
+        _put(entries[at], rest[0], value, table)
+    elif value is None:
+        del entries[at]
+    elif at < len(entries):
+        entries[at] = table(value)
+    else:
+        entries.append(table(value))
+    if not entries:
+        del document[section]
 
 
 def _put(document: MutableMapping[str, Any], key: str, value: Any, table: Callable[..., Any]) -> None:

@@ -1,9 +1,12 @@
-"""Hammer files: parsing of TOML into parts, constants and waveform, and the JSON schema.
+"""Hammer files: parsing of TOML into parts, constants and waveform.
 
 A file has ``format = 1``, ``name``, optionally ``title``, ``note``, ``strike`` and ``views``, the constants
 ``mass`` and ``platen``, and a table for each part: ``[magnet]``, ``[coil]``, ``[spring]``, ``[pack]``,
-``[backstop]`` and ``[damping]`` with their ``law``, ``[waveform]`` with its ``shape``, and ``[uncertainty]``
-with standard errors of constants (`printhammer.hammer.uncertainty`). All but name and mass are optional. A
+``[backstop]`` and ``[damping]`` with their ``law``, ``[waveform]`` with its ``shape``, any number of
+``[[force]]`` and ``[[contact]]`` with ``name`` and ``law`` (`printhammer.parts.spring.forces`), and
+``[uncertainty]`` with standard errors of constants (`printhammer.hammer.uncertainty`). All but name and mass
+are optional. A constant is ``{ value = 0.008, unit = "in", status = "stated", source = "Fig. 3" }``, with the
+unit "1" for a pure number.
 constant is ``{ value = 0.008, unit = "in", status = "stated", source = "Fig. 3" }``, with the unit "1" for a
 pure number.
 """
@@ -21,14 +24,15 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
-from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError, located, nearest
-from printhammer.hammer.uncertainty import ENTRIES, UNCERTAINTY, Uncertainty, read_uncertainty
+from printhammer.hammer.uncertainty import UNCERTAINTY, Uncertainty, read_uncertainty
 from printhammer.parts import PARTS, ROLES, BackstopPart, MagnetPart, PackPart, Part, laws
 from printhammer.parts.functions import check_functions
 from printhammer.parts.outside import load_installed
+from printhammer.parts.spring.forces import TERMS, ForceSum, Term, sum_of
 from printhammer.support.constants import (
     STATUSES,
     Constant,
@@ -60,6 +64,7 @@ VIEWS: Final = ("motion", "forces", "loops", "phase", "sketch", "map", "strobe",
 """Names of the views that the studio can display, and that the entry ``views`` of a hammer file may list."""
 
 _NOUN: Final = re.compile("[a-z]+(-[a-z]+)*")
+_LABEL: Final = re.compile("[a-z][a-z0-9]*([-_][a-z0-9]+)*")
 _EXPECTED: Final = {
     "strike": (_NOUN, "a noun in lower case whose plural ends in s, such as 'closing'"),
     "struck": (_NOUN, "a noun in lower case, such as 'pole'"),
@@ -89,7 +94,7 @@ class Body(BaseModel):
 
 @dataclass(frozen=True)
 class Contents:
-    """Parsed contents of a hammer file in SI; `parts` is keyed by role."""
+    """Parsed contents of a hammer file in SI; `parts` by role, `terms` by key, such as "contact.pole"."""
 
     name: str
     title: str
@@ -102,6 +107,7 @@ class Contents:
     views: tuple[str, ...]
     body: Body
     parts: dict[str, Part]
+    terms: dict[str, Term]
     waveform: Waveform | None
     constants: dict[str, Constant]
     uncertainty: Uncertainty | None
@@ -169,7 +175,8 @@ def file_options(model: type[BaseModel]) -> dict[str, Any]:
 def _build(
     document: Mapping[str, Any], folder: Path, before: Mapping[str, Any], known: Contents | None
 ) -> Contents:
-    _check_keys(document, ("format", *TEXTS, "views", *quantities(Body), *SELECTORS, UNCERTAINTY), "")
+    known_keys = ("format", *TEXTS, "views", *quantities(Body), *SELECTORS, *TERMS, UNCERTAINTY)
+    _check_keys(document, known_keys, "")
     if "format" not in document:
         raise InputError("format is missing", key="format", expected=f"format = {FORMAT}")
     version = document["format"]
@@ -196,7 +203,8 @@ def _build(
                 raise InputError.of(section, table, f"a table [{section}]", written=shown(table))
             keys = [f"{section}.{name}" for name in table if name != selector]
             # An option may name a file that has changed since, so that it is read again.
-            if known is not None and table is before.get(section) and known.constants.keys() >= set(keys):
+            same = known is not None and table is before.get(section) and known.constants.keys() >= set(keys)
+            if same and known is not None and not isinstance(known.parts.get(section), ForceSum):
                 made[section] = known.parts.get(section, known.waveform)
                 constants |= {key: known.constants[key] for key in keys}
                 continue
@@ -206,12 +214,20 @@ def _build(
             made[section] = _read(
                 model, rest, f"{section}.", constants, folder, before.get(section, {}), known
             )
+    terms = {
+        f"{section}.{entry['name']}": _term(section, entry, constants, folder)
+        for section in TERMS
+        for entry in entries_of(document, section)
+    }
+    if terms:
+        made["spring"] = sum_of(made.get("spring"), terms, body.mass)
     contents = Contents(
         **texts,
         views=_views(document),
         body=body,
         waveform=made.pop("waveform", None),
         parts=made,
+        terms=terms,
         constants=constants,
         uncertainty=read_uncertainty(document[UNCERTAINTY], constants) if UNCERTAINTY in document else None,
     )
@@ -248,6 +264,37 @@ def _kind(table: Mapping[str, Any], section: str, selector: str) -> str:
             written=shown(kind),
         )
     return kind
+
+
+def entries_of(document: Mapping[str, Any], section: str) -> list[Mapping[str, Any]]:
+    """Return the entries of ``[[force]]`` or ``[[contact]]`` of a document, each with a name of its own."""
+    entries = document.get(section, [])
+    if not isinstance(entries, list) or not all(isinstance(entry, Mapping) for entry in entries):
+        raise InputError.of(section, entries, f"tables [[{section}]]", written=shown(entries))
+    names: list[Any] = []
+    for number, entry in enumerate(entries, 1):
+        name = entry.get("name")
+        key = f"{section}[{number}].name"
+        if name is None:
+            raise InputError(f"{key} is missing", key=key, expected="a short name, such as 'weight'")
+        if not isinstance(name, str) or not _LABEL.fullmatch(name) or name in names:
+            expected = "a name of its own in lower case, such as 'weight' or 'contact-spring'"
+            raise InputError.of(key, name, expected, written=shown(name))
+        names.append(name)
+    return entries
+
+
+def _term(section: str, entry: Mapping[str, Any], constants: dict[str, Constant], folder: Path) -> Term:
+    """Parse an entry of ``[[force]]`` or ``[[contact]]``; add its constants to `constants`."""
+    key, known = f"{section}.{entry['name']}", TERMS[section]
+    law = entry.get("law")
+    expected = f"one of {', '.join(known)}"
+    if law is None:
+        raise InputError(f"{key}.law is missing", key=f"{key}.law", expected=expected)
+    if not isinstance(law, str) or law not in known:
+        raise InputError.of(f"{key}.law", law, expected, written=shown(law))
+    rest = {name: value for name, value in entry.items() if name not in ("name", "law")}
+    return _read(known[law], rest, f"{key}.", constants, folder, {}, None)
 
 
 def _check_keys(table: Mapping[str, Any], known: Iterable[str], prefix: str) -> None:
@@ -375,6 +422,11 @@ def _check_order(contents: Contents) -> None:
     for (key, place), (after, end) in pairwise([*places.items(), *ends.items()]):
         if not place < end:
             raise InputError(f"{written(key)}: expected a position before {written(after)}", key=written(key))
+    for key, constant in contents.constants.items():
+        before = places.get("backstop.position", -math.inf)
+        if key.startswith("contact.") and key.endswith(".position") and constant.si < before:
+            expected = f"a position not before {written('backstop.position')}"
+            raise InputError.of(key, constant.value, expected, unit=constant.unit)
     magnet = contents.parts.get("magnet")
     if isinstance(magnet, MagnetPart):
         low, high = magnet.domain
@@ -386,92 +438,3 @@ def _check_order(contents: Contents) -> None:
                     f"{written(key)}: expected a position where the magnet's law holds, {span}",
                     key=written(key),
                 )
-
-
-_DIALECT = "https://json-schema.org/draft/2020-12/schema"
-
-
-def schema() -> dict[str, Any]:
-    """Return the JSON schema (draft 2020-12) of hammer files.
-
-    The schema does not express dimensions, the order of positions, or constants that replace others;
-    `printhammer hammer check` does.
-    """
-    properties: dict[str, Any] = {"format": {"const": FORMAT, "description": "version of the file format"}}
-    properties |= {name: {"type": "string", "description": meaning} for name, meaning in TEXTS.items()}
-    properties["name"]["minLength"] = 1
-    properties["views"] = {
-        "type": "array",
-        "description": "views of the studio that apply; chosen by the parts if missing",
-        "items": {"enum": list(VIEWS)},
-        "minItems": 1,
-        "uniqueItems": True,
-    }
-    properties |= _constants(Body)
-    for section, selector in SELECTORS.items():
-        tables = [_table(section, kind, selector) for kind in kinds_of(section)]
-        properties[section] = {"oneOf": tables}
-    properties[UNCERTAINTY] = _object(
-        {name: {"type": "array", "description": meaning} for name, meaning in ENTRIES.items()}, ["constants"]
-    )
-    result = _object(properties, ["format", "name", *_required(Body)])
-    return {
-        "$schema": _DIALECT,
-        "title": "printhammer hammer file",
-        **result,
-        "$defs": {"constant": _CONSTANT},
-    }
-
-
-def _table(section: str, kind: str, selector: str) -> dict[str, Any]:
-    model = model_of(section, kind)
-    properties: dict[str, Any] = {selector: {"const": kind}}
-    properties |= _constants(model)
-    for name, annotation in file_options(model).items():
-        description = model.model_fields[name].description
-        properties[name] = TypeAdapter(annotation).json_schema()
-        if description:
-            properties[name]["description"] = description
-    required = [name for name in file_options(model) if model.model_fields[name].is_required()]
-    doc = (model.__doc__ or "").strip().partition("\n")[0]
-    needed = [] if UNSAID.get(section) == kind else [selector]
-    return {"description": doc, **_object(properties, [*needed, *_required(model), *required])}
-
-
-def _object(properties: dict[str, Any], required: list[str]) -> dict[str, Any]:
-    return {"type": "object", "properties": properties, "required": required, "additionalProperties": False}
-
-
-def _required(model: type[BaseModel]) -> list[str]:
-    return [name for name, note in quantities(model).items() if note.required]
-
-
-def _constants(model: type[BaseModel]) -> dict[str, Any]:
-    return {name: _constant_schema(note) for name, note in quantities(model).items()}
-
-
-def _constant_schema(note: Quantity) -> dict[str, Any]:
-    """Return the JSON schema of one constant; only the sign of a bound is independent of the unit."""
-    units = " or ".join((note.si, *(unit for unit in note.also if unit != note.si)))
-    result: dict[str, Any] = {
-        "$ref": "#/$defs/constant",
-        "description": f"{note.meaning}, {note.symbol}, in {units} or a unit like it",
-    }
-    if note.gt == 0:
-        result["properties"] = {"value": {"exclusiveMinimum": 0}}
-    elif note.ge == 0:
-        result["properties"] = {"value": {"minimum": 0}}
-    if note.si == "1" and not note.also and note.le is not None:
-        result.setdefault("properties", {"value": {}})["value"]["maximum"] = note.le
-    return result
-
-
-_CONSTANT: dict[str, Any] = _object(
-    {
-        "value": {"type": "number"},
-        "unit": {"type": "string", "minLength": 1},
-        "status": {"enum": list(STATUSES)},
-        "source": {"type": "string", "minLength": 1},
-    },
-    list(CONSTANT_KEYS),
-)

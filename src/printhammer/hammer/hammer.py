@@ -25,6 +25,7 @@ from printhammer.hammer.edit import Edit, changed, changed_text, edit_of
 from printhammer.hammer.file import FORMAT, Contents, build, file_options, read_document
 from printhammer.hammer.uncertainty import UNCERTAINTY, Uncertainty
 from printhammer.parts import BackstopPart, CoilPart, DampingPart, MagnetPart, PackPart, Part, SpringPart
+from printhammer.parts.spring.forces import ForceSum, Term
 from printhammer.support.arguments import checked
 from printhammer.support.constants import Constant, quantities
 from printhammer.support.html import html_table, titled
@@ -236,6 +237,22 @@ class Hammer:
         return MappingProxyType(self._contents.parts)
 
     @property
+    def laws(self) -> dict[str, str]:
+        """Laws of parts, forces and contacts, and the shape of the waveform, by table of the file."""
+        laws = {role: part.law for role, part in self.parts.items()}
+        if isinstance(self.spring, ForceSum):
+            laws.pop("spring")
+            if "spring" in self._document:
+                laws["spring"] = self._document["spring"]["law"]
+        laws |= {key: term.law for key, term in self.terms.items()}
+        return laws | ({} if self.waveform is None else {"waveform": self.waveform.shape})
+
+    @property
+    def terms(self) -> Mapping[str, Term]:
+        """Further forces and contacts by key, such as "force.weight" or "contact.pole"."""
+        return MappingProxyType(self._contents.terms)
+
+    @property
     def waveform(self) -> Waveform | None:
         """Standard waveform of one pulse; None if absent."""
         return self._contents.waveform
@@ -420,7 +437,7 @@ class Hammer:
     @staticmethod
     def schema() -> dict[str, Any]:
         """Return the JSON schema of hammer files."""
-        from printhammer.hammer.file import schema
+        from printhammer.hammer.schema import schema
 
         return schema()
 
@@ -438,9 +455,9 @@ class Hammer:
 
     def _repr_html_(self) -> str:
         """Return the HTML repr: name and title, laws, and constants with their sources."""
-        laws = [(role, part.law) for role, part in self.parts.items()]
+        laws = list(self.laws.items())
         if self.waveform is not None:
-            laws.append(("waveform", f"{self.waveform.shape}, {self.waveform.quantity}"))
+            laws[-1] = ("waveform", f"{self.waveform.shape}, {self.waveform.quantity}")
         rows = [
             (each.key, f"{each.value:.6g} {each.unit}", each.meaning, each.status, each.source)
             for each in self.constants.values()

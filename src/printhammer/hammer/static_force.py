@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from importlib import import_module
+from itertools import count, takewhile
 from typing import Any, Protocol
 
 from printhammer.errors import InputError
@@ -102,7 +103,7 @@ class StaticForce:
         """
         room = min(x - self.statics.low, self.statics.high - x)
         step = 0.05 * room if math.isfinite(room) else 1e-3
-        total = derivative(self.spring, x, 1e-3)
+        total = self._spring_slope(x)
         if self.hammer.magnet is not None:
             total += derivative(lambda place: self.magnet(place, current), x, step)
         depth = self.statics.position - x
@@ -112,6 +113,16 @@ class StaticForce:
         if x > self.front:
             total += derivative(self.pack, x, 0.2 * (x - self.front))
         return total
+
+    def _spring_slope(self, x: float) -> float:
+        """Compute the derivative of the spring force, N/m; at a kink of the law, the one-sided one above."""
+        step = 1e-3
+        level_at, constants = self.statics.spring_level, self.statics.spring
+        for level in takewhile(math.isfinite, (level_at(constants, float(k)) for k in count())):
+            if level == x:
+                return (self.spring(x + 1e-7 * step) - self.spring(x)) / (1e-7 * step)
+            step = min(step, 0.9 * abs(x - level))
+        return derivative(self.spring, x, step)
 
     def anchors(self) -> list[float]:
         """Return the positions, m, near which forces vary on short length scales."""
@@ -129,6 +140,7 @@ def statics_of(hammer: HammerLike) -> Statics:
         raise InputError.of("hammer", hammer, "a hammer, such as load('hendriks-1983')")
     magnet_force, magnet = law_of(hammer, hammer.magnet, "magnet_force")
     spring_force, spring = law_of(hammer, hammer.spring, "spring_force")
+    spring_level, _constants = law_of(hammer, hammer.spring, "spring_level")
     pack_loading, pack = law_of(hammer, hammer.pack, "pack_loading")
     backstop_elastic, backstop = law_of(hammer, hammer.backstop, "backstop_elastic")
     low, high = hammer.magnet.domain if hammer.magnet is not None else (-math.inf, math.inf)
@@ -137,6 +149,7 @@ def statics_of(hammer: HammerLike) -> Statics:
         spring_force,
         pack_loading,
         backstop_elastic,
+        spring_level,
         magnet,
         spring,
         pack,

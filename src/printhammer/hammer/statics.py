@@ -44,6 +44,7 @@ class Statics(NamedTuple):
     spring_force: Any
     pack_loading: Any
     backstop_elastic: Any
+    spring_level: Any
     """Law functions of the parts; for absent parts, those of `printhammer.parts.absent`."""
     magnet: Any
     spring: Any
@@ -88,6 +89,19 @@ def total_force(x: float, current: float, s: Statics) -> float:
 def force_at(x: float, about: tuple[float, Statics]) -> float:
     """Return the net force, N, at a displacement, m; `about` is the pair of current, A, and statics."""
     return total_force(x, about[0], about[1])
+
+
+def nearest_level(x: float, s: Statics) -> float:
+    """Return the distance from `x` to the nearest other kink of the spring law, m; infinity without one."""
+    nearest = math.inf
+    k = 0.0
+    level = float(s.spring_level(s.spring, k))
+    while level < math.inf:
+        if level != x:
+            nearest = min(nearest, abs(level - x))
+        k += 1.0
+        level = float(s.spring_level(s.spring, k))
+    return nearest
 
 
 def origin_of(s: Statics) -> float:

@@ -10,6 +10,7 @@ from typing import Any
 
 MEMORY = False
 RIGID = False
+LEVELS = False
 
 
 def magnet_force(c: Any, x: float, current: float) -> float:
@@ -50,6 +51,11 @@ def spring_force(c: Any, x: float) -> float:
 def spring_energy(c: Any, x: float) -> float:
     """Return 0 J, the spring energy: the hammer has no spring."""
     return 0.0
+
+
+def spring_level(c: Any, k: float) -> float:
+    """Return infinity: the force of the spring has no kink."""
+    return math.inf
 
 
 def pack_loading(c: Any, x: float, v: float) -> float:

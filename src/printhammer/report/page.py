@@ -389,14 +389,11 @@ def view(report: Report) -> dict[str, Any]:
 
 def _parts(hammer: Hammer) -> list[dict[str, Any]]:
     """Group the constants of a hammer by part, with the law of each part."""
-    laws = {role: part.law for role, part in hammer.parts.items()}
-    if hammer.waveform is not None:
-        laws["waveform"] = hammer.waveform.shape
     sections: dict[str, list[Any]] = {}
     for key, constant in hammer.constants.items():
         sections.setdefault(key.rpartition(".")[0], []).append(constant)
     return [
-        {"name": name or "armature and platen", "law": laws.get(name, ""), "constants": constants}
+        {"name": name or "armature and platen", "law": hammer.laws.get(name, ""), "constants": constants}
         for name, constants in sections.items()
     ]
 

@@ -31,6 +31,7 @@ from printhammer.results.summary import (
     quantity,
     styled,
 )
+from printhammer.run.closings import Closing, closings_of, extrema
 from printhammer.run.contacts import Contact, Dot, contact_rows, contacts_of, dots_of
 from printhammer.run.energy import CoilWork, Ledger, coil_work_of, increments_of, ledger_of
 from printhammer.run.problem import Problem, Record, message_of
@@ -49,9 +50,6 @@ a force, and the total."""
 PATHS: Final = ("supply", "chopped", "blocked", "backward")
 """Paths of the coil current: through the supply, through the diode of a chopper, none, and decay of a
 negative current."""
-
-_BISECTIONS: Final = 52  # Number of bisections: the bits of a double's mantissa
-
 
 MOST_DOTS: Final = 40
 """Largest number of dots in a summary; a longer list shows its first and last dots. Arbitrary."""
@@ -279,6 +277,11 @@ class Motion(Result, fields=False):
         return Rows(contacts_of(self._contact_rows), Contact)
 
     @cached_property
+    def closings(self) -> Rows[Closing]:
+        """Closings of all further contacts in order of time; a tuple, shown as a table."""
+        return Rows(closings_of(self._problem, self._record), Closing)
+
+    @cached_property
     def dots(self) -> Rows[Dot]:
         """Dots of all firings up to the end of the run, in order; a tuple, shown as a table."""
         return Rows(dots_of(self._problem, self._record, self._contact_rows, self._increments), Dot)
@@ -303,17 +306,7 @@ class Motion(Result, fields=False):
     @cached_property
     def maxima(self) -> tuple[FloatArray, FloatArray]:
         """Times, s, and displacements, m, of all local maxima of the displacement."""
-        nodes = self._record.nodes
-        before, after = nodes[:-1, 2], nodes[1:, 2]
-        rows = np.flatnonzero((before > 0.0) & (after <= 0.0) & (nodes[1:, 0] > nodes[:-1, 0]))
-        low, high = nodes[rows, 0].copy(), nodes[rows + 1, 0].copy()
-        for _ in range(_BISECTIONS if len(rows) else 0):
-            middle = 0.5 * (low + high)
-            rising = self._problem.resample(self._record, middle)[:, 1] > 0.0
-            low = np.where(rising, middle, low)
-            high = np.where(rising, high, middle)
-        times = np.where(after[rows] == 0.0, nodes[rows + 1, 0], high)
-        return times, self._problem.resample(self._record, times)[:, 0] if len(rows) else times
+        return extrema(self._problem, self._record, 1.0)
 
     def peak_after(self, firing: int) -> tuple[float, float] | None:
         """Return time, s, and displacement, m, of the largest local maximum from a firing to the next.
@@ -356,6 +349,11 @@ class Motion(Result, fields=False):
             forces = [each.peak_force for each in touches if each.peak_force is not None]
             up_to = f", up to {quantity(max(forces), 'N')}" if forces else ""
             rows.append((surface, f"{len(touches)} {'touch' if len(touches) == 1 else 'touches'}{up_to}"))
+        for name in dict.fromkeys(closing.contact for closing in self.closings):
+            own = [each for each in self.closings if each.contact == name]
+            count = f"{len(own)} {'closing' if len(own) == 1 else 'closings'}"
+            largest = quantity(max(each.peak_force for each in own), "N")
+            rows.append((name, f"{count} from {quantity(own[0].t_in, 's')}, up to {largest}"))
         energies = Facts([*rows, *self._energy_facts()])
         if self.drive.quantity != "current" and self.hammer.pack is None:
             return Summary([energies])

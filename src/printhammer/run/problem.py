@@ -164,8 +164,9 @@ def scales_of(
     The displacement is the distance from backstop to pack. If backstop or pack is missing, the displacement
     is the largest of three: the distance that the forces would move the mass in 1 / (2 pi) of a period of the
     drive or of the hammer, the distance of the initial state from the origin, and the distance covered in
-    that time at the initial velocity. The typical speed is that imparted to the mass by the largest force
-    over that displacement. `static` is the static force of the hammer, computed if not passed.
+    that time at the initial velocity; the first and the third end at the nearest kink of the spring law. The
+    typical speed is that imparted to the mass by the largest force over that displacement. `static` is the
+    static force of the hammer, computed if not passed.
     """
     if static is None:
         static = StaticForce(hammer)

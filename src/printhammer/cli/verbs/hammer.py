@@ -119,9 +119,7 @@ def numbered(sources: list[str]) -> list[str]:
 
 def constants_table(hammer: Hammer, sources: list[str]) -> Table:
     """Return the table of constants, grouped by part and headed by its law."""
-    laws = {role: f"law {part.law}" for role, part in hammer.parts.items()}
-    if hammer.waveform is not None:
-        laws["waveform"] = f"shape {hammer.waveform.shape}"
+    laws = {key: f"{'shape' if key == 'waveform' else 'law'} {law}" for key, law in hammer.laws.items()}
 
     def cells(constant: Constant) -> tuple[str, ...]:
         own, style = constant.unit == constant.si_unit, STATUS_STYLES[constant.status]

@@ -42,6 +42,7 @@ _record = partial(opt.file, panel=_FILES)
     out=opt.results("the motion or, with .json, its dots, contacts and energies", panel=_FILES),
     dots=_record("Output file for the table of dots (.csv, .parquet).", ".csv", ".parquet"),
     contacts=_record("Output file for the table of contacts (.csv, .parquet).", ".csv", ".parquet"),
+    closings=_record("Output file for the closings of contacts (.csv, .parquet).", ".csv", ".parquet"),
 )
 def run(
     job: Job,
@@ -73,6 +74,7 @@ def run(
             "out": Content(motion.write, motion.plot),
             "dots": Content(motion.dots.save),
             "contacts": Content(motion.contacts.save),
+            "closings": Content(motion.closings.save),
         },
         complaints=[] if motion.ok else [motion.message],
     )

@@ -59,7 +59,7 @@ def bindings_of(laws: Laws) -> Bindings:
         sources = (absent, module, *(sys.modules[other] for other in others))
         digests[role] = code_digest(inspect.getsource(each) for each in sources)
         choices[f"HAS_{role.upper()}"] = bool(name)
-        for role_of_choice, choice in (("pack", "MEMORY"), ("backstop", "RIGID")):
+        for role_of_choice, choice in (("pack", "MEMORY"), ("backstop", "RIGID"), ("spring", "LEVELS")):
             if role == role_of_choice:
                 choices[choice] = bool(getattr(module, choice, False))
     return Bindings(names, choices, digests, packing)

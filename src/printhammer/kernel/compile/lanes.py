@@ -25,6 +25,7 @@ def suits(laws: Laws) -> bool:
         and not choices["RIGID"]
         and choices["HAS_PACK"]
         and choices["MEMORY"]
+        and not choices["LEVELS"]
         and laws.pack_pulls
         and laws.backstop_pulls
     )

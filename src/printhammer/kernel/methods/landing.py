@@ -14,7 +14,17 @@ from typing import TYPE_CHECKING, Any
 from printhammer.kernel.compile.compiling import called, compiled, inlined
 from printhammer.kernel.methods.hermite import position_root, rises_through, turns_down, velocity_root
 from printhammer.kernel.model import modes as M
-from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION, Control, ForceLaw
+from printhammer.kernel.model.layout import (
+    BACKSTOP_PART,
+    FRONT,
+    MAGNET,
+    MOST_LEVELS,
+    PACK,
+    POSITION,
+    SPRING,
+    Control,
+    ForceLaw,
+)
 
 if TYPE_CHECKING:
     from printhammer.kernel.methods.crossing import circuit_switch
@@ -28,10 +38,12 @@ if TYPE_CHECKING:
         HAS_CIRCUIT,
         HAS_DAMPING,
         HAS_PACK,
+        LEVELS,
         MEMORY,
         PACK_PULLS,
         backstop_switch,
         pack_switch,
+        spring_level,
     )
 
 State = Any
@@ -244,6 +256,12 @@ def level_switch(
 
 
 @inlined
+def is_beyond(x: float, v: float, a: float, level: float) -> bool:
+    """Whether a motion lies, or begins, on the far side of a displacement `level` [m]."""
+    return x > level or (x == level and (v > 0.0 or (v == 0.0 and a > 0.0)))
+
+
+@inlined
 def first_switch(
     start: State, end: State, h: float, law: ForceLaw, peak: float, control: Control
 ) -> tuple[int, float, float, float, float]:
@@ -284,6 +302,17 @@ def first_switch(
             f = velocity_root(turn * start[2], turn * start[3], turn * end[2], turn * end[3], h)
             if f < fraction:
                 switch, fraction, upper, level, sign = M.REVERSAL, f, 1.0, 0.0, turn
+    if LEVELS:
+        for k in range(MOST_LEVELS):
+            bound = spring_level(hammer[SPRING:PACK], float(k))
+            if math.isinf(bound):
+                break
+            toward = -1.0 if is_beyond(start[1], start[2], start[3], bound) else 1.0
+            code, f, u = level_switch(start, end, h, bound, toward, law, control)
+            if code == M.UNRESOLVED:
+                return M.UNRESOLVED, f, u, bound, toward
+            if code == M.REACHED_FRONT and f < fraction:
+                switch, fraction, upper, level, sign = M.REACHED_LEVEL, f, u, bound, toward
     return switch, fraction, upper, level, sign
 
 

@@ -67,7 +67,7 @@ LAW_FUNCTIONS = {
         "magnet_inductance",
         "magnet_current",
     ),
-    "spring": ("spring_force", "spring_energy"),
+    "spring": ("spring_force", "spring_energy", "spring_level"),
     "pack": ("pack_loading", "pack_memory", "pack_unloading", "pack_switch"),
     "backstop": (
         "backstop_elastic",
@@ -99,6 +99,7 @@ HAS_DAMPING: bool
 HAS_CIRCUIT: bool
 MEMORY: bool
 RIGID: bool
+LEVELS: bool
 FORCE_DRIVE: bool
 PACK_PULLS: bool
 BACKSTOP_PULLS: bool
@@ -134,6 +135,9 @@ spring_force: Law1
 """Force of the spring [N]; argument: displacement [m]."""
 spring_energy: Law1
 """Potential energy of the spring [J], whose negative slope is the force; argument: displacement [m]."""
+spring_level: Law1
+"""Position [m] at which the slope of the spring force changes; argument: index of the position; infinity from
+the number of such positions on."""
 damping_force: Law1
 """Damping force on the armature [N], a differentiable function; argument: velocity [m/s]."""
 pack_loading: Law2

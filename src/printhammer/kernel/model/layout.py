@@ -2,7 +2,8 @@
 
 Inverse mass [1/kg], backstop position [m] and pack front [m] come first. The packed constants of damping,
 spring, pack, backstop, coil with supply, and magnet follow, each part at a fixed index: thirteen elements
-are reserved for the damping, sixteen for each of the others, and any number for the magnet, which is last.
+are reserved for the damping, 64 for the spring, sixteen for each of the others, and any number for the
+magnet, which is last.
 """
 
 from typing import Any, NamedTuple
@@ -12,11 +13,11 @@ POSITION = 1
 FRONT = 2
 DAMPING = 3
 SPRING = 16
-PACK = 32
-BACKSTOP_PART = 48
-COIL = 64
-SUPPLY = 72
-MAGNET = 80
+PACK = 80
+BACKSTOP_PART = 96
+COIL = 112
+SUPPLY = 120
+MAGNET = 128
 PLACES = {
     "damping": DAMPING,
     "spring": SPRING,
@@ -25,8 +26,16 @@ PLACES = {
     "coil": COIL,
     "magnet": MAGNET,
 }
-ROOM = {"damping": SPRING - DAMPING, "spring": 16, "pack": 16, "backstop": 16, "coil": SUPPLY - COIL}
+ROOM = {
+    "damping": SPRING - DAMPING,
+    "spring": PACK - SPRING,
+    "pack": 16,
+    "backstop": 16,
+    "coil": SUPPLY - COIL,
+}
 """Maximum number of constants of each part; a magnet may have any number."""
+MOST_LEVELS = 12
+"""Maximum number of displacements at which the slope of the spring force changes."""
 
 # Indices of the coil constants.
 RESISTANCE, INDUCTANCE, TURN_RESISTANCE, LEAKAGE, COUPLED = range(COIL, COIL + 5)

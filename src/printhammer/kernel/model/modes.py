@@ -63,6 +63,8 @@ CIRCUIT = 12
 """Switching event: the coil current changes to another path through the driver."""
 REST_ENDED = 13
 """Switching event: the coil current sets an armature at rest in motion."""
+REACHED_LEVEL = 15
+"""Switching event: the displacement reaches a kink of the spring force."""
 HOLDS = 14
 """Not an event: the armature stays at rest, so the latest node of the record remains valid."""
 

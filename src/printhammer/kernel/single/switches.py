@@ -59,7 +59,7 @@ def after_step(switch: int, state: State, setup: Setup, nodes: Any, contacts: An
                 reverse(state, setup)
         elif switch in (M.LEFT_FRONT, M.LEFT_BACKSTOP):
             leave(switch, state, setup, contacts)
-        else:
+        elif switch != M.REACHED_LEVEL:
             follow(switch, state)
             if int(state[C.MODE]) == M.BACKSTOP:
                 depth = setup.hammer[POSITION] - state[C.POSITION_NOW]

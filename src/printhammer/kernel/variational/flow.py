@@ -35,12 +35,13 @@ from printhammer.kernel.variational.layout import (
 if TYPE_CHECKING:
     from printhammer.kernel.model.circuit import take_path
     from printhammer.kernel.model.forces import Hammer
-    from printhammer.kernel.model.laws import ELECTRIC_ROW, FORCED, HAS_CIRCUIT, HAS_PACK, MEMORY
+    from printhammer.kernel.model.laws import ELECTRIC_ROW, FORCED, HAS_CIRCUIT, HAS_PACK, LEVELS, MEMORY
     from printhammer.kernel.model.pulses import edges_at, pass_edges
     from printhammer.kernel.single.resample import branch_of
     from printhammer.kernel.variational.circuit import hold_linkage, pass_edge_of_driver, pass_path
     from printhammer.kernel.variational.forcing import set_live_moves
     from printhammer.kernel.variational.layout import Carried
+    from printhammer.kernel.variational.slopes import smooth_bounds
     from printhammer.kernel.variational.steps import begin_step, carry
     from printhammer.kernel.variational.supply import latest_edge, move_edge, rates_at
     from printhammer.kernel.variational.switches import pass_moving_edges, pass_node
@@ -223,7 +224,7 @@ def flow(
     forcing: Any = ()
     if FORCED:
         forcing = Forcing(*forced_by)
-    setting = Setting(scales, bounds, hammer, train.live, forcing)
+    setting = Setting(scales, smooth_bounds(nodes[0], nodes[0], bounds, hammer), hammer, train.live, forcing)
     columns, work, track, passed = carried.columns, carried.work, carried.track, carried.passed
     count = nodes.shape[0]
     asked = 0
@@ -238,6 +239,8 @@ def flow(
         node = nodes[i]
         after = nodes[min(i + 1, count - 1)]
         final = i + 1 == count
+        if LEVELS:
+            setting = Setting(scales, smooth_bounds(node, after, bounds, hammer), hammer, train.live, forcing)
         t_end = after[0]
         pulse, piece = -1, -1
         if FORCED and due > 0:

@@ -20,6 +20,7 @@ from printhammer.kernel.model.layout import (
     FRONT,
     INVERSE_MASS,
     MAGNET,
+    MOST_LEVELS,
     PACK,
     POSITION,
     SPRING,
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
         HAS_CIRCUIT,
         HAS_DAMPING,
         HAS_PACK,
+        LEVELS,
         PACK_PULLS,
         backstop_elastic,
         backstop_energy,
@@ -53,6 +55,7 @@ if TYPE_CHECKING:
         pack_memory,
         pack_switch,
         spring_force,
+        spring_level,
     )
     from printhammer.kernel.model.pulses import Drive, piece_change, piece_rate
     from printhammer.kernel.variational.circuit import (
@@ -116,15 +119,35 @@ def force_with_value(x: float, value: float, hammer: Hammer, drive: Drive, forci
     return math.nan
 
 
+@compiled
+def smooth_side(x: float, k: int, setting: Setting) -> int:
+    """Return the difference formula for constant k in which no kink of the spring law passes `x`."""
+    if LEVELS:
+        varied = setting.forcing.varied
+        for j in range(MOST_LEVELS):
+            level = spring_level(varied[k, V.MIDDLE][SPRING:PACK], float(j))
+            if math.isinf(level):
+                break
+            beyond = setting.bounds[2] >= level
+            ahead = spring_level(varied[k, V.MIDDLE + 2][SPRING:PACK], float(j)) - x
+            behind = spring_level(varied[k, V.MIDDLE - 2][SPRING:PACK], float(j)) - x
+            if (beyond and ahead > 0.0) or (not beyond and ahead < 0.0):
+                return BACKWARD
+            if (beyond and behind > 0.0) or (not beyond and behind < 0.0):
+                return FORWARD
+    return CENTRAL
+
+
 @inlined
 def field_changes(
-    t: float, x: float, value: float, with_value: float, k: int, drive: Drive, forcing: Forcing
+    t: float, x: float, value: float, with_value: float, k: int, drive: Drive, setting: Setting
 ) -> tuple[float, float, float]:
     """Return the derivatives of total, coil and drive force with respect to constant k.
 
     The total is the sum of magnet, spring and drive force. The state, including any flux linkage, is fixed.
     `with_value` is the derivative of the force with respect to the drive `value`.
     """
+    forcing = setting.forcing
     varied, of_hammer, live_moves = forcing.varied, forcing.of_hammer, forcing.live_moves
     if HAS_CIRCUIT:
         pulse = with_value * current_change(x, drive[1], drive[0], k, forcing)
@@ -133,12 +156,13 @@ def field_changes(
     total, coil = 0.0, 0.0
     current = 0.0 if FORCE_DRIVE else value
     if of_hammer[k] & V.FIELD_MOVES:
-        for i in range(POINTS[CENTRAL]):
-            other = varied[k, V.MIDDLE + int(OFFSETS[CENTRAL, i])]
+        side = smooth_side(x, k, setting)
+        for i in range(POINTS[side]):
+            other = varied[k, V.MIDDLE + int(OFFSETS[side, i])]
             magnet = magnet_force(other[MAGNET:], x, current)
-            total += WEIGHTS[CENTRAL, i] * (magnet + spring_force(other[SPRING:PACK], x))
+            total += WEIGHTS[side, i] * (magnet + spring_force(other[SPRING:PACK], x))
             if current != 0.0:
-                coil += WEIGHTS[CENTRAL, i] * (magnet - magnet_force(other[MAGNET:], x, 0.0))
+                coil += WEIGHTS[side, i] * (magnet - magnet_force(other[MAGNET:], x, 0.0))
     total, coil = total / V.SPACING + pulse, coil / V.SPACING
     return (total, coil, pulse) if FORCE_DRIVE else (total, coil + pulse, 0.0)
 
@@ -269,7 +293,7 @@ def add_forcing(
     for k in range(columns.shape[1]):
         j = V.FIRST_COLUMN + CHANGING * k
         dx, dv = y[j], y[j + 1]
-        change, coil_change, drive_part = field_changes(t, x, value, with_value, k, drive, forcing)
+        change, coil_change, drive_part = field_changes(t, x, value, with_value, k, drive, setting)
         e = j + V.STATE - V.ENERGY
         if HAS_DAMPING:
             drag = damping_change(v, k, forcing)

@@ -113,7 +113,7 @@ class Carried(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """Data that do not change along a run: scales, bounds, parameter array, drive and forcing."""
+    """Scales, bounds of the step (see `smooth_bounds`), parameter array, drive and forcing."""
 
     scales: Any
     bounds: Any

@@ -13,7 +13,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from printhammer.kernel.compile.compiling import compiled, inlined
-from printhammer.kernel.model.layout import BACKSTOP_PART, DAMPING, FRONT, MAGNET, PACK, SPRING
+from printhammer.kernel.model.layout import (
+    BACKSTOP_PART,
+    DAMPING,
+    FRONT,
+    MAGNET,
+    MOST_LEVELS,
+    PACK,
+    SPRING,
+)
 from printhammer.kernel.model.modes import LOADING
 
 if TYPE_CHECKING:
@@ -23,6 +31,7 @@ if TYPE_CHECKING:
         FORCE_DRIVE,
         FORCED,
         HAS_DAMPING,
+        LEVELS,
         MEMORY,
         PACK_PULLS,
         backstop_elastic,
@@ -34,6 +43,7 @@ if TYPE_CHECKING:
         pack_switch,
         pack_unloading,
         spring_force,
+        spring_level,
     )
 
 FIELD_SPACING = 2e-4
@@ -41,6 +51,8 @@ FIELD_SPACING = 2e-4
 NEAR_END = 1e-3
 """Limit of the step size, as a fraction of the distance to an end of the range, where the law may be
 singular."""
+NEAR_KINK = 1e-2
+"""Limit of the step size, as a fraction of the distance to a kink of the spring law; set by hand."""
 DEPTH_SPACING = 3e-4
 """Step size in the pack, as a fraction of the depth, since the law may contain high powers of the depth."""
 LEAST_DEPTH_SPACING = 1e-7
@@ -69,20 +81,42 @@ def field_at(x: float, value: float, hammer: Hammer) -> float:
 
 
 @compiled
+def smooth_bounds(node: Any, after: Any, bounds: Any, hammer: Hammer) -> Any:
+    """Return the ends of the range of the laws, and the kinks of the spring law around a step [m].
+
+    A step, from `node` to `after`, passes no kink; it may begin and end on one.
+    """
+    low, high = bounds[0], bounds[1]
+    if LEVELS:
+        for k in range(MOST_LEVELS):
+            level = spring_level(hammer[SPRING:PACK], float(k))
+            first, last = node[1] - level, after[1] - level
+            if first > 0.0 or last > 0.0 or (first == 0.0 and last == 0.0 and node[2] >= 0.0):
+                low = max(low, level)
+            else:
+                high = min(high, level)
+    return bounds[0], bounds[1], low, high
+
+
+@compiled
 def field_slope(x: float, value: float, scales: Any, bounds: Any, hammer: Hammer) -> float:
     """Return the derivative of magnet and spring force with respect to displacement [N/m].
 
-    `scales` holds the scales of displacement and velocity; `bounds` begins with the ends of the range of the
-    laws.
+    `scales` holds the scales of displacement and velocity; `bounds` is the result of `smooth_bounds`.
     """
     to_end = min(x - bounds[0], bounds[1] - x)
     spacing = min(FIELD_SPACING * scales[0], NEAR_END * max(to_end, NEAR_END * scales[0]))
+    low, high = bounds[2], bounds[3]
+    if LEVELS:
+        # Beyond a kink, the law may contain a fractional power of the distance.
+        to_kink = min(x - low, high - x)
+        spacing = min(spacing, max(NEAR_KINK * to_kink, LEAST_DEPTH_SPACING * scales[0]))
     # Round the step so that x + spacing is exact, as the difference formula assumes.
     spacing = (x + spacing) - x
     side = CENTRAL
-    if x - 2.0 * spacing < bounds[0]:
+    if x - 2.0 * spacing < low:
         side = FORWARD
-    elif x + 2.0 * spacing > bounds[1]:
+    elif x + 2.0 * spacing > high:
         side = BACKWARD
     total = 0.0
     for k in range(POINTS[side]):

@@ -113,7 +113,7 @@ def place_of_rest(t: float, node: Any, k: int, columns: Any, setting: Setting) -
     drive = driven(live, electric_at_node(node))
     value = value_at(t, x, hammer, drive)
     with_value = force_with_value(x, value, hammer, drive, forcing)
-    change, _coil, _drive = field_changes(t, x, value, with_value, k, drive, forcing)
+    change, _coil, _drive = field_changes(t, x, value, with_value, k, drive, setting)
     if mode == M.HELD:
         w = node[4]
         with_x = -contact_slopes(w, 0.0, scales, hammer)[0] / (2.0 * w)
@@ -244,7 +244,7 @@ def set_in(t: float, t_to: float, node: Any, columns: Any, work: Any, setting: S
         if FORCED:
             value = value_at(t, x, hammer, drive)
             with_value = force_with_value(x, value, hammer, drive, forcing)
-            change = field_changes(t, x, value, with_value, k, drive, forcing)[0] * hammer[INVERSE_MASS]
+            change = field_changes(t, x, value, with_value, k, drive, setting)[0] * hammer[INVERSE_MASS]
             a = acceleration(t, x, 0.0, M.FREE, 0.0, hammer, drive)
             change += a * forcing.moves[k, INVERSE_MASS] / hammer[INVERSE_MASS]
             columns[1, k] += pause * change

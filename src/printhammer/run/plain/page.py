@@ -60,6 +60,7 @@ if TYPE_CHECKING:
         magnet_linkage,
         pack_loading,
         spring_force,
+        spring_level,
     )
     from printhammer.parts.absent import (
         backstop_packed,
@@ -143,6 +144,7 @@ def statics_at(constants: Any, limits: Any) -> Statics:
         spring_force,
         pack_loading,
         backstop_elastic,
+        spring_level,
         constants[MAGNET:],
         constants[SPRING:PACK],
         constants[PACK:BACKSTOP_PART],

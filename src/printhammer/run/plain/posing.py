@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any, Final, NamedTuple
 
-from printhammer.hammer.statics import Statics, free_force, origin_of
+from printhammer.hammer.statics import Statics, free_force, nearest_level, origin_of
 from printhammer.kernel.model.modes import PACK_SURFACE
 
 FAR: Final = 1e4
@@ -191,7 +191,8 @@ def typical_scales(
             time = min(time, period / (2.0 * math.pi))
         if math.isinf(time):
             time = 1e-3
-        way = max(near * time * time / mass, abs(state[0] - origin), abs(state[1]) * time)
+        reach = max(near * time * time / mass, abs(state[1]) * time)
+        way = max(min(reach, nearest_level(origin, s)), abs(state[0] - origin))
         if way == 0.0:
             way = 1e-4
     largest = max(largest_force(origin, current, push, s), largest_force(origin + way, current, push, s))
