@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.drive.waveforms.drivers import Rail
 from printhammer.hammer.names import Range, range_of
+from printhammer.parts.spring.forces import TERMS, Gravity
 from printhammer.support.constants import Constant, quantities
 
 if TYPE_CHECKING:
@@ -74,8 +75,15 @@ TEMPERATURES: Final = Range(-40.0, 180.0, logarithmic=False)
 
 
 def span_of(hammer: Hammer, key: str, factor: float) -> Range | None:
-    """Return the control range of a constant or an unspecified coil constant; None for an unknown key."""
-    if key.startswith("waveform."):
+    """Return the control range of a constant or an unspecified coil constant; None for an unknown key.
+
+    The page adds further forces and contacts up beforehand: their constants, those of the spring, and a mass
+    that has a weight have no control.
+    """
+    section = key.partition(".")[0]
+    if section == "waveform" or section in TERMS or (hammer.terms and section == "spring"):
+        return None
+    if key == "mass" and any(isinstance(term, Gravity) for term in hammer.terms.values()):
         return None
     if (further := open_constants(hammer).get(key)) is not None:
         return further[1]

@@ -109,7 +109,9 @@ def numbers_of(hammer: Hammer) -> Numbers:
 
 def _numbers_of(part: Part, origin: float) -> tuple[tuple[str | None, ...], tuple[float, ...]]:
     if part.function(f"{part.role}_packed") is not None:
-        return (*(f"{part.role}.{name}" for name in part.names()), None), part.numbers()
+        numbers, names = part.numbers(), part.names()
+        keys = (f"{part.role}.{name}" for name in names)
+        return (*keys, *(None,) * (len(numbers) - len(names))), numbers
     # Fixed numbers: a table, or a law of the user's own.
     numbers = (*part.packed(origin), *(part.domain if isinstance(part, MagnetPart) else ()))
     return (None,) * len(numbers), numbers
