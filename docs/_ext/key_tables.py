@@ -9,6 +9,7 @@ from docutils.statemachine import StringList
 from sphinx.util.docutils import SphinxDirective
 
 from printhammer.hammer.file import SELECTORS, Body, file_options, kinds_of, model_of
+from printhammer.parts.spring.forces import TERMS
 from printhammer.support.constants import Quantity, quantities
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
 MEANINGS = {
+    "side": "side on which the contact acts",
     "pull": "whether the contact may pull",
     "reloading": "where the pack goes in again within a contact",
     "back_emf": "whether the flux of the magnet is linked with the coil",
@@ -39,10 +41,12 @@ class KeyTable(SphinxDirective):
         if section == "top":
             rows = _cells(Body)
         else:
-            head.insert(0, first)
-            for kind in kinds_of(section):
+            head.insert(0, first or "law")
+            listed: dict[str, type[BaseModel]] = dict(TERMS.get(section, {}))
+            models = listed or {kind: model_of(section, kind) for kind in kinds_of(section)}
+            for kind, model in models.items():
                 label = f"`{kind}`"
-                for cells in _cells(model_of(section, kind)):
+                for cells in _cells(model):
                     rows.append([label, *cells])
                     label = ""
         lines = [_line(head), "|" + "---|" * len(head), *map(_line, rows)]

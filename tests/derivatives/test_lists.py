@@ -1,0 +1,55 @@
+"""Derivatives through the kinks of further contacts against differences of runs."""
+
+import numpy as np
+import pytest
+
+import printhammer as ph
+
+QUANTITIES = ("flight_time", "impact_speed", "peak_force")
+STEPS = ((1, 8.0), (-1, -8.0), (2, -1.0), (-2, 1.0))
+"""Offsets and weights, times 12, of central differences: Abramowitz and Stegun (1964), table 25.2."""
+
+
+def relay(law: str, stiffness: float) -> ph.Hammer:
+    """Armature with a contact on its way to the pole, and one that ends behind the start."""
+    return ph.Hammer.build(1e-3).replace(
+        {
+            "spring": {"law": "preload", "preload": -0.5, "stiffness": 100.0},
+            "backstop": {"law": "rigid", "position": 0.0, "restitution": 0.3},
+            "pack": {"law": "dashpot", "front": 0.5e-3, "stiffness": 1e6, "damping": 10.0},
+            "waveform": {"shape": "half-sine", "amplitude": "3 N", "width": 1.5e-3},
+            "force.weight": {"law": "gravity", "angle": "60 deg"},
+            "contact.front": {"law": law, "side": "front", "position": 0.3e-3, "stiffness": stiffness},
+            "contact.back": {"law": "linear", "side": "back", "position": 0.1e-3, "stiffness": 2e3},
+        }
+    )
+
+
+def dots_of(hammer: ph.Hammer) -> np.ndarray:
+    drive = ph.PulseTrain(hammer.waveform, period=3e-3, pulses=2)
+    motion = ph.simulate(hammer, drive, tolerance=1e-14)
+    return np.array([[getattr(dot, name) for name in QUANTITIES] for dot in motion.dots])
+
+
+@pytest.mark.parametrize(("law", "stiffness", "within"), [("linear", 3e3, 3e-8), ("hertz", 1e5, 3e-6)])
+def test_sensitivities_follow_the_contacts(law: str, stiffness: float, within: float) -> None:
+    """The columns of a run take its steps, which at the touch of a Hertz contact are less accurate."""
+    hammer = relay(law, stiffness)
+    result = ph.sensitivities(hammer, ph.PulseTrain(hammer.waveform, period=3e-3, pulses=2), tolerance=1e-13)
+    assert result.ok
+    rows = [result.quantities.index(name) for name in QUANTITIES]
+    for key in (
+        "mass",
+        "force.weight.angle",
+        "contact.front.position",
+        "contact.front.stiffness",
+        "contact.back.position",
+        "contact.back.stiffness",
+    ):
+        value = hammer.constants[key].si
+        step = 1e-4 * value
+        moved = (weight * dots_of(hammer.replace(key, value + k * step)) for k, weight in STEPS)
+        expected = sum(moved) / (12.0 * step)
+        own = result.derivatives[:, rows, result.constants.index(key)]
+        scale = np.abs(result.dots[:, rows]) / value
+        assert np.abs((own - expected) / scale).max() < within, key
