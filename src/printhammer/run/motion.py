@@ -31,8 +31,16 @@ from printhammer.results.summary import (
     quantity,
     styled,
 )
-from printhammer.run.closings import Closing, closings_of, extrema
-from printhammer.run.contacts import Contact, Dot, contact_rows, contacts_of, dots_of
+from printhammer.run.contacts import (
+    Closing,
+    Contact,
+    Dot,
+    closings_of,
+    contact_rows,
+    contacts_of,
+    dots_of,
+    extrema,
+)
 from printhammer.run.energy import CoilWork, Ledger, coil_work_of, increments_of, ledger_of
 from printhammer.run.problem import Problem, Record, message_of
 from printhammer.run.start import state_to_begin
