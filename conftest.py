@@ -127,12 +127,20 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Compile what most tests need once, before workers of their own do it side by side."""
+    """Compile what most tests need while the workers collect tests; a worker waits for code that it needs."""
     watch_compiling(COMPILING)
     if hasattr(config.option, "loadscopereorder"):
         config.option.loadscopereorder = False
     if config.getoption("numprocesses", None) and not hasattr(config, "workerinput") and not compiled():
-        subprocess.run([sys.executable, "-m", "printhammer", "warm", CRUDE], check=True, capture_output=True)
+        command = [sys.executable, "-m", "printhammer", "warm", CRUDE]
+        warm = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+
+        def end() -> None:
+            _, said = warm.communicate()
+            if warm.returncode:
+                raise RuntimeError(said.decode())
+
+        config.add_cleanup(end)
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -9,6 +9,7 @@ import typer.main
 
 import printhammer as ph
 from printhammer.cli.main import main
+from printhammer.run import ahead
 
 COMPILING = re.compile(r"^compiling |: the machine code there is for ")
 
@@ -29,6 +30,8 @@ def called(
 ) -> Callable[..., Outcome]:
     """Return a function that runs a program of verbs in this process."""
     monkeypatch.setattr(typer.main, "get_command", _commands)
+    # The cores are busy with other tests; the hook would stay for the tests that follow in this process.
+    monkeypatch.setattr(ahead, "begin", lambda _laws: lambda: None)
 
     def call(*arguments: object) -> Outcome:
         with pytest.raises(SystemExit) as end:
