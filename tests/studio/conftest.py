@@ -1,7 +1,7 @@
 """Tests in a browser: run where a Chromium is found; where none is, they are left out and that is said."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,8 @@ from printhammer.studio.bundle import page_files
 NEEDS = "opened_browser"
 HAMMERS = ("hendriks-1983-1", "hendriks-1983", "bouncing-ball", "duffing-holmes")
 """Hammers of the page of the tests, the first of which is shown."""
+WHOLE = f"#views={'-'.join(VIEWS)}"
+"""Link to the page with all views."""
 left_out: list[str] = []
 
 
@@ -59,17 +61,56 @@ def visited(address: str, opened_browser: Any) -> Iterator[Page]:
     opened.call("Page.close")
 
 
+COMPLETE = """(({ busy, stale, frames, store: { state }, loaded, offered }) => {
+  const { motion, map, dots } = frames;
+  const isShown = (view) => !(view in motion.outdated) || frames[view]?.serial === motion.serial;
+  return !busy && !stale && loaded === (state.text || state.hammer || offered[0])
+    && dots?.serial === motion.serial && state.views.every(isShown)
+    && (!state.views.includes("map") || map.detail === "full");
+})(window.studio.studio)"""
+"""Whether the state is shown, and its whole map where there is one."""
+AGAIN = """(({ studio }) => {
+  document.querySelector("dialog[open]")?.close();
+  document.activeElement.blur();
+  for (const part of document.querySelectorAll("details")) part.open = false;
+  studio.notes = "";
+  studio.store.begin(%s);
+  studio.setCursor(0);
+})(window.studio)"""
+"""Sets the state with which a page opened, without a history."""
+
+
+@pytest.fixture(scope="module")
+def tabs(address: str, opened_browser: Any) -> Iterator[Callable[..., Page]]:
+    """Pages by their links, opened once for all tests of a module; every test begins with the same state."""
+    tabs: dict[str, tuple[Page, str]] = {}
+    with ExitStack() as stack:
+
+        def tab(link: str = "", width: int = 1280, height: int = 720) -> Page:
+            if link not in tabs:
+                opened = stack.enter_context(visited(f"{address}{link}", opened_browser))
+                tabs[link] = opened, opened.run("JSON.stringify(window.studio.studio.store.state)")
+            found, state = tabs[link]
+            found.call("Page.bringToFront")
+            found.size(width, height)
+            found.complaints.clear()
+            found.run(AGAIN % state)
+            found.wait(COMPLETE)
+            return found
+
+        yield tab
+
+
 @pytest.fixture
-def page(address: str, opened_browser: Any) -> Iterator[Page]:
+def page(tabs: Callable[..., Page]) -> Page:
     """The page as it opens, with four views."""
-    with visited(address, opened_browser) as opened:
-        yield opened
+    return tabs()
 
 
 @pytest.fixture
 def whole_page(address: str, opened_browser: Any) -> Iterator[Page]:
-    """The page with all views."""
-    with visited(f"{address}#views={'-'.join(VIEWS)}", opened_browser) as opened:
+    """The page with all views, opened for one test."""
+    with visited(f"{address}{WHOLE}", opened_browser) as opened:
         yield opened
 
 

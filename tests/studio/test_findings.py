@@ -1,7 +1,7 @@
 """Values at the cursor, findings, pins: in a browser, with the hammer of the paper."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 from urllib.parse import quote
 
@@ -15,15 +15,11 @@ STATE = "window.studio.studio.store.state"
 
 
 @pytest.fixture
-def opened(address: str, opened_browser: Any) -> Iterator[Page]:
-    page = opened_browser()
-    page.size(1440, 900)
-    page.open(f"{address}#hammer=hendriks-1983&views={'-'.join(VIEWS)}")
-    page.wait("window.studio?.studio?.frames.map?.detail === 'full' && window.studio.studio.frames.strobe")
-    page.wait("window.studio.studio.frames.dots")
+def opened(tabs: Callable[..., Page]) -> Iterator[Page]:
+    page = tabs(f"#hammer=hendriks-1983&views={'-'.join(VIEWS)}", 1440, 900)
+    page.wait("window.studio.studio.frames.strobe && window.studio.studio.frames.dots")
     yield page
     assert page.complaints == []
-    page.call("Page.close")
 
 
 def readout(page: Page, view: str) -> str:

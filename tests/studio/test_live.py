@@ -1,15 +1,16 @@
 """The page that computes by itself, opened from a file: what Python computes, four views, hostile links."""
 
 import json
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from tests.studio.browser import Page
+from tests.studio.conftest import WHOLE
 from tests.studio.reading import without_modules
 
 import printhammer as ph
-from printhammer.hammer.file import VIEWS
 from printhammer.printing.page.page import print_page
 from printhammer.printing.page.pattern import Pattern
 from printhammer.studio import Shelf, live_page
@@ -33,22 +34,18 @@ def test_the_page_begins_from_a_file(
     page.call("Page.close")
 
 
-WHOLE = "window.studio?.studio?.frames.map?.detail === 'full'"
-WHOLE += (
+FULL = "window.studio?.studio?.frames.map?.detail === 'full'"
+FULL += (
     " && window.studio.studio.frames.strobe?.data.x.length === 400 && !document.querySelector('.outdated')"
 )
 
 
 @pytest.fixture
-def live(address: str, opened_browser: Any) -> Any:
-    page = opened_browser()
-    page.size(1280, 720)
-    page.open(f"{address}#views={'-'.join(VIEWS)}")
-    page.wait(WHOLE)
+def live(tabs: Callable[..., Page]) -> Iterator[Page]:
+    page = tabs(WHOLE)
+    page.wait(FULL)
     yield page
     assert page.complaints == []
-    assert [place for place in page.requests if not place.startswith(("blob:", "file:", "data:"))] == []
-    page.call("Page.close")
 
 
 @pytest.mark.slow
@@ -81,10 +78,10 @@ def test_a_rate_is_followed_and_a_superseded_state_dropped(live: Page) -> None:
     script = "for (let rate = 900; rate <= 1000; rate += 1) window.studio.studio.store.set({ rate }); 1"
     live.run(script)
     live.wait("window.studio.studio.frames.motion.fired[1] === 1e-3 && !window.studio.studio.busy")
-    live.wait(WHOLE)
+    live.wait(FULL)
     live.run("window.studio.studio.store.set({ pattern: '1101' }); 1")
     live.wait("window.studio.studio.frames.motion.fired.length === 3")
-    live.wait(f"window.studio.studio.frames.map.pattern === '1101' && {WHOLE}")
+    live.wait(f"window.studio.studio.frames.map.pattern === '1101' && {FULL}")
 
 
 @pytest.mark.slow
@@ -106,7 +103,7 @@ def test_changed_constants_and_pulses_are_computed_as_by_python(live: Page) -> N
         dot = ph.simulate(changed, ph.PulseTrain(wave, rate=1200.0, pulses=9)).dots[0]
         assert shown["flight_time"] == pytest.approx(dot.flight_time, rel=1e-4)
         assert shown["peak_force"] == pytest.approx(dot.peak_force, rel=1e-3)
-    live.wait(WHOLE)
+    live.wait(FULL)
 
 
 SHOWN = "[...document.querySelectorAll('.panel')].filter((each) => each.checkVisibility())"

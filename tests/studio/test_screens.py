@@ -2,11 +2,13 @@
 
 import io
 import itertools
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 from tests.studio.browser import Page
+from tests.studio.conftest import COMPLETE, WHOLE
 
 from printhammer.hammer.file import VIEWS
 
@@ -15,16 +17,11 @@ RATIOS = (1.0, 1.25, 1.5, 2.0)
 SIZES = ((1440, 900), (1280, 720), (1024, 768), (670, 900), (390, 844))
 DRAWN = "new Promise((done) => setTimeout(() => requestAnimationFrame(done), 280))"
 """Waits until a new size is drawn, and captions are written."""
-COMPLETE = (
-    "(({ busy, stale, frames, store }) => !busy && !stale"
-    " && (!store.state.views.includes('map') || frames.map.detail === 'full'))(window.studio.studio)"
-)
-"""The state is shown, and its map where one is."""
 
 
 @pytest.fixture
-def page(whole_page: Page) -> Page:
-    return whole_page
+def page(tabs: Callable[..., Page]) -> Page:
+    return tabs(WHOLE)
 
 
 def resized(page: Page, width: int, height: int, ratio: float) -> None:
@@ -45,8 +42,9 @@ def pixels(page: Page, path: Path, selector: str) -> Any:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("ratio", RATIOS)
-def test_nothing_is_cut_or_overlaps(page: Page, tmp_path: Path, ratio: float) -> None:
+def test_nothing_is_cut_or_overlaps(whole_page: Page, tmp_path: Path, ratio: float) -> None:
     """At every size, with all controls and a story open; a window of 1440 px zoomed to 200 % has 720."""
+    page = whole_page
     page.run(HELPERS)
     for width, height in (*SIZES, (720, 450)):
         resized(page, width, height, ratio)
@@ -112,7 +110,8 @@ def test_everything_fits_on_the_screen(page: Page, width: int, height: int) -> N
 
 
 @pytest.mark.slow
-def test_controls_are_a_sheet_on_a_phone(page: Page) -> None:
+def test_controls_are_a_sheet_on_a_phone(whole_page: Page) -> None:
+    page = whole_page
     resized(page, 390, 844, 2.0)
     assert not page.run("document.querySelector('[data-key=rate]').checkVisibility()")
     page.run("document.querySelector('.sheet').click()")
@@ -123,8 +122,9 @@ def test_controls_are_a_sheet_on_a_phone(page: Page) -> None:
 
 
 @pytest.mark.slow
-def test_forced_colours_leave_everything_to_be_seen(page: Page, tmp_path: Path) -> None:
+def test_forced_colours_leave_everything_to_be_seen(whole_page: Page, tmp_path: Path) -> None:
     """With colours that a user forces, curves and pressed buttons are still apart from their ground."""
+    page = whole_page
     page.prefer(
         {"forced-colors": "active", "prefers-color-scheme": "dark", "prefers-reduced-motion": "reduce"}
     )
