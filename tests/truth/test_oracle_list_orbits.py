@@ -1,0 +1,273 @@
+"""Periodic motions of the oracle for lists under friction and between two stops, against closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+from scipy.optimize import minimize_scalar
+from tests.oracle.list_laws import Damping, Drive, Friction, Piece, Spring, Stop, System
+from tests.oracle.list_steps import Run
+from tests.oracle.lists import simulate
+
+CLOSE = 1e-11
+
+
+def kinds(run: Run) -> list[tuple[str, str]]:
+    return [(event.kind, event.name) for event in run.events]
+
+
+class DenHartog:
+    """Symmetric motion without stops of x'' + x + f sgn(x') = a cos(β t + φ), from x = x0, v = 0 at t = 0.
+
+    Half a cycle, v < 0, is x = f (1 - cos t - βU sin t) + aV cos(β t + φ), V = 1/(1 - β²), U = tan(π/2β)/β.
+    x(0) = -x(π/β) = x0 and x'(0) = 0 give aV cos φ = x0 and aV sin φ = -f U, so x0² = (aV)² - (f U)².
+    v < 0 in between needs x0 > f S/β², S the maximum of β (sin t + βU (cos β t - cos t))/sin β t; its limit
+    at t = 0 is 1, where the other forces at the turn are f. (Den Hartog, Trans. ASME 53 (1931) 107.)
+    """
+
+    def __init__(self, beta: float, f: float) -> None:
+        self.beta, self.f = beta, f
+        self.big_u, self.big_v = math.tan(0.5 * math.pi / beta) / beta, 1.0 / (1.0 - beta**2)
+        half = math.pi / beta
+        grid = np.linspace(0.0, half, 4002)[1:-1]
+        top = float(grid[np.argmax(self.ratio(grid))])
+        near = (max(top - half / 4000.0, 1e-9), min(top + half / 4000.0, half - 1e-9))
+        self.best = minimize_scalar(
+            lambda t: -self.ratio(t), bounds=near, method="bounded", options={"xatol": 1e-12}
+        )
+        self.big_s = max(1.0, -float(self.best.fun))
+        self.boundary = f * math.hypot(self.big_s / beta**2, self.big_u) / abs(self.big_v)
+
+    def ratio(self, t: np.ndarray) -> np.ndarray:
+        b = self.beta
+        return b * (np.sin(t) + b * self.big_u * (np.cos(b * t) - np.cos(t))) / np.sin(b * t)
+
+    def motion(self, a: float) -> tuple[float, float]:
+        """Amplitude x0 and phase φ."""
+        x0 = math.sqrt((a * self.big_v) ** 2 - (self.f * self.big_u) ** 2)
+        return x0, math.atan2(-self.f * self.big_u / (a * self.big_v), x0 / (a * self.big_v))
+
+    def run(self, a: float, static: float, cycles: float) -> tuple[Run, float, float]:
+        x0, phase = self.motion(a)
+        piece = Piece(0.0, math.inf, amplitude=a, rate=self.beta, phase=phase + 0.5 * math.pi)
+        friction = Friction(self.f, static)
+        system = System(1.0, (Spring(1.0),), (Drive((piece,)),), (friction,), length=1.0)
+        return simulate(system, x0, 0.0, cycles * 2.0 * math.pi / self.beta), x0, phase
+
+
+@pytest.mark.parametrize("beta", [0.42, 0.7, 1.4, 2.5])
+def test_den_hartog_motion(beta: float) -> None:
+    exact = DenHartog(beta, 0.3)
+    a = 1.1 * exact.boundary
+    run, x0, phase = exact.run(a, 0.3, 5.0)
+    assert run.events == []
+    t = np.linspace(0.0, math.pi / beta, 9)
+    t_late = t + 4.0 * 2.0 * math.pi / beta
+    wave = 0.3 * (1.0 - np.cos(t) - beta * exact.big_u * np.sin(t)) + a * exact.big_v * np.cos(
+        beta * t + phase
+    )
+    np.testing.assert_allclose(run.at(t)[0], wave, atol=CLOSE * x0)
+    np.testing.assert_allclose(run.at(t_late)[0], wave, atol=10.0 * CLOSE * x0)
+    assert run.work["friction"] == pytest.approx(-0.3 * 5.0 * 4.0 * x0, rel=CLOSE)
+    assert run.work["drive"] == pytest.approx(0.3 * 5.0 * 4.0 * x0, rel=10.0 * CLOSE)
+
+
+@pytest.mark.parametrize("beta", [0.38, 0.42, 0.7, 1.4, 2.5])
+def test_den_hartog_boundary_of_motion_without_stops(beta: float) -> None:
+    exact = DenHartog(beta, 0.3)
+    free, _x0, _phase = exact.run(exact.boundary * (1.0 + 1e-8), 0.3, 3.0)
+    assert free.events == []
+    stopped, _x0, _phase = exact.run(exact.boundary * (1.0 - 1e-8), 0.3, 1.0)
+    assert stopped.times("stick")
+    assert exact.big_s > 1.01 if beta < 0.5 else exact.big_s < 1.0 + 1e-12
+
+
+@pytest.mark.parametrize("beta", [0.7, 1.4])
+def test_a_larger_static_force_moves_the_boundary(beta: float) -> None:
+    """At a turn the other forces are x0 β²; they must exceed the static force (Shaw 1986)."""
+    exact, static = DenHartog(beta, 0.3), 0.45
+    boundary = math.hypot(static / beta**2, 0.3 * exact.big_u) / abs(exact.big_v)
+    assert exact.run(boundary * (1.0 + 1e-9), static, 3.0)[0].events == []
+    assert exact.run(boundary * (1.0 - 1e-9), static, 0.1)[0].events[0].kind == "stick"
+
+
+def symmetric_orbit(
+    stiffness: float, damping: float, amplitude: float, rate: float, restitution: float
+) -> list[tuple[float, float]]:
+    """Phases φ and speeds v of x'' + c x' + k x = A cos(w t + φ) that go from -1 to 1 in half a cycle.
+
+    Remove the steady response X cos(w t + θ): y(π/w) = -y(0) for both stops, y'(0) = v + X w sin θ and
+    y'(π/w) = v/e - X w sin θ, with y' proportional to y by the transition matrix. So v, cos θ and sin θ are
+    affine in y(0), and cos² + sin² = 1 is a quadratic equation. (Shaw, J. Appl. Mech. 52 (1985) 453; Heiman,
+    Bajaj & Sherman, J. Sound Vib. 124 (1988) 55, with k = c = 0.)
+    """
+    response = amplitude / complex(stiffness - rate**2, damping * rate)
+    size, lag = abs(response), -math.atan2(response.imag, response.real)
+    m = expm(np.array([[0.0, 1.0], [-stiffness, -damping]]) * math.pi / rate)
+    a = -(1.0 + m[0, 0]) / m[0, 1]
+    b = m[1, 0] + m[1, 1] * a
+    speed = (a + b) * restitution / (1.0 + restitution)
+    # cos θ = -(1 + y)/X, sin θ = (a - speed) y/(X w).
+    slope = (a - speed) / rate
+    orbits = []
+    for y in np.roots([1.0 + slope**2, 2.0, 1.0 - size**2]):
+        if abs(y.imag) < 1e-12 and speed * y.real > 0.0:
+            theta = math.atan2(slope * y.real / size, -(1.0 + y.real) / size)
+            orbits.append((theta + lag, float(speed * y.real)))
+    return orbits
+
+
+PAIRS = [
+    (0.0, 0.0, 9.0, 2.0, 0.6),
+    (0.0, 0.0, 2.0, 2.0, 0.6),
+    (0.0, 0.3, 9.0, 2.0, 0.6),
+    (1.0, 0.0, 6.0, 2.2, 0.5),
+    (1.0, 0.2, 5.0, 1.7, 0.8),
+]
+"""Stiffness, damping, amplitude, rate, restitution; the orbit of the second is stable."""
+
+
+def pair_run(
+    pair: tuple[float, float, float, float, float], phase: float, speed: float, cycles: float
+) -> Run:
+    stiffness, damping, amplitude, rate, restitution = pair
+    piece = Piece(0.0, math.inf, amplitude=amplitude, rate=rate, phase=phase + 0.5 * math.pi)
+    stops = (Stop("left", "back", -1.0, restitution), Stop("right", "front", 1.0, restitution))
+    system = System(1.0, (Spring(stiffness), Damping(damping)), (Drive((piece,)),), stops=stops, length=1.0)
+    return simulate(system, -1.0, speed, (cycles + 0.1) * 2.0 * math.pi / rate)
+
+
+def half_cycle(pair: tuple[float, float, float, float, float], phase: float, speed: float) -> np.ndarray:
+    """Derivative of (time, speed) just after an impact with respect to those after the impact before.
+
+    At (t, v) just after an impact a change (dt, dv) is dx = -v dt, dv - a dt of the motion; it goes through
+    the transition matrix, changes the time of the next impact by -dx/v and its speed by dv + a dt.
+    """
+    stiffness, damping, amplitude, rate, restitution = pair
+    m = expm(np.array([[0.0, 1.0], [-stiffness, -damping]]) * math.pi / rate)
+    before, force = speed / restitution, amplitude * math.cos(phase) + stiffness
+    after = m @ np.array([[-speed, 0.0], [damping * speed - force, 1.0]])
+    delay = -after[0] / before
+    return np.array([delay, restitution * (after[1] - (force + damping * before) * delay)])
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+def test_symmetric_orbit_between_two_stops(pair: tuple[float, float, float, float, float]) -> None:
+    """Impacts come every half cycle; a small change of the start grows as the derivative of the map says."""
+    *_parts, rate, restitution = pair
+    half = math.pi / rate
+    orbits = [
+        orbit for orbit in symmetric_orbit(*pair) if kinds(pair_run(pair, *orbit, 1.0))[0][1] == "right"
+    ]
+    assert orbits
+    for phase, speed in orbits:
+        run = pair_run(pair, phase, speed, 2.0)
+        assert kinds(run) == [("impact", "right"), ("impact", "left")] * 2
+        times = np.array([event.time for event in run.events])
+        np.testing.assert_allclose(times, half * np.arange(1, 5), rtol=CLOSE)
+        assert run.events[-1].v == pytest.approx(speed, rel=CLOSE)
+        hit = 0.5 * (speed / restitution) ** 2 * (1.0 - restitution**2)
+        assert run.lost["left"] == pytest.approx(2.0 * hit, rel=CLOSE)
+        assert run.lost["right"] == pytest.approx(2.0 * hit, rel=CLOSE)
+        _x, last = run.at([run.steps[-1].end])
+        gained = 0.5 * (float(last[0]) ** 2 - speed**2)
+        assert sum(run.work.values()) - 4.0 * hit == pytest.approx(gained, abs=CLOSE * 4.0 * hit)
+
+        tangent = half_cycle(pair, phase, speed)
+        # After four impacts the change is about 1e-5, whatever the multiplier.
+        step = 1e-5 / max(1.0, float(np.abs(np.linalg.eigvals(tangent)).max())) ** 4
+        moved = pair_run(pair, phase, speed + step, 2.0)
+        back = pair_run(pair, phase, speed - step, 2.0)
+        change = np.array([0.0, 2.0 * step])
+        for plus, minus, sign in zip(moved.events, back.events, [-1.0, 1.0] * 2, strict=True):
+            change = tangent @ change
+            found = [plus.time - minus.time, sign * (plus.v - minus.v)]
+            np.testing.assert_allclose(found, change, rtol=1e-7, atol=1e-7 * float(np.abs(change).max()))
+
+
+def test_symmetric_orbit_of_an_impact_pair() -> None:
+    """x'' = A cos(w t + φ): integrating twice over half a cycle gives cos φ - κ sin φ = d w²/2A.
+
+    κ = (π/2) (1 + e)/(1 - e), v = -2 e A sin φ/(w (1 - e)), d the play.
+    """
+    _k, _c, amplitude, rate, restitution = PAIRS[0]
+    kappa = 0.5 * math.pi * (1.0 + restitution) / (1.0 - restitution)
+    turn = math.acos(2.0 * rate**2 / (2.0 * amplitude) / math.hypot(1.0, kappa))
+    expected = []
+    for sign in (1.0, -1.0):
+        phase = sign * turn - math.atan(kappa)
+        expected.append(
+            (phase, -2.0 * restitution * amplitude * math.sin(phase) / (rate * (1.0 - restitution)))
+        )
+    positive = sorted((phase % (2.0 * math.pi), speed) for phase, speed in expected if speed > 0.0)
+    found = sorted((phase % (2.0 * math.pi), speed) for phase, speed in symmetric_orbit(*PAIRS[0]))
+    np.testing.assert_allclose(found, positive, rtol=1e-13)
+
+
+@pytest.mark.parametrize("restitution", [0.3, 0.6])
+def test_bounds_of_stable_symmetric_orbits_of_an_impact_pair(restitution: float) -> None:
+    """The half-cycle map has determinant e² and trace 2e + (1 + e) q, q = -(π/2) (1 - e) cot φ.
+
+    Its multiplier is -1 (two unsymmetric orbits are born) at q = -(1 + e), that is cot φ = 4 κ/π², and 1 (the
+    orbit ends) at cot φ = -1/κ; with D = d w²/2A = cos φ - κ sin φ these are the bounds of D below.
+    """
+    e, rate = restitution, 2.0
+    kappa = 0.5 * math.pi * (1.0 + e) / (1.0 - e)
+    c = 4.0 * kappa / math.pi**2
+    bounds = (kappa - c) / math.hypot(1.0, c), math.hypot(1.0, kappa)
+
+    def pair(ratio: float) -> tuple[float, float, float, float, float]:
+        return 0.0, 0.0, rate**2 / ratio, rate, e
+
+    def radii(ratio: float) -> list[float]:
+        maps = [half_cycle(pair(ratio), *orbit) for orbit in symmetric_orbit(*pair(ratio))]
+        assert [float(np.linalg.det(m)) for m in maps] == pytest.approx([e**2] * len(maps), rel=1e-10)
+        return sorted(float(np.abs(np.linalg.eigvals(m)).max()) for m in maps)
+
+    assert radii(bounds[0] * (1.0 + 1e-6))[0] < 1.0 < radii(bounds[0] * (1.0 - 1e-6))[0]
+    assert radii(bounds[1] * (1.0 - 1e-6))[0] < 1.0
+    assert symmetric_orbit(*pair(bounds[1] * (1.0 + 1e-6))) == []
+
+    uneven = []
+    for ratio in (1.2 * bounds[0], 0.9 * bounds[0]):
+        phase, speed = min(
+            symmetric_orbit(*pair(ratio)),
+            key=lambda orbit: np.abs(np.linalg.eigvals(half_cycle(pair(ratio), *orbit))).max(),
+        )
+        times = [event.time for event in pair_run(pair(ratio), phase, speed + 1e-3, 50.0).events]
+        uneven.append(abs(times[-1] - 2.0 * times[-2] + times[-3]))
+        assert times[-1] - times[-3] == pytest.approx(2.0 * math.pi / rate, abs=1e-4)
+    assert uneven[0] < 1e-6
+    assert uneven[1] > 1e-2
+
+
+@pytest.mark.parametrize("beta", [0.42, 0.7, 1.4])
+def test_multipliers_of_den_hartog_motion(beta: float) -> None:
+    """The map from turn to turn has determinant d = (x0 β² - f)/(x0 β² + f) and trace -(1 + d) cos(π/β).
+
+    A change (dx, dt) at a turn is dx, -a dt of the motion, a its acceleration just after the turn; after half
+    a cycle a velocity dv moves the next turn by -dv/a. So |λ|² = d < 1: stable, marginal only where β = 1/n
+    (Shaw, J. Sound Vib. 108 (1986) 305; Csernák, Stépán & Shaw, Nonlinear Dyn. 50 (2007) 93).
+    """
+    exact = DenHartog(beta, 0.3)
+    a = 1.3 * exact.boundary
+    run, x0, _phase = exact.run(a, 0.3, 2.0)
+    d = (x0 * beta**2 - 0.3) / (x0 * beta**2 + 0.3)
+    trace = -(1.0 + d) * math.cos(math.pi / beta)
+    start, cycle, step = 0.4 * math.pi / beta, 2.0 * math.pi / beta, 1e-5
+    x, v = run.at([start])
+    columns = []
+    for change in ((step, 0.0), (0.0, step)):
+        ends = [
+            np.array(
+                simulate(run.system, x[0] + s * change[0], v[0] + s * change[1], start + cycle, start).at(
+                    [start + cycle]
+                )
+            )
+            for s in (1.0, -1.0)
+        ]
+        columns.append((ends[0] - ends[1])[:, 0] / (2.0 * step))
+    monodromy = np.array(columns).T
+    assert np.linalg.det(monodromy) == pytest.approx(d**2, rel=1e-7)
+    assert np.trace(monodromy) == pytest.approx(trace**2 - 2.0 * d, abs=1e-7)
