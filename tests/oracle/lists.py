@@ -195,7 +195,7 @@ class _Motion:
             self.t = origin + t if t < bound else self.bound
             start, self.z = t, z.copy()
             if falls:
-                self.happen(guard[0], guard[1])
+                self.happen(guard[0], guard[1], is_jump=slope == 0.0)
                 return
             guards = [(kind, i, function, 0) for kind, i, function, _order in guards]
         self.switched = -1
@@ -218,8 +218,8 @@ class _Motion:
             z = flow(self.system, rates, start, self.z, t)
         return t, z
 
-    def happen(self, kind: str, i: int) -> None:
-        """Apply an event."""
+    def happen(self, kind: str, i: int, is_jump: bool) -> None:
+        """Apply an event; where a stop makes the velocity jump, a contact is cut at a force other than 0."""
         self.switched = -1
         if kind == "turn":
             self.settle()
@@ -232,7 +232,7 @@ class _Motion:
         contact = self.system.contacts[i]
         if kind in ("touch", "leave"):
             self.ref, self.z[0] = contact.position, 0.0
-        else:
+        elif not is_jump:
             self.switched = i
         self.modes[i] = {"touch": "closed", "leave": "open", "cut": "cut", "uncut": "closed"}[kind]
         self.record(kind, contact.name)

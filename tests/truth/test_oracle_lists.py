@@ -134,6 +134,19 @@ def test_a_kelvin_voigt_contact_is_cut_before_it_pulls() -> None:
     assert run.lost["pad"] == pytest.approx(0.5 * mass * (speed**2 - rate**2), rel=CLOSE)
 
 
+def test_a_contact_is_cut_when_a_stop_inside_it_reverses_the_velocity() -> None:
+    """With k d < b e v at the stop the contact would pull, so the mass leaves at the speed e v."""
+    pad = Contact("pad", "front", 0.0, 10.0, damping=0.5)
+    system = System(1e-3, contacts=(pad,), stops=(Stop("pole", "front", 1e-4, 0.5),))
+    run = simulate(system, -1e-4, 0.4, 2e-3)
+    assert kinds(run) == [("touch", "pad"), ("impact", "pole"), ("cut", "pad"), ("leave", "pad")]
+    _touch, impact, cut, leave = run.events
+    assert (cut.time, cut.v) == (impact.time, impact.v)
+    assert leave.v == impact.v
+    assert leave.time - impact.time == pytest.approx(-1e-4 / impact.v, rel=CLOSE)
+    assert balance(run, 0.4) < CLOSE
+
+
 STATIC, KINETIC = 0.5, 0.3
 
 
@@ -285,11 +298,19 @@ def mirror(system: System) -> System:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_energies_and_mirror_image_of_random_lists(seed: int) -> None:
+def test_energies_restart_and_mirror_image_of_random_lists(seed: int) -> None:
     system, x, v = random_system(seed)
     run = simulate(system, x, v, 5e-3)
     assert balance(run, v) < CLOSE
     assert all(loss > -CLOSE * max(map(abs, run.work.values())) for loss in run.lost.values())
+    middle = 2.3e-3
+    places, speeds = run.at([middle])
+    again = simulate(system, float(places[0]), float(speeds[0]), 5e-3, middle)
+    late = [event for event in run.events if event.time > middle]
+    found = [event for event in again.events if event.time > middle]
+    assert [(event.kind, event.name) for event in found] == [(event.kind, event.name) for event in late]
+    for one, other in zip(found, late, strict=True):
+        assert one.time == pytest.approx(other.time, abs=5e-3 * CLOSE)
     image = simulate(mirror(system), -x, -v, 5e-3)
     assert kinds(image) == kinds(run)
     times = np.array([event.time for event in run.events])
