@@ -221,7 +221,7 @@ class ImpactEstimator:
         return ImpactEstimate(shown - self.sampling.delay, flag, clearness)
 
     def _is_clipped(self, windows: FloatArray) -> BoolArray:
-        """Whether each window contains readings at the upper end of the converter's range, a mask."""
+        """Mask of the windows that contain readings at the upper end of the converter's range."""
         full_scale = self.sampling.full_scale or math.inf
         return np.asarray((windows >= full_scale - self.sampling.step).any(axis=-1))
 

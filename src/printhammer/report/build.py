@@ -68,13 +68,8 @@ def _is_picture(path: Path) -> bool:
 def staged(out: str | Path) -> Iterator[Path]:
     """Provide a folder to write a report into; its contents are moved to `out` at the end.
 
-    If the block ends early, an earlier report stays intact. The page is moved last, so that a page implies a
-    complete report.
-
-    Parameters
-    ----------
-    out : path
-        Folder of the report; created if missing.
+    If the context ends with an exception, an earlier report stays intact. The page is moved last, so that a
+    page implies a complete report. The folder `out` is created if missing.
 
     Raises
     ------

@@ -100,15 +100,7 @@ class Store:
         return (self.path / _chunk(MARK, index)).exists()
 
     def write(self, index: Sequence[int], results: Mapping[str, npt.NDArray[Any]]) -> None:
-        """Write all results of a block, atomically and durably.
-
-        Parameters
-        ----------
-        index : sequence of int
-            Index of the block in the chunk grid of the members.
-        results : mapping
-            Arrays by name, of the shape of the block.
-        """
+        """Write the arrays of the block at an index of the chunk grid, by name, atomically and durably."""
         where = tuple(
             slice(i * size, i * size + count)
             for i, size, count in zip(index, self._layout.chunks, results[MARK].shape, strict=True)

@@ -291,13 +291,7 @@ class Ensemble:
         return list(known.values()), np.array(which, dtype=np.int64)
 
     def motion(self, member: int) -> Motion:
-        """Return the full motion of one member.
-
-        Parameters
-        ----------
-        member : int
-            Index of the member.
-        """
+        """Return the full motion of the member with the index `member`."""
         from printhammer.run.simulate import simulate
 
         if self.states[member, 0] > 0.0:

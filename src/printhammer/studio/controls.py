@@ -85,7 +85,7 @@ def _shaken(
 
 
 SINE: Final = ("amplitude", "phase")
-"""Constants of a sinusoidal force that a page sets; its frequency is the rate."""
+"""Constants of a sinusoidal force that a page sets; the rate of the page sets the frequency."""
 
 _QUARTER: Final = 0.5 * math.pi
 

@@ -267,14 +267,10 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
             )
 
     def drive(self, hammer: Hammer, slots: Sequence[int], rate: float | str) -> Drive:
-        """Return the drive that prints dots in the given slots.
+        """Return the drive that prints dots in the slots with the ascending indices `slots`.
 
-        Parameters
-        ----------
-        hammer, rate
-            As for `strategy` and `at`.
-        slots : sequence of int
-            Slot indices, ascending; slot 0 is at `printhammer.printing.dots.strategy.FIRST_SLOT`.
+        Slot 0 is at `printhammer.printing.dots.strategy.FIRST_SLOT`. `hammer` and `rate` are as for
+        `strategy` and `at`.
         """
         return self.strategy(hammer)(hammer, [tuple(slots)], read_positive(rate, "Hz", "rate"))[0]
 
@@ -375,7 +371,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return size_of(self.rates.size, entries_of(self.gaps, self.reach), bits)
 
     def quantised(self, tick: float | str) -> CompensationTable:
-        """Return a copy with times in whole timer ticks (s, or text); deviations become NaN."""
+        """Return a copy with times rounded to whole timer ticks (s, or text) and unknown deviations (NaN)."""
         times: dict[str, Any] = whole_ticks(
             self._times, self.rates, self.gaps, self.reach, checked_tick(tick)
         )
