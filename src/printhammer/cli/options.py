@@ -88,7 +88,7 @@ class Option:
 
 @dataclass(frozen=True)
 class Files(Option):
-    """Option that names output files; the runner checks the files before the computation and writes them."""
+    """Option that names output files, which the runner checks before the computation and writes."""
 
     endings: tuple[str, ...] = ()
     """Accepted file endings besides those of pictures; if empty, every ending is accepted."""

@@ -41,7 +41,7 @@ STYLES: Final = {
 
 @dataclass(frozen=True)
 class Column(Generic[Row]):
-    """Column of a table whose rows are objects; `printhammer.results.Cells` is the counterpart for arrays."""
+    """Column of a table whose rows are objects; see `printhammer.results.Cells` for arrays."""
 
     heading: str
     value: Callable[[Row], Any]

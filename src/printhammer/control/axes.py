@@ -46,7 +46,7 @@ _MILLIONTH: Final = 1e-6  # Resolution of axis values other than lengths in a C 
 
 @dataclass(frozen=True)
 class Axis:
-    """Axis of a family of tables: an operating condition that the firmware knows, e.g. the rail voltage."""
+    """Axis of a family of tables: an operating condition known to the firmware, e.g. rail voltage."""
 
     unit: str
     meaning: str

@@ -237,7 +237,7 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
 
 @dataclass(frozen=True)
 class _Fired:
-    """Firing from rest: impact time, s, and speed, m/s, peak current, A, coil heat, J; NaN without impact."""
+    """Firing from rest: time, s, speed, m/s, current, A, heat, J; NaN without an impact."""
 
     time: float = np.nan
     speed: float = np.nan
@@ -256,7 +256,7 @@ def dead_time(
     effort: Effort = DEFAULT,
     **_keywords: Unpack[InOneThread],
 ) -> DeadTime:
-    """Compute time to impact and pulse width at equal impact speed, by rail voltage and coil temperature.
+    """Tabulate time to impact, and pulse width at equal impact speed, by voltage and temperature.
 
     Parameters
     ----------

@@ -404,7 +404,7 @@ def heat_of(hammer: Hammer) -> DotHeat:
 
 
 def _copper_loss(hammer: Hammer, drive: PulseTrain) -> tuple[float, float]:
-    """Simulate one firing until its current has decayed; return the coil heat, J, and the decay time, s."""
+    """Simulate one firing until the current has decayed; return coil heat, J, and decay time, s."""
     from printhammer.run.simulate import simulate
 
     span = 4.0 * drive.waveform.support

@@ -89,7 +89,7 @@ class ImpactEstimate(Declared):
 
 
 class ImpactEstimator:
-    """Estimator of impact times from samples of the coil's current or voltage, for one pulse of a hammer.
+    """Estimator of the impact time of one pulse from samples of the coil's current or voltage.
 
     Parameters
     ----------

@@ -155,7 +155,7 @@ def recorded_impacts(
 
 
 def _errors_of_units(estimator: ImpactEstimator, units: Sequence[Hammer]) -> tuple[float, float]:
-    """Return RMS errors over simulated units, s: of unflagged estimates, and of the nominal flight time."""
+    """Return RMS errors over units, s: of unflagged estimates, and of the nominal flight time."""
     records = [unit_record(unit, estimator, estimator.sampling) for unit in units]
     errors, believed = errors_of(estimator, records, len(records), np.random.default_rng(0))
     return root_mean_square(errors[believed]), flight_deviation(estimator, records)

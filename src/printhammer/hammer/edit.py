@@ -181,7 +181,7 @@ def _fields(section: str, value: Any) -> dict[str, Any]:
 
 
 def changed(document: Mapping[str, Any], edits: Iterable[Edit]) -> dict[str, Any]:
-    """Return a copy of a parsed document with edits applied; unedited values are shared with the original."""
+    """Return a copy of a parsed document with edits applied; unedited values are shared."""
     result = dict(document)
     for key, value in edits:
         section, _, name = key.rpartition(".")

@@ -272,7 +272,7 @@ def _work() -> Work:
 
 
 def _ascending(numbers: list[float], count: int) -> int:
-    """Sort the first numbers of a list; return the number of different ones, at the front."""
+    """Sort the first `count` numbers of a list, distinct ones to the front; return their number."""
     different = sorted(set(numbers[:count]))
     numbers[: len(different)] = different
     return len(different)
@@ -300,7 +300,7 @@ def _equilibrium_at(force: StaticForce, root: Root, current: float) -> Equilibri
 
 
 def _is_stable(root: Root, force: StaticForce) -> bool:
-    """Whether the force points to the root from both sides, or a rigid backstop supports the lower side."""
+    """Whether the force points to the root from both sides; a rigid backstop replaces the lower."""
     return is_stable(root.x, root.before, root.after, force.statics)
 
 

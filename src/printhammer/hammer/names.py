@@ -103,17 +103,17 @@ def quantity_of(hammer: Hammer, name: str) -> Quantity | None:
 
 
 def quantities_of(waveform: Waveform) -> dict[str, Quantity]:
-    """Return the declarations of a waveform's constants; amplitudes have the unit of the driven quantity."""
+    """Return the declarations of a waveform's constants, amplitudes in the driven unit."""
     return {name: in_unit_of_drive(note, waveform.unit) for name, note in quantities(type(waveform)).items()}
 
 
 def in_unit_of_drive(note: Quantity, unit: str) -> Quantity:
-    """Return the declaration of a constant that may be a current or a force, in the unit of the waveform."""
+    """Return a declaration with the unit of the waveform, for a constant in A or N."""
     return replace(note, si=unit, also=()) if note.also else note
 
 
 def unknown(name: str, known: Collection[str], where: str = "") -> InputError:
-    """Return the error for an unknown constant; the message suggests the nearest name or lists all names."""
+    """Return the error for an unknown constant, with the nearest name or a list of names."""
     file, _, key = where.rpartition(": ")
     return InputError(
         f"{where or 'constant'} = {shown(name)} is not known",

@@ -163,7 +163,7 @@ def is_stable(x: float, before: float, after: float, s: Statics) -> bool:
 
 
 def put_cluster(anchor: float, sign: float, limit: float, grid: Any, count: int) -> int:
-    """Append an anchor and points at geometrically growing distances from it; return the new point count."""
+    """Append an anchor and a geometric sequence of points around it; return the new point count."""
     grid[count] = anchor
     if limit <= NEAREST:
         grid[count + 1] = anchor + sign * limit
@@ -180,7 +180,7 @@ def put_cluster(anchor: float, sign: float, limit: float, grid: Any, count: int)
 
 
 def fill_grid(low: float, high: float, s: Statics, grid: Any) -> int:
-    """Write an unsorted search grid between two limits, m: even points, and clusters around the anchors.
+    """Write an unsorted search grid between two limits, m: even points, and clusters at anchors.
 
     Returns
     -------
@@ -276,7 +276,7 @@ def rest_position(s: Statics, work: Work, out: Any) -> int:
 
 
 def sorted_in_place(numbers: Any, count: int) -> int:
-    """Sort the first numbers of an array by heapsort; return the number of different ones, at the front."""
+    """Heapsort the first `count` numbers, distinct ones to the front; return their number."""
     for step in range(count // 2 + count - 1, 0, -1):
         if step >= count:
             root, end = step - count, count

@@ -103,7 +103,7 @@ def panels_view(report: Report) -> list[dict[str, Any]]:
 
 
 def schemes_view(report: Report) -> dict[str, Any] | None:
-    """Return the effect of the integrators of 1983 on Fig. 11; None if the data belong to another hammer."""
+    """Return the effect of the 1983 integrators on Fig. 11; None for another hammer's data."""
     found = report.reconstruction.schemes
     if found is None or found.shipped != report.hammer.fingerprint:
         return None
@@ -138,7 +138,7 @@ def schemes_view(report: Report) -> dict[str, Any] | None:
 
 
 def predictions_view(report: Report) -> dict[str, Any] | None:
-    """Return the predictions of hammers found by searching on the stated claims alone; None without data."""
+    """Return the predictions of hammers fitted to the stated claims alone; None without data."""
     predictions = report.reconstruction.predictions
     if predictions is None or not report.reconstructed:
         return None

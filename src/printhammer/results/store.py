@@ -299,7 +299,7 @@ def _lock(folder: Path, named: Path) -> int:
 
 
 def _make(folder: Path) -> list[Path]:
-    """Create a folder and its parents; return the folders whose directory entries may have to be flushed."""
+    """Create a folder and its parents; return the folders whose entries must be flushed."""
     if folder.is_dir():
         return [folder]
     above = _make(folder.parent)

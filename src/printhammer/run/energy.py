@@ -104,7 +104,7 @@ def _gauss(drive: Drive, ends: FloatArray) -> float:
 
 
 def _stretches(problem: Problem, record: Record) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Split steps where the coil power changes sign; return step index, start and end, s, of each piece."""
+    """Split steps where the coil power changes sign; return index, start and end, s, of the pieces."""
     begins, finishes = record.nodes[:-1, 0], record.nodes[1:, 0]
     rows = np.flatnonzero(finishes > begins)
     begins, finishes = begins[rows], finishes[rows]
@@ -176,7 +176,7 @@ class Ledger(Declared):
 
 
 def increments_of(problem: Problem, record: Record) -> FloatArray:
-    """Integrate the power terms over each step, J: coil, drive force, and pack, backstop, damping losses.
+    """Integrate work (coil, drive) and losses (pack, backstop, damping) over each step, J.
 
     Under a voltage drive, further columns hold the supply work and the losses in coil, driver and shorted
     turn.
@@ -201,7 +201,7 @@ def stored_energy(hammer: Hammer, x: float) -> float:
 
 
 def field_energy(problem: Problem, record: Record, row: int) -> float:
-    """Return the magnetic field energy due to the current at a node, plus that of a reservoir capacitor, J.
+    """Return the magnetic energy due to the current, plus the capacitor's energy, at a node, J.
 
     With the flux linkage lambda(i), the field energy is i lambda minus the integral of lambda over the
     current from 0 to i, computed by Gauss quadrature.

@@ -131,7 +131,7 @@ class Group:
 
 
 class _Posed(NamedTuple):
-    """Distinct initial-value problems of the members, one per row; `by` is the row index of each member."""
+    """Distinct initial-value problems of the members; `by` is the row index of each member."""
 
     constants: FloatArray
     controls: FloatArray
@@ -192,7 +192,7 @@ def _scales(
     first_drive: Drive,
     states: FloatArray,
 ) -> tuple[list[tuple[float, float]], IntArray]:
-    """Return the distinct scales (m, m/s) of members with the same hammer, and the index for each member."""
+    """Return the distinct scales (m, m/s) of members of one hammer, and the index for each member."""
     x, v = states[own, 1], states[own, 2]
     if hammer.position is None or hammer.front is None:
         periods = [math.nan if (period := fired.drives[i].period) is None else period for i in own]
@@ -209,7 +209,7 @@ def _scales(
 
 
 class Job:
-    """Integration of a group of members: the requested results, and the arrays that receive the results.
+    """Integration of a group of members: requested results, and their arrays.
 
     The results are the dots and extra contacts, if requested; the states at the `moments`, times in s for
     each member of the ensemble; and the displacements at the times of the `grid`, s, in `x`, the array of the
@@ -448,7 +448,7 @@ class Fired:
 
 
 def closed_form(table: FloatArray) -> tuple[list[float], LaneKinds | None]:
-    """Return decay rates and frequencies, 1/s, and the kinds of segments of waveforms, for vector lanes.
+    """Return decay rates and frequencies, 1/s, and segment kinds of waveforms, for vector lanes.
 
     The kinds are None if the waveforms have more rates than lanes support.
     """

@@ -366,7 +366,7 @@ class Regime(Declared):
 
 
 def waveform_of(hammer: Hammer, waveform: Waveform | None) -> Waveform:
-    """Return the waveform to fire, by default the hammer's waveform; raise InputError without a waveform."""
+    """Return the waveform to fire, by default the hammer's; raise InputError without a waveform."""
     fired = hammer.waveform if waveform is None else waveform
     if fired is None:
         raise InputError(

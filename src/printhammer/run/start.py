@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class Beyond(NamedTuple):
-    """Components of a state besides displacement and velocity; by default outside the pack, without current.
+    """State components in addition to (x, v); by default outside the pack, without current.
 
     In the pack: the branch, an index in `printhammer.run.ensemble.MODE_NAMES` or -1 (determined by
     displacement and velocity), and the latest local maximum, m. Under a voltage: the currents in the coil and
@@ -163,7 +163,7 @@ def state_to_begin(
 
 
 def check_branch(hammer: Hammer, state: Sequence[float]) -> None:
-    """Check the initial state of an armature in the pack: (displacement, velocity, branch code, memory).
+    """Check an initial state in the pack: (displacement, velocity, branch code, memory).
 
     Raises
     ------

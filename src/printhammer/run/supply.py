@@ -164,7 +164,7 @@ def take_supply(constants: FloatArray, hammer: Hammer, drive: Drive) -> None:
 
 
 def check_linkage(hammer: Hammer, current: float) -> None:
-    """Check that the flux linkage of a coil increases with the current along the travel of the armature."""
+    """Check that the flux linkage of a coil increases with the current at all displacements."""
     coil = coil_of(hammer)
     ends = [place for place in (hammer.front, hammer.platen) if place is not None]
     x, slope = falling_place(hammer.origin, max([*ends, hammer.origin]), current, coil)

@@ -60,7 +60,7 @@ def least_wait(waveform: Waveform) -> float:
 
 
 def wait_of(hammer: Hammer, waveform: Waveform | None = None) -> float:
-    """Compute the time from the last firing to the end of a run, s, by default for the hammer's waveform."""
+    """Compute the time from last firing to end of run, s, by default for the hammer's waveform."""
     pulse = hammer.waveform if waveform is None else waveform
     return CYCLE if pulse is None else _window_of(hammer, pulse).wait
 
@@ -116,7 +116,7 @@ def end_of(hammer: Hammer, drive: Drive) -> float:
 
 
 def longest_of(drive: Drive) -> Waveform:
-    """Return the waveform of a drive with the longest duration; the first waveform if several are equal."""
+    """Return the longest waveform of a drive; the first if several are equally long."""
     return max(waveforms_of(drive), key=lambda waveform: waveform.support)
 
 
@@ -143,7 +143,7 @@ def _single(hammer: Hammer, drive: Drive, end: float) -> Single:
 
 
 def is_enough(hammer: Hammer, seen: Single, wait: float) -> bool:
-    """Whether a window is long enough: it holds `FLIGHTS` flight times and ends with the armature at rest."""
+    """Whether a window spans `FLIGHTS` flight times and ends with the armature at rest."""
     assert hammer.front is not None
     return is_window(seen.ok, seen.flight, seen.x, seen.v, hammer.rest, hammer.front, wait)
 

@@ -110,7 +110,7 @@ def deltas(content: bytes) -> bytes:
 
 
 def _common_end(content: bytes, at: int, distance: int) -> int:
-    """Return the end index of the longest match of the bytes at `at` with those `distance` bytes earlier."""
+    """Return the end of the longest match of the bytes at `at` with bytes `distance` earlier."""
     step = 4096
     while step and at < len(content):
         step = min(step, len(content) - at)

@@ -96,7 +96,7 @@ def span_of(hammer: Hammer, key: str, factor: float) -> Range | None:
 
 
 def rail_of(hammer: Hammer) -> dict[str, Any] | None:
-    """Build the default rail driver of a hammer without a driver; None if no voltage can drive the coil."""
+    """Build the default rail driver of a hammer; None if no voltage can drive the coil."""
     if not has_rail(hammer):
         return None
     current, width = _pulse(hammer)

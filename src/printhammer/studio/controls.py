@@ -164,7 +164,7 @@ def _control(hammer: Hammer, constant: Constant, span: Range) -> dict[str, Any]:
 
 
 def opening_of(hammer: Hammer) -> dict[str, Any]:
-    """Return initial page settings of a hammer that has no pulse or differs from printers in time scale."""
+    """Return the initial page settings of a hammer that has no pulse or is unlike a print hammer."""
     if hammer.waveform is not None:
         return OPENINGS.get(hammer.name, {})
     quantity = "current" if "magnet" in hammer.parts else "force"
@@ -185,7 +185,7 @@ def equation_of(section: str, law: str) -> str:
 
 
 def combined_of(hammer: Hammer) -> list[dict[str, Any]]:
-    """Return the combined controls, each of which changes several constants, as on the terminal of the paper.
+    """Return the controls that change several constants at once, as on the terminal of the paper.
 
     Two of platen position, pack front and pack thickness are independent, since the pack lies on the platen:
     the platen distance moves platen and front; the forms thickness moves the front toward the hammer.

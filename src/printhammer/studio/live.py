@@ -137,7 +137,7 @@ def content_of(shelf: Shelf) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """Convert a value to plain data for JSON: NaN and infinity to None, NumPy numbers to Python numbers."""
+    """Convert a value to plain data for JSON: NaN and infinity become None."""
     if isinstance(value, dict):
         return {str(name): _plain(entry) for name, entry in value.items()}
     if isinstance(value, list | tuple):
@@ -259,7 +259,7 @@ def _numbers(hammer: Hammer) -> dict[str, Any]:
 
 
 def _numbers_of(values: Iterable[float]) -> list[float | str]:
-    """Convert numbers for JSON; infinity and NaN, which JSON lacks, become texts that JavaScript parses."""
+    """Convert numbers for JSON; infinity and NaN become texts that JavaScript parses."""
     return [
         value if math.isfinite(value) else repr(value).replace("inf", "Infinity").replace("nan", "NaN")
         for value in map(float, values)

@@ -82,7 +82,7 @@ def bisected(function: Any, about: Any, low: float, high: float) -> float:
 
 
 def find_roots(function: Any, about: Any, grid: Any, count: int, places: Any, values: Any, found: Any) -> int:
-    """Find the roots of ``function(x, about)`` on the first `count` points of an ascending grid; see `roots`.
+    """Find the roots of ``function(x, about)`` on an ascending grid; see `roots`.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def find_roots(function: Any, about: Any, grid: Any, count: int, places: Any, va
 
 
 def with_probes(function: Any, about: Any, grid: Any, count: int, places: Any, values: Any) -> int:
-    """Evaluate a function on a grid and, for its sign on both sides, next to grid points that are roots.
+    """Evaluate a function on a grid and at probes on both sides of grid points that are roots.
 
     Returns
     -------

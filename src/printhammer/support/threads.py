@@ -169,7 +169,7 @@ def together(works: Sequence[Work[A, B, T]]) -> Work[A, B, list[T]]:
 
 
 def translated(work: Work[A, B, T], answer: Callable[[list[A]], Work[C, D, list[B]]]) -> Work[C, D, T]:
-    """Adapt a `Work` coroutine: `answer` answers its queries by a coroutine with queries of another kind."""
+    """Adapt a `Work` coroutine: `answer` converts its queries to queries of another kind."""
     answers: list[B] | None = None
     while True:
         try:

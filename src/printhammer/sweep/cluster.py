@@ -211,9 +211,9 @@ def _unable(error: BaseException) -> str:
 
 @contextmanager
 def client_of(dask: Any) -> Iterator[Any]:
-    """Open a client of a cluster by the address of its scheduler, without log output; close it at the end.
+    """Open a client of a cluster for the duration of the context, without log output.
 
-    An existing `distributed.Client` is passed through.
+    `dask` is the address of a scheduler, or an existing `distributed.Client`, which is yielded unchanged.
     """
     try:
         distributed: Any = import_module("distributed")

@@ -200,7 +200,7 @@ def _fault(error: ValidationError) -> InputError:
 
 
 def _place(steps: tuple[int | str, ...]) -> tuple[str, type[BaseModel]]:
-    """Return the key of a validation error, such as "axis[1].count", and the table that contains the key."""
+    """Return key and table class of a validation error; a key is text such as "axis[1].count"."""
     key, table = "", SpecTable
     inner: dict[str, type[_Table]] = {
         "axis": AxisTable,

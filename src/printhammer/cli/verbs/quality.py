@@ -28,7 +28,7 @@ FEEDBACK: Final = opt.switch("Drive with position feedback, as in `printhammer f
 def chosen_strategy(
     job: Job, hammer: Hammer, table: Path | None, feedback: bool, serial: str | None = None
 ) -> tuple[dict[str, Any], CompensationTable | None]:
-    """Return the keyword `strategy` of the printing functions (empty: open loop), and the table or None.
+    """Return the keyword `strategy` of printing functions (empty: open loop), and any table.
 
     Raises
     ------

@@ -26,7 +26,7 @@ def tuned_along(
     options: dict[str, Any],
     units: Units,
 ) -> Answer:
-    """Tune one table per value of an axis, such as 'rail 90 V, 110 V, 3'; `header` holds the timer tick."""
+    """Tune one table per value of an axis, such as 'rail 90 V, 110 V, 3'; tick in `header`."""
     from printhammer.control.axes import tune_along
 
     axis, values = _read(along)

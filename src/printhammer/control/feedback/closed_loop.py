@@ -59,7 +59,7 @@ class FeedbackStrategy(Declared):
         return [loop.drive(self.controller.driver.edge) for loop in loops]
 
     def loops(self, hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) -> list[Loop]:
-        """Simulate the closed loop on a hammer from rest, one run per pattern; return the final loop states.
+        """Simulate the closed loop from rest, one run per pattern; return the final loop states.
 
         The controller does not know the driven hammer and observes the hammer only through the sensor.
         Patterns are indices of the slots with a dot; `rate` is the slot rate, Hz.

@@ -239,7 +239,7 @@ class Controller:
             loop.printed = printed if unsure else None
 
     def decide_again(self, now: Sequence[tuple[Loop, int]], policy: Policy) -> None:
-        """Repeat the choice of the next pulse after a contact, with the improved estimate of the pack front.
+        """Repeat the choice of the next pulse after a contact, with the updated estimate of the front.
 
         `now` holds each loop with the index of the coming dot.
         """
@@ -357,7 +357,7 @@ def _steps(loops: Sequence[Loop]) -> tuple[FloatArray, FloatArray]:
 
 
 def _current(at: FloatArray, height: FloatArray, edge: float, t: FloatArray) -> FloatArray:
-    """Return the current, A, at times t, shape (M, K), after the steps of the command (first-order lag)."""
+    """Return the current, A, at times t, shape (M, K), with first-order lag behind the command."""
     total = np.zeros_like(t)
     for k in range(at.shape[1]):
         since = np.maximum(t - at[:, k, np.newaxis], 0.0)

@@ -111,7 +111,7 @@ def front_force(farther: Plant, table: ImpactMap) -> FloatArray:
 
 
 def between_fronts(front: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Locate M pack distances between the maps' distances: index of the map below, weight of the map above.
+    """Locate M pack distances: index of the map below, and weight of the map above.
 
     A front is the distance beyond nominal as a fraction of the stroke; values outside the maps are clipped.
     """
@@ -349,7 +349,7 @@ class Choice:
 
 
 def between(table: ImpactMap, kind: IntArray, speed: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Locate M impact speeds between the rows of a map: index of the row below, weight of the row above."""
+    """Locate M impact speeds in a map: index of the row below, and weight of the row above."""
     below, share = np.zeros(len(kind), np.int64), np.zeros(len(kind))
     for number in range(int(table.kind.max()) + 1):
         rows = np.flatnonzero(table.kind == number)

@@ -51,7 +51,7 @@ class Landing:
 
 
 def soft_landing(plant: Plant, forces: ForceMap) -> Landing:
-    """Optimise the brake pulse after each touch for least residual motion, by successively refined grids."""
+    """Optimise the brake pulse after each touch for least residual motion, by refined grid search."""
     scale = plant.single.flight_time
     release = forces.release_for(1.0)[:, forces.off]
     force = np.full(len(release), np.nan)
@@ -78,7 +78,7 @@ def soft_landing(plant: Plant, forces: ForceMap) -> Landing:
 def _residual_speeds(
     plant: Plant, forces: ForceMap, release: FloatArray, rows: IntArray, tried: FloatArray
 ) -> FloatArray:
-    """Simulate brake pulses, shape (rows, pulses, 2): start and width, s; return the residual speeds, m/s."""
+    """Simulate brake pulses (start and width, s); return the residual speeds, m/s."""
     driver, scale = plant.driver, plant.single.flight_time
     drives, states = [], []
     for row, pulses in zip(rows.tolist(), tried, strict=True):
@@ -119,7 +119,7 @@ class Launch:
 
 
 def launch(plant: Plant, forces: ForceMap) -> Launch:
-    """Compute the launch from rest that prints with `_ALMOST` times the single-pulse force without a push.
+    """Compute the launch from rest that prints with `_ALMOST` times the single-pulse force.
 
     A short push into the pack adds the rest of the force; the length of the push is chosen when the impact
     speed is known.

@@ -183,7 +183,7 @@ def _linearise(constants: FloatArray, shown: FloatArray) -> Search[_Iterate]:
 
 
 def _objective(places: FloatArray, shown: FloatArray, value: FloatArray, noise: FloatArray) -> FloatArray:
-    """Compute the negative log posterior of each row of constants, up to an additive constant, shape (M,)."""
+    """Compute the negative log posterior of M rows of constants, up to an additive constant."""
     rest = (value - shown) / noise
     each = (_FREEDOM + 1.0) * np.log1p(rest**2 / _FREEDOM)
     lost = np.isfinite(value) & ~np.isfinite(shown)

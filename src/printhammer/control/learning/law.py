@@ -71,7 +71,7 @@ ADVANCE, WIDTH, DELAY, BRAKE = range(4)
 
 
 class OpenLoop(NamedTuple):
-    """Open-loop drive, the same pulse at every slot: its table settings, shape (4, entries), and waveform."""
+    """Open-loop drive, the same pulse at every slot, as table settings and waveform."""
 
     settings: FloatArray
     pulse: Waveform
@@ -197,7 +197,7 @@ IN_CYCLE: Final = np.asarray(PRINTED)[JUDGED] < LEAD_IN + 2**SLOTS
 
 
 class Verdict(NamedTuple):
-    """Outcome of comparing a compensation table with open-loop drive on hammers drawn from the posterior."""
+    """Outcome of comparing a compensation table with open-loop drive on posterior samples."""
 
     gains: bool  # Whether the table is better than both open-loop drives
     loop: OpenLoop  # Open-loop drive to use if the table is not better

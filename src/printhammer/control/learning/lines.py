@@ -103,7 +103,7 @@ _POINTS: Final = 24  # Number of simulated hammers over which the design is aver
 
 
 class Rung(NamedTuple):
-    """Single test pulse, or pair of test pulses `later` s apart; widths as fractions of the nominal width."""
+    """Single test pulse, or a pair `later` s apart; widths as fractions of the nominal width."""
 
     first: float
     later: float = 0.0

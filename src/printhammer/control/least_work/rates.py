@@ -24,7 +24,7 @@ NOT_FOUND = "no current found"
 
 
 class LeastWorkRates(Result):
-    """Coil work of bursts of least work at several dot rates; NaN where the search for a current failed."""
+    """Coil work of bursts of least work by dot rate; NaN where no current was found."""
 
     hammer: Hammer = part("driven hammer")
     rates: FloatArray = coordinate("Hz", "dot rate", "rate", name="rate")

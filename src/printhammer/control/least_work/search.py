@@ -141,9 +141,9 @@ _REACH, _SHRINKS = 0.25, 0.7  # Half-width of the first cloud, and factor on the
 def printing_profile(
     shares: FloatArray, largest: float, duration: float, arrival: float, nodes: int
 ) -> FloatArray:
-    """Return currents, A, shape (n, nodes), that brake, hold and throw the armature; parameters in [0, 1].
+    """Return currents, A, shape (n, nodes), that brake, hold and throw the armature.
 
-    `shares`, shape (n, `PRINTING_SHARES`), are the parameters: three current levels and two switching times.
+    `shares`, shape (n, `PRINTING_SHARES`), in [0, 1], are three current levels and two switching times.
     `largest` is the current limit, A; the slot lasts `duration`, and its dot is due at `arrival`, both in s.
     """
     low, high = np.array([0.0, 0.0, 0.3]), np.array([1.0, 0.6, 1.0])
@@ -170,7 +170,7 @@ def refined(
     badness: Callable[[FloatArray], FloatArray],
     count: int,
 ) -> tuple[FloatArray, FloatArray]:
-    """Evaluate Sobol profiles and refine the best; return their currents, shape (n, nodes), and objectives.
+    """Evaluate Sobol profiles and refine the best; return currents, shape (n, nodes), and objectives.
 
     `profile` maps shares, shape (n, `count`), to currents, `badness` maps currents to the objective.
     """
@@ -355,7 +355,7 @@ def _descend(
     *,
     printing: bool,
 ) -> tuple[float, FloatArray]:
-    """Minimise the cost from a start by SLSQP within the limits on value and slope; return cost and currents.
+    """Minimise the cost by SLSQP within the current limits; return the cost and the currents, A.
 
     For a landing (not `printing`), the current must be able to return to zero in one more step.
     """

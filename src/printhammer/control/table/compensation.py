@@ -71,7 +71,7 @@ ANY_UNIT: Final = "any"
 
 
 class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".nc", ".zarr", ".parquet")):
-    """Pulse width and advance as a function of the last gaps between dots: rows by rate, columns by history.
+    """Pulse width and advance as a function of the last gaps between dots, by rate and history.
 
     A dot with history h is fired `advance` before its slot, with a pulse of `width`. In the gap before the
     dot, `brake_delay` after the slot of the preceding dot, a brake pulse of `brake_width` stops the
@@ -205,7 +205,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return mixed(low_row, high_row, share)
 
     def fired_by(self, driver: str, hammer: Hammer) -> CompensationTable:
-        """Relabel a table tuned on `driven_by(hammer, driver, ...)` as a table for `hammer` with that driver.
+        """Relabel a table tuned on `driven_by(hammer, driver, ...)` as a table for `hammer`.
 
         All pulses are shifted by the difference of the flight times from rest.
         """

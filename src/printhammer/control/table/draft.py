@@ -201,7 +201,7 @@ def histories_of_length(task: Task, known: int) -> list[History]:
 
 
 def gaps_before(history: History, reach: int) -> list[tuple[int, ...]]:
-    """Return the gap sequences that precede a history in its test patterns: none, and several long ones."""
+    """Return the gap sequences that precede a history in its test patterns; the first is empty."""
     late = (reach + 1,)
     if REST in history:
         return [(), late]

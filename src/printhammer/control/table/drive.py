@@ -84,7 +84,7 @@ def shared_numbers(gaps: int, reach: int) -> IntArray:
 
 
 def histories_of(slots: Sequence[int], gaps: int, reach: int) -> IntArray:
-    """Return the history numbers of the dots of a pattern that begins at rest, and of a later dot from rest.
+    """Return the history numbers of the dots of a pattern, and of a later dot from rest.
 
     `slots` are the ascending slot indices of the dots. The array has one more element than dots: the last is
     the number of a dot printed from rest, long after the pattern.
@@ -232,7 +232,7 @@ def clearance(hammer: Hammer, pulse: Waveform, width: float, largest: float) -> 
 
 
 def brake_of(pulse: Waveform, width: float) -> Waveform:
-    """Return the brake pulse of a width, s; a driver with a peak phase applies full supply up to its end."""
+    """Return the brake pulse of a width, s; within the peak phase of a driver, on full supply."""
     if isinstance(pulse, PeakAndHold) and width <= pulse.peak_time:
         shared = {name: value for name, value in dict(pulse).items() if name in Rail.model_fields}
         return Rail(**{**shared, "width": width})

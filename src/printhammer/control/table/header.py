@@ -42,7 +42,7 @@ def bits_of(times: Mapping[str, FloatArray], tick: float) -> int:
 
 
 def size_of(rates: int, entries: int, bits: int, values: int = 0) -> int:
-    """Return the size of the arrays of a header in bytes, for numbers of rates, entries and axis values."""
+    """Return the size of a header's arrays, bytes, for counts of rates, entries and axis values."""
     each = len(COLUMNS) * bits // 8 + 1
     return max(values, 1) * rates * entries * each + _PLACE_BYTES * (rates + values)
 
@@ -250,7 +250,7 @@ class _Between(NamedTuple):
 
 
 def _over_rates(prefix: str, rates: int) -> _Between:
-    """Return the C code of the interpolation over the slot period, equivalent to `CompensationTable.at`."""
+    """Return the C code that interpolates over the slot period like `CompensationTable.at`."""
     rate = f"{prefix}_rate"
     share = f"""\
   const unsigned at = {prefix}_rate_at(millihertz), last = {max(rates - 2, 0)}u;

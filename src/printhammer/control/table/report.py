@@ -266,7 +266,7 @@ def _growth(driven: Sequence[Hammer], rate: float, strategy: Strategy, effort: E
 
 
 def _sets(seed: int) -> dict[str, tuple[Sequence[tuple[int, ...]], int | Sequence[int]]]:
-    """Return the pattern sets by name, each with its patterns and the index of the first evaluated slot."""
+    """Return the pattern sets by name: patterns, and index of the first evaluated slot."""
     long = {kind: [each for each in long_patterns() if each.kind == kind] for kind in KINDS}
     judged = {
         kind: ([each.slots for each in some], [each.judged_from for each in some])

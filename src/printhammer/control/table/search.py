@@ -226,7 +226,7 @@ def _distinct(ways: Ways) -> Ways:
 
 
 def _path(ways: Ways, groups: Sequence[IntArray], jump: float) -> IntArray:
-    """Choose one candidate per group by dynamic programming: minimise the sum of costs and branch changes.
+    """Choose one candidate per group by dynamic programming over costs and branch changes.
 
     A table can be interpolated between two periods only if the branch is the same: if firing times
     relative to the slots differ by at most `jump`, s.

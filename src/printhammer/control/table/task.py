@@ -154,7 +154,7 @@ class Task:
     def deviations(
         self, hammer: Hammer, drives: Sequence[Drive], slots: FloatArray, ends: FloatArray
     ) -> tuple[FloatArray, BoolArray]:
-        """Simulate drives; return the deviations of all dots from the single-pulse dot, and a mask of faults.
+        """Simulate drives; return deviations from the single-pulse dot, and a mask of extra contacts.
 
         The drives have a firing for each of `slots` (drives, dots), the slot times, s, NaN-padded; a
         simulation continues for `tail` after `ends` (drives,), s.

@@ -69,7 +69,7 @@ def refined(draft: Draft) -> Draft:
 
 
 def _halfway(draft: Draft, lower: IntArray) -> Draft:
-    """Interpolate a draft halfway between the rates `lower` and the next higher rates; evaluate the rows."""
+    """Interpolate and evaluate a draft halfway between the rates `lower` and the next higher rates."""
     table = draft.table()
     rates = 0.5 * (draft.rates[lower] + draft.rates[lower + 1])
     settings = np.array([table.at(float(rate)) for rate in rates])
@@ -293,7 +293,7 @@ def _given_rates(asked: Sequence[float | str]) -> FloatArray:
 
 
 def _bridge(draft: Draft) -> None:
-    """Retune short runs of unusable rates, in place and from the lowest rate up, until a run stays unusable.
+    """Retune short runs of unusable rates in place, lowest first, until a run remains unusable.
 
     A table ends below its first unusable rate, so a run of a few unusable rates would cost all higher rates.
     """
@@ -324,7 +324,7 @@ def _tune_again(draft: Draft, poor: IntArray) -> None:
 
 
 def _failed_brakes(draft: Draft) -> tuple[tuple[float, float, float], ...]:
-    """Return period, delay and width of the brake pulses, s, of the candidates whose rows of dots failed."""
+    """Return period, delay and width, s, of the brake pulses of candidates with failed rows."""
     task, barred = draft.task, []
     for gap in range(1, task.reach + 1):
         columns = [number_of(each, task.reach) for each in histories(task.gaps, task.reach) if each[0] == gap]

@@ -40,7 +40,7 @@ def solve(
     bounded: Bounded,
     longest: float = LONGEST_STEP,
 ) -> FloatArray:
-    """Minimise each dot's deviation over firing time and width; return the best iterates, shape (dots, 2).
+    """Minimise each dot's deviation over firing time and width, s; return them, shape (dots, 2).
 
     The method is Levenberg-Marquardt (J. Nocedal and S. J. Wright, *Numerical Optimization*, ch. 10).
 
@@ -89,7 +89,7 @@ def changes(
     most: FloatArray,
     longest: float = LONGEST_STEP,
 ) -> FloatArray:
-    """Compute a Levenberg-Marquardt step in firing time and width, s, shape (dots, 2), with width bounds.
+    """Compute a Levenberg-Marquardt step in firing time and width, s, shape (dots, 2).
 
     `slopes`, shape (dots, deviations, 2), are the derivatives of the deviations `off`, shape (dots,
     deviations), with respect to firing time, or advance, and width, 1/s. The change of width, s, is clipped
@@ -130,7 +130,7 @@ _ROUNDING: Final = 1e-12  # Tolerance by which ranges of firing times are extend
 
 
 class Ways(NamedTuple):
-    """Candidate pulses for a dot: arrays of shape (ways,), times after the slot of the preceding dot, s.
+    """Candidate pulses for a dot: arrays (ways,) of times after the slot of the preceding dot, s.
 
     The dot is due at `period`. A brake pulse of width `brake` begins at `delay`, both 0 without one; the dot
     is `fired` with a pulse of `width`. `cost` is the deviation of a row of such dots; see `costs`.
@@ -243,7 +243,7 @@ def costs(task: Task, ways: Ways) -> FloatArray:
 
 
 def growths(task: Task, ways: Ways) -> FloatArray:
-    """Compute the growth factor of an error, from dot to dot, in a long row of each candidate, shape (ways,).
+    """Compute the growth factor of an error from dot to dot, in a long row of each candidate.
 
     An unknown factor is NaN. If the first two dots meet their target, the state after them is the fixed point
     of the row. If the cost shows that they miss it, and the row looks stable, the fixed point is located by
@@ -279,7 +279,7 @@ def rows_of(task: Task, ways: Ways, dots: int) -> list[Drive]:
 
 
 def _deviations(task: Task, hammer: Hammer, ways: Ways, drives: Sequence[Drive]) -> FloatArray:
-    """Simulate drives; return deviations of force and arrival, as fractions of the limits (ways, dots, 2).
+    """Simulate drives; return normalised deviations of force and arrival, shape (ways, dots, 2).
 
     A lost dot, and a dot with extra contacts, is NaN.
     """

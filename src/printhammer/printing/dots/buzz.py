@@ -155,10 +155,10 @@ def find_buzz_train(
 
 
 def longest_run(motion: Motion, reference_force: float, forces: tuple[float, float] = FORCES) -> Run:
-    """Return the longest run of dots whose peak force, as a fraction of `reference_force`, is in `forces`.
+    """Return the longest run of dots whose relative peak force is within `forces`.
 
-    `reference_force` is in N. The first run wins a tie. If no dot is in the range, all touches count as
-    before the run.
+    Peak forces are relative to `reference_force`, N. The first run wins a tie. If no dot is in the range, all
+    touches count as before the run.
     """
     returns = [contact.t_in for contact in touches(motion)]
     best: list[tuple[int, float, float]] = []
@@ -191,7 +191,7 @@ def longest_run(motion: Motion, reference_force: float, forces: tuple[float, flo
 
 
 def delayed_train(hammer: Hammer, delay: float, pulses: int = _PULSES) -> tuple[float, ...]:
-    """Compute the firing times, s, of a train with a constant delay, s, after each departure from the pack.
+    """Compute the firing times, s, of a train that fires a delay, s, after each pack departure.
 
     The train has fewer than `pulses` firings if a firing makes no dot, since no departure follows.
     """

@@ -84,10 +84,10 @@ def single_pulses(
     effort: Effort = DEFAULT,
     **_keywords: Unpack[InThreads],
 ) -> list[SinglePulse | None]:
-    """Simulate one pulse from rest for each of many hammers; `waveforms` replace the hammers' own waveforms.
+    """Simulate one pulse from rest for each of many hammers; return their dots.
 
-    The entry of a hammer is None if its pulse makes no dot or its simulation ended early. Every hammer needs
-    a pack.
+    `waveforms` replace the hammers' own waveforms. The entry of a hammer is None if its pulse makes no dot or
+    its simulation ended early. Every hammer needs a pack.
     """
     if not hammers:
         return []

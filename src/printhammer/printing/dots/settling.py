@@ -49,7 +49,7 @@ class Wear(Declared):
 
 @dataclass(frozen=True)
 class Rebound:
-    """Interval between two backstop touches: start and end, s, and largest height above the backstop, m."""
+    """Rebound between two backstop touches: start and end, s, and largest height, m."""
 
     start: float
     end: float
@@ -80,7 +80,7 @@ class Settling(Declared):
 
 
 def settle(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float = TOLERANCE) -> Settling:
-    """Simulate one pulse from rest, by default the hammer's own, and compute settling and backstop wear."""
+    """Simulate one pulse from rest (default: the hammer's own); compute settling and backstop wear."""
     if hammer.position is None:
         raise InputError(
             f"{hammer.path}: the hammer has no backstop",
@@ -163,7 +163,7 @@ def settled_from(away: BoolArray) -> int:
 
 
 def _settle_time(motion: Motion, rest: float, limit: float) -> float | None:
-    """Locate by bisection the time, s, of the last departure from within `limit` (m) of the rest position.
+    """Bisect for the time, s, after which the armature stays within `limit`, m, of its rest position.
 
     The time counts from the firing; None if the armature never leaves the limit, or ends outside the limit.
     """

@@ -118,7 +118,7 @@ def open_loop(hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) 
 
 
 class OpenLoop:
-    """Open-loop strategy, with an optional waveform in place of the hammer's own waveform; see `open_loop`.
+    """Open-loop strategy; see `open_loop`.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def row_of_dots(step: int = 1) -> tuple[int, ...]:
 
 @cache
 def long_patterns() -> tuple[LongPattern, ...]:
-    """Return the long test patterns: cycle with lead-in, rows, and the line of text, one pattern per wire.
+    """Return the long test patterns: cycle with lead-in, rows, and one pattern per wire of text.
 
     Patterns of the same kind are consecutive.
     """

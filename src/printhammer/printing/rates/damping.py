@@ -136,7 +136,7 @@ _ROUNDS: Final = 5  # Number of refinements
 
 
 class DampingStudy(Result):
-    """Safe rate and settling of a hammer with replaced backstop and pack materials, at equal print force.
+    """Safe rate and settling of a hammer by backstop and pack material, at equal print force.
 
     The numbers are NaN unless `status` is "ok" or "current limit".
     """

@@ -449,11 +449,11 @@ def safe_rates(
     limits: Limits,
     effort: Effort,
 ) -> FloatArray:
-    """Compute the safe rates, Hz, of many hammers on an ascending grid of rates; arguments as for `all_pass`.
+    """Compute the safe rates, Hz, of many hammers on an ascending grid of rates, Hz.
 
-    The dots of each hammer are compared with its own entry of `singles`; progress counts the hammers whose
-    safe rate is known. The rate is NaN if not even the first rate of the grid passes, and the last rate of
-    the grid if all pass.
+    Other arguments are those of `all_pass`. The dots of each hammer are compared with its own entry of
+    `singles`; progress counts the hammers whose safe rate is known. The rate is NaN if not even the first
+    rate of the grid passes, and the last rate of the grid if all pass.
     """
     rates = np.full(len(hammers), np.nan)
     alive = np.arange(len(hammers))

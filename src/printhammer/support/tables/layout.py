@@ -388,7 +388,7 @@ def _with_units(columns: list[Heading], facts: dict[str, list[str]], above: list
 
 
 def _beside_names(columns: list[Heading], facts: dict[str, list[str]]) -> list[Heading]:
-    """Return the headings of an older Tektronix oscilloscope: time, and the channel named in the metadata."""
+    """Return the headings of an older Tektronix oscilloscope, from the metadata."""
     source = _fact(facts, ("source",), [""])[0]
     unit = split_heading(f"x [{facts[_TIME_UNIT[0]][0]}]").unit
     return [Heading("time", unit), *(column._replace(name=source) for column in columns[1:])]

@@ -205,7 +205,7 @@ def assigned(
     columns: Columns | None,
     option: bool,
 ) -> tuple[dict[str, Source], dict[str, int]]:
-    """Assign columns to quantities and text columns, by the declaration or, without one, by the heading."""
+    """Assign columns to quantities and words, by the declaration or else by the heading."""
     if columns is None:
         return _by_heading(table, numbers, text, wanted, option)
     for name, source in columns.sources.items():
@@ -414,7 +414,7 @@ def _words(table: Table, name: str, place: int, allowed: tuple[str, ...]) -> lis
 def _in_time(
     values: dict[str, FloatArray], lines: IntArray, columns: Columns, where: str
 ) -> tuple[dict[str, FloatArray], IntArray]:
-    """Remove column delays: interpolate all columns to the times of the first column; drop incomplete rows.
+    """Remove column delays by interpolation to common times; drop incomplete rows.
 
     The times of the first column are shifted; the others are interpolated linearly.
     """
