@@ -17,7 +17,7 @@ PULSES: Final = 9
 """Default number of firings of a pulse train, as in the bursts of the paper."""
 
 MOST_PULSES: Final = 10_000_000
-"""Largest number of firings of a drive; arbitrary, to refuse typing errors."""
+"""Largest number of firings of a drive; arbitrary, catches typing errors."""
 
 SPACING_UNITS: Final = {"rate": "Hz", "period": "s"}
 """Names of the arguments that state the spacing of firings, rate or period, and their SI units."""

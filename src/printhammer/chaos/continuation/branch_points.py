@@ -54,18 +54,21 @@ _REAL: Final = 1e-9  # Imaginary part up to which a multiplier counts as real
 _ROUNDING: Final = 1e-8
 """Magnitude of a test function below which its sign change is rounding noise."""
 _SHARE_OF_CHANGE: Final = 1e-10
+"""Final bracket of a change of the contact sequence, as a fraction of a continuation step."""
 _SMALL_MARGIN: Final = 0.05
+"""Grazing margin below which the search for a contact change interpolates instead of bisecting."""
 _CLOSE_MARGIN: Final = 1e-7
-"""Search for a contact change: final bracket, in steps; margins at which interpolation begins and ends."""
+"""Grazing margin below which the interpolation of a contact change ends."""
 _NEAR: Final = 1e-4
 """Distance, as a fraction of a step, within which a fold and a crossing are the same point."""
 _AMPLITUDE: Final = 1e-2  # First scaled distance from a period doubling at which to seek the doubled orbit
-_LEAST_AMPLITUDE: Final = 1e-6
+_LEAST_AMPLITUDE: Final = 1e-6  # Smallest scaled distance from a period doubling to try
 _CLOSER: Final = 4.0
-"""Smallest scaled distance from a doubling to try for the doubled orbit; ratio of successive distances."""
+"""Ratio of successive scaled distances from a period doubling at which the doubled orbit is sought."""
 _ASIDE: Final = 0.5
+"""Largest offset of a doubled orbit from the critical direction, relative to its distance."""
 _NEW_MULTIPLIER: Final = 0.3
-"""Limits for a doubled orbit: offset from the critical direction, relative; |multiplier - 1|."""
+"""Largest distance of a multiplier of a doubled orbit from 1 near its period doubling."""
 _HALF_NEAR: Final = 0.05
 """Largest scaled distance between an orbit and one of half its period, for both to meet at a doubling."""
 _HALF_DOUBLES: Final = 0.5

@@ -29,7 +29,7 @@ Crossing = Literal["pitchfork", "transcritical", "branching"]
 """Kind of a crossing; "branching" if the second derivatives leave the kind undecided."""
 CROSSINGS: Final[tuple[Crossing, ...]] = get_args(Crossing)
 
-_ROUNDS: Final = 60
+_ROUNDS: Final = 60  # Iteration limit of the bracketing of a crossing; arbitrary
 _BRACKET: Final = 1e-5
 """Smallest bracket of a crossing, as a fraction of a step; Newton's method fails at the crossing itself."""
 _DIFFERENCE: Final = 1e-3
@@ -38,10 +38,10 @@ _FLAT: Final = 1e-6
 """Relative mixed second derivative below which the tangent of the crossing curve is undetermined."""
 _UPRIGHT: Final = 0.01
 """Largest component along the parameter of the tangent of a curve that turns back; arbitrary."""
-_AMPLITUDE: Final = 1e-2
-_LEAST_AMPLITUDE: Final = 1e-5
+_AMPLITUDE: Final = 1e-2  # First scaled distance from a crossing at which to seek the crossing curve
+_LEAST_AMPLITUDE: Final = 1e-5  # Smallest scaled distance from a crossing to try
 _CLOSER: Final = 4.0
-"""Smallest scaled distance from a crossing to try for a point of the crossing curve; ratio of distances."""
+"""Ratio of successive scaled distances from a crossing at which the crossing curve is sought."""
 _ASIDE: Final = 0.5
 """Largest distance from the predicted point, relative to the step, of a point on the crossing curve."""
 

@@ -59,7 +59,7 @@ class Flight(Declared):
 def fly(
     regime: Regime, surface: Surface, phase: float, speed: float, firings: int, tolerance: float
 ) -> Flight:
-    """Compute the flight from an impact at a given drive phase and speed, m/s, to the impact after it."""
+    """Compute the flight from an impact at a given drive phase and speed, m/s, over `firings` periods."""
     hammer = regime.hammer
     place = hammer.front if surface == "pack" else hammer.position
     assert place is not None
@@ -106,7 +106,7 @@ def fly(
 
 
 def _acceleration(problem: Problem, time: float) -> float:
-    """Compute the acceleration of the armature, m/s^2, at the start of a run that ends at `time`, s."""
+    """Compute the acceleration of the armature, m/s^2, at the start of a run of duration `time`, s."""
     record = problem.run(problem.start + time)
     (row,) = problem.resample(record, np.array([problem.start]))
     push = row[2] if problem.drive.quantity == "force" else 0.0

@@ -44,8 +44,9 @@ TOO_LONG: Final = "too many iterations"
 SINGULAR: Final = "singular derivative"
 
 _LONGEST_STEP: Final = 1.0
+"""Largest Newton step, in half-widths of the strobe window."""
 _LEAST_SHARE: Final = 2.0**-7
-"""Largest Newton step, in half-widths of the strobe window; smallest damping factor of a step."""
+"""Smallest damping factor of a Newton step."""
 
 
 @dataclass(frozen=True)

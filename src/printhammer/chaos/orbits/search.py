@@ -23,9 +23,11 @@ LONGEST: Final = 8
 
 MOST_FIRINGS: Final = 64  # Largest orbit period that can be searched for, in firings
 STARTS: Final = 1024
+"""Default number of initial states of a search, in addition to the rest state."""
 GUESSES: Final = 48
+"""Default number of initial guesses per number of firings and block of starts."""
 FOLLOW: Final = 2
-"""Defaults of `orbits`: number of starts, number of guesses, largest period of followed branches."""
+"""Default largest period, in firings, of the orbits whose branches are followed."""
 
 
 @computation

@@ -40,11 +40,13 @@ NEAR: Final = 0.1
 """Distance from the states, in half-widths, within which an orbit of fewer firings is sought."""
 
 _SHRINKS: Final = 1e-5
+"""Smallest relative decrease of a distance that counts as shrinking."""
 _NOISE: Final = 1e-9
-"""Smallest decrease of a distance that counts as shrinking: relative, and absolute in half-widths."""
+"""Smallest decrease of a distance that counts as shrinking, in half-widths of the strobe window."""
 _GOAL: Final = 1e-13
+"""Residual at which Newton's method stops, in half-widths of the strobe window."""
 _ENOUGH: Final = 1e-9
-"""Residual at which Newton's method stops, and residual that is accepted if it stops decreasing."""
+"""Residual that Newton's method accepts if it stops decreasing, in half-widths of the strobe window."""
 _ITERATIONS: Final = 20  # Iteration limit of Newton's method; arbitrary
 
 NO_ORBIT: Final = "Newton's method finds no stable orbit of {} there that the states approach"

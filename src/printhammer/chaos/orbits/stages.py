@@ -83,8 +83,9 @@ _JOINED: Final = 48
 _TOUCHES: Final = 4
 """Ratio, among the starts, of evenly spread states to states just after a touch of a rigid backstop."""
 _COMPLETED: Final = 6
+"""Largest period, in firings, that is searched again if its fixed-point indices do not sum to 1."""
 _MORE: Final = 512
-"""Largest period, in firings, that is searched again if its index sum is not 1; number of further guesses."""
+"""Number of additional guesses for a period whose fixed-point indices do not sum to 1."""
 _NEAR: Final = 64  # Number of guesses near each known orbit of a period whose index sum is not 1; arbitrary
 _ROUNDS: Final = 3  # Largest number of rounds of further guesses; arbitrary
 _SIZES: Final = (-6.0, -1.5)

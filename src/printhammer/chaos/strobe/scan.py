@@ -40,8 +40,9 @@ LARGEST_MULTIPLIER: Final = 0.99
 """Largest absolute Floquet multiplier with which the early test accepts a period."""
 
 _SHORT: Final = 301
+"""Number of firings over which the first estimate of the exponent is averaged."""
 _SURE: Final = 5.0
-"""Firings of the first estimate of the exponent; number of standard errors that makes its sign decisive."""
+"""Number of standard errors above which the first estimate of the exponent is decisive."""
 
 
 @computation

@@ -82,7 +82,7 @@ class _Driver(Waveform):
         return (*super().numbers(), float(DECAYS.index(self.decay)))
 
     def supply(self) -> Supply:
-        """Return the supply."""
+        """Return the voltage supply of the driver, from its fields."""
         numbers = [0.0] * len(Supply._fields)
         tables.fill_supply(self.numbers(), self.code == tables.CAPACITOR, numbers, 0)
         return Supply(*numbers)

@@ -26,6 +26,7 @@ from printhammer.figures.elements.style import BLUE, INK, MUTED, ORANGE, SMALL, 
 from printhammer.figures.paper.motion import DELAYS
 
 COLOURS: Final = {"stable": BLUE, "unstable": ORANGE}
+"""Colours of stable and unstable manifolds on a white background."""
 _LIGHT: Final = {"stable": "white", "unstable": INK}
 """Colours of stable and unstable manifolds that are drawn over basins."""
 

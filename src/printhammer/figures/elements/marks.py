@@ -84,8 +84,9 @@ HALO: Final[dict[str, Any]] = {"facecolor": "white", "edgecolor": "none", "alpha
 """Background of text that may overlap a line: a semi-transparent white box."""
 
 ALONG_X: Final = ("data", "axes fraction")
+"""Annotation coordinates: x in data units, y as a fraction of the axes."""
 ALONG_Y: Final = ("axes fraction", "data")
-"""Annotation coordinates: x in data units and y as a fraction of the axes, or the reverse."""
+"""Annotation coordinates: x as a fraction of the axes, y in data units."""
 
 _LINE_NAME: Final = (0.095, 0.06)
 """Width and height of a name on a horizontal line, as fractions of the axes; arbitrary."""

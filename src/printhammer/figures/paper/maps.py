@@ -83,7 +83,7 @@ _SHEETS: Final = 2.0
 _FLAT: Final = 4e-4
 """Tolerance of thinned curves, in units of the picture width; corresponds to 0.15 points."""
 
-_NAME: Final[dict[str, Any]] = {"fontsize": "medium"}
+_NAME: Final[dict[str, Any]] = {"fontsize": "medium"}  # Style of the axis names
 _POST: Final = 0.13
 """Distance from the displacement axis to the curves, in units of the picture width."""
 

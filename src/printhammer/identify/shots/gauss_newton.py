@@ -135,8 +135,9 @@ _FLOOR: Final = 1e-7
 _LEAST: Final = 1e-16
 """Standard deviation assumed for the noise of exact data, m; sets their weight."""
 _REACH: Final = 3.0
+"""Half-width of a profile likelihood, in standard errors."""
 _POINTS: Final = 7
-"""Half-width of a profile, in standard errors, and number of its points; arbitrary."""
+"""Number of points of a profile likelihood."""
 _LOST: Final = 1e-7
 """Relative singular value below which rounding errors dominate a direction."""
 _NO_MOTION: Final = "the simulated hammer does not move, so that the records cannot be compared"
