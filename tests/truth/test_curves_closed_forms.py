@@ -106,7 +106,7 @@ def test_a_curve_ends_at_the_bounds_of_either_constant() -> None:
     assert curve.message.count("is the bound") == 2
     short = ph.bifurcation_curve(branch, "backstop.restitution", (0.3, 0.9), event="fold", most=1)
     assert [stop.reason for stop in short.stops] == ["length", "length"]
-    assert short.message.count("the number of steps was used up at backstop.restitution") == 2
+    assert short.message.count("the maximum number of steps is reached at backstop.restitution") == 2
     with pytest.raises(InputError, match=r"expected drive\.amplitude or backstop"):
         short.at("mass", 1.0)
 

@@ -93,7 +93,7 @@ def variance_of(
     """Estimate the variance of each row, shape (m,), by maximum likelihood of variance components.
 
     The iteration multiplies each component by the square root of the ratio of its observed to its expected
-    score; superfluous components tend to zero. `spread`, shape (m, q), holds the coefficients of the
+    score; superfluous components tend to zero. `spread`, shape (m, q), contains the coefficients of the
     components; only the used rows count, with a correction for the fitted `parameters`. With `clipped`, large
     residuals are clipped, as long as the outliers are unknown.
     """

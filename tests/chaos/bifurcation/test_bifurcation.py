@@ -304,7 +304,7 @@ def test_windows_and_the_series_of_doublings() -> None:
     assert falling.periods == []
     assert falling.first == 9.0
     assert doublings(spans) == [spans[1]]
-    assert "after a series of doublings: period-1, period-2" in rising.sentence
+    assert "after a period-doubling cascade: period-1, period-2" in rising.sentence
 
 
 def test_trains_that_settle_slowly_do_not_hide_a_series(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -319,7 +319,7 @@ def test_trains_that_settle_slowly_do_not_hide_a_series(monkeypatch: pytest.Monk
     rising, _ = found.routes()
     assert not rising.complete
     assert rising.first is None
-    assert "not followed further" in rising.sentence
+    assert "the search stopped after 2 undecided" in rising.sentence
 
 
 def test_a_route_that_begins_with_a_strange_train_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -333,7 +333,7 @@ def test_without_a_strange_train_the_route_says_so() -> None:
     rising, falling = found.routes()
     assert rising.first is None
     assert falling.periods == [1, 2, 1]
-    assert "no strange train comes" in rising.sentence
+    assert "no train is strange" in rising.sentence
     with refused("direction"):
         found.windows("up")
 

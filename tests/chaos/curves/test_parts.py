@@ -191,7 +191,7 @@ def test_a_curve_ends_where_it_leaves_the_plane_or_the_steps_are_used_up() -> No
     assert f"{NAMES[0]} = 21 N is the bound" in curve.message
     short = henon_curve(most=2)
     assert len(short) == 5
-    assert "the number of steps was used up at" in short.message
+    assert "the maximum number of steps is reached at" in short.message
 
 
 def test_a_curve_is_begun_at_any_of_its_points_from_a_file(tmp_path: Path) -> None:

@@ -89,16 +89,13 @@ class Route(Declared):
         values = f"With {self.way} values"
         way = ", ".join(window.verdict for window in self.before)
         if not self.complete:
-            return (
-                f"{values} {MOST_UNDECIDED} trains come that neither repeat nor are strange, and the way was"
-                f" not followed further: {way}."
-            )
+            return f"{values} the search stopped after {MOST_UNDECIDED} undecided aperiodic trains: {way}."
         if self.first is None:
-            return f"{values} no strange train comes: {way}."
+            return f"{values} no train is strange: {way}."
         if not way:
             return f"{values} the very first train, at {shown(self.first)}, is strange."
-        series = "a series of doublings" if self.cascade else "no series of doublings"
-        return f"{values} the first strange train comes at {shown(self.first)} after {series}: {way}."
+        series = "a period-doubling cascade" if self.cascade else "no period-doubling cascade"
+        return f"{values} the first strange train is at {shown(self.first)}, after {series}: {way}."
 
 
 def cells(values: FloatArray) -> FloatArray:
@@ -215,7 +212,9 @@ class Bifurcation(Result, rows="direction column"):
         if several:
             widths = cells(self.values)
             share = float(widths[hysteresis(self)].sum() / (widths.sum() or 1.0))
-            lines.append(f"Up and down lead to different attractors at {100.0 * share:.2f} % of the range.")
+            lines.append(
+                f"Attractors of rising and falling values differ over {100.0 * share:.2f} % of the range."
+            )
         return Summary(
             [
                 *map(self._windows_grid, self.directions),
@@ -278,7 +277,7 @@ class Bifurcation(Result, rows="direction column"):
         """Report how many periods change at finer tolerances; an empty list if none changes."""
         count = int(self.sensitive.sum())
         whose = "1 period changes" if count == 1 else f"{count} periods change"
-        return [f"{whose} at a finer tolerance: long cycles hang on the last bits."] if count else []
+        return [f"{whose} at a finer tolerance: rounding decides the length of long cycles."] if count else []
 
     @property
     @derived("1", "time from a firing to its point, as a fraction of the period")

@@ -231,7 +231,7 @@ def _half(
         if float(here.tangent @ ahead.tangent) > 0.5 * (1.0 + _LEAST_COSINE):
             length = min(length * _GROWTH, steps.largest)
         here = ahead
-    sentence = f"{steps.most} steps were taken, and the curve goes on at the parameter {here.parameter:.9g}"
+    sentence = f"the limit of {steps.most} steps is reached at the parameter {here.parameter:.9g}"
     return nodes, Stop("length", here.parameter, here.state, sentence)
 
 
@@ -255,7 +255,7 @@ def _lost(node: Node, trouble: str, *, jumped: bool = False) -> Stop:
     at = f"the parameter {node.parameter:.9g}"
     reason, sentence = "lost", f"the curve was lost at {at}: Newton's method does not converge beyond"
     if jumped:
-        reason, sentence = "jump", f"the curve was lost at {at}: what lies beyond is no continuation of it"
+        reason, sentence = "jump", f"the curve was lost at {at}: Newton's method converges to another one"
     if trouble:
         reason, sentence = "no value", f"the map has no value beyond {at}: {trouble}"
     return Stop(reason, node.parameter, node.state, sentence)

@@ -269,7 +269,7 @@ class Branch(Result):
                 self.unit if self.unit != "1" else "",
                 ".9g",
             ),
-            Cells("what happens", [event.message for event in self.events], left=True),
+            Cells("event", [event.message for event in self.events], left=True),
             Cells("multipliers", ["  ".join(map(multiplier, event.multipliers)) for event in self.events]),
             Cells("", ["" if event.sharp else "between two orbits" for event in self.events], left=True),
         ]
@@ -289,7 +289,7 @@ class Branch(Result):
     def stable(self) -> BoolArray:
         """Mask of the stable orbits, shape (N,): all small perturbations decay.
 
-        Where a branch is born at a period doubling, a multiplier is 1; the orbit there takes the stability of
+        Where a branch is born at a period doubling, a multiplier is 1; the orbit there has the stability of
         its neighbour.
         """
         stable = np.asarray(np.abs(self.multipliers[:, 0]) < 1.0)

@@ -385,7 +385,7 @@ def birth_of(half: Corrector, here: Node, ahead: Node) -> Stop | None:
     whole = MapValue(value.image, twice, slope, here.value.label, extra=value.extra)
     arc = here.arc + float(np.linalg.norm(half.point(node) - start))
     last = replace(node, value=whole, tangent=here.tangent, arc=arc)
-    sentence = f"the orbit ends at the parameter {node.parameter:.9g}, where one of half its period doubles"
+    sentence = f"the orbit ends at the parameter {node.parameter:.9g}, in the period doubling that creates it"
     return Stop(BIRTH, node.parameter, node.state, sentence, last)
 
 

@@ -239,7 +239,7 @@ class Tracer:
         )
         curve = self.grazed(family, curve)
         value, state = event.value, event.point.node.state
-        sentence = f"the orbit is born at {self.at_value(value)}, where one of half its period doubles"
+        sentence = f"the orbit is born at {self.at_value(value)}, in a period doubling"
         born = Stop(BIRTH, value, state, sentence)
         nodes = curve.nodes
         at_birth = family(state, value)
@@ -411,11 +411,11 @@ class Tracer:
             "closed": f"the branch closes upon itself at {at}",
             "no value": f"beyond {at} there is no strobe map: {why}",
             "lost": f"beyond {at} Newton's method does not converge",
-            "jump": f"beyond {at} what Newton's method converges to is no continuation",
-            "length": f"the number of steps was used up at {at}",
+            "jump": f"beyond {at} Newton's method converges to another curve",
+            "length": f"the maximum number of steps is reached at {at}",
             GRAZING: f"at {at} {why}",
             "merged": f"close to {at} {why}",
-            BIRTH: f"at {at} it is born from an orbit of half its period, which doubles",
+            BIRTH: f"at {at} it is born in the period doubling of an orbit of half its period",
             "not asked": f"it was not followed beyond {at}",
         }
         return replace(stop, sentence=sentences.get(stop.reason, stop.sentence))

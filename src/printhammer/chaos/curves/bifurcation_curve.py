@@ -121,7 +121,7 @@ class BifurcationCurve(Result, rows="point"):
         columns = [
             Cells(self.names[0], [point.first for point in self.points], first, ".9g"),
             Cells(self.names[1], [point.second for point in self.points], second, ".9g"),
-            Cells("what happens", [point.message for point in self.points], left=True),
+            Cells("kind", [point.message for point in self.points], left=True),
             Cells("multipliers", ["  ".join(map(multiplier, point.multipliers)) for point in self.points]),
         ]
         return Summary([Grid(columns), "", self.message])

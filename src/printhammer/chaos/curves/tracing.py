@@ -354,7 +354,7 @@ class CurveTracer:
         sentences = {
             "bound": f"{at} is the bound" if "parameter" in stop.sentence else stop.sentence,
             "closed": f"the curve closes upon itself at {at}",
-            "length": f"the number of steps was used up at {at}",
+            "length": f"the maximum number of steps is reached at {at}",
             "no value": f"beyond {at} there is no strobe map: {stop.sentence.partition(': ')[2]}",
         }
         why = stop.sentence.rpartition(": ")[2]

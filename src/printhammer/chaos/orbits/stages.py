@@ -129,8 +129,8 @@ class _Known:
 class Search:
     """Search for periodic orbits, run in stages.
 
-    Starts come in blocks and guesses in batches. The result of a stage depends only on stages with no more
-    starts and no more guesses, so that a larger search never loses an orbit of a smaller search.
+    Starts are divided into blocks, guesses into batches. The result of a stage depends only on stages with no
+    more starts and no more guesses, so that a larger search never loses an orbit of a smaller search.
     """
 
     regime: Regime

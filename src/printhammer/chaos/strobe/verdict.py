@@ -126,7 +126,7 @@ class Verdict(Declared):
             phrases.append(f"largest exponent {self.exponent:+.4g} ± {self.standard_error:.2g} per firing")
         if self.hangs_on_rounding:
             others = ", ".join(f"{name} at {tolerance:g}" for tolerance, name in self.elsewhere)
-            phrases.append(f"the period hangs on the last bits: {others}")
+            phrases.append(f"rounding decides the period: {others}")
         phrases.append(f"firings {self.first} to {self.last}, tolerance {self.tolerance:g}")
         return phrases
 

@@ -38,10 +38,10 @@ _REACH: Final = 1e3
 """Largest factor between a fitted constant and its initial guess; arbitrary."""
 
 _ABSENT_HIGH: Final = ("saturation_flux", "leakage_reach")
-"""Constants whose effect vanishes when they are large; the effect of all others vanishes at zero."""
+"""Constants whose effect vanishes when they are large; the effect of every other constant vanishes at 0."""
 
 _FACTOR: Final = 4.0
-"""Ratio of force to i^2/2 dL/dg beyond what saturation explains; forces in lbf instead of N give 4.4."""
+"""Ratio of force to i^2/2 dL/dg that saturation cannot explain, e.g. 4.4 for forces in lbf instead of N."""
 
 _SPARE: Final = 4
 """Smallest number of rows in excess of parameters for which standard errors are computed; arbitrary."""
