@@ -14,6 +14,7 @@ from tests.identify import shots
 import printhammer as ph
 from printhammer.drive.waveforms.shapes import HalfSine, Rectangle
 from printhammer.identify.shots.motion import fit_motion
+from printhammer.identify.shots.shot import find_touches
 
 HAMMER = ph.load(CRUDE)
 assert HAMMER.waveform is not None
@@ -339,3 +340,22 @@ def test_without_a_rebound_only_the_mass_is_found(tmp_path: Path) -> None:
     assert list(fit.constants) == ["mass"]
     assert abs(fit["mass"].value - MASS) < 4.0 * fit["mass"].standard_error
     assert any("backstop damping cannot be fitted" in note for note in fit.remarks)
+
+
+@pytest.mark.parametrize(("depth", "contacts"), [(60e-6, 1), (2.5e-6, 1), (1.5e-6, 1), (0.2e-6, 0)])
+def test_a_hard_pack_that_hardly_yields_is_touched(depth: float, contacts: int) -> None:
+    """A relay's pole yields by 2.7 um, near 0.5 % of the stroke: one bit decided whether it was touched."""
+    relay = ph.load("relay-5v")
+    assert relay.front is not None
+    times = np.arange(0.0, 8e-3, 5e-6)
+    places = np.where(times < 5e-3, relay.front * (times / 5e-3) ** 2, relay.front)
+    places = np.where(times > 5e-3, relay.front + depth * np.sin(np.pi * (times - 5e-3) / 100e-6), places)
+    away = np.clip((times - 5.1e-3) / 2e-3, 0.0, 1.0)
+    places = np.where(times > 5.1e-3, relay.front * (1.0 - away), places)
+    places += np.random.default_rng(3).normal(0.0, 0.2e-6, len(times))
+    touches, _smooth, _clear = find_touches(times, places, 0.2e-6, relay)
+    found = [touch for touch in touches if touch.surface == "pack"]
+    assert len(found) == contacts
+    for touch in found:
+        assert times[touch.first] == pytest.approx(5e-3, abs=20e-6)
+        assert times[touch.last] == pytest.approx(5.1e-3, abs=20e-6)
