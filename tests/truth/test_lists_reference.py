@@ -1,0 +1,104 @@
+"""Hammer files with lists of forces and contacts, drawn at random, against the oracle for lists.
+
+The oracle knows a contact as a mode with events; the kernel integrates the sum of all elastic contacts. A run
+is compared as long as a start moved by 1e-12 of the stroke changes the displacement by less than 1e-10.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from tests.oracle.list_laws import Constant, Contact, Drive, Piece, Spring, Stop, System, gravity
+from tests.oracle.list_steps import Run
+from tests.oracle.lists import simulate
+
+import printhammer as ph
+
+END = 6e-3
+STROKE = 1e-3
+
+
+def draw(rng: np.random.Generator) -> tuple[ph.Hammer, ph.PulseTrain, System]:
+    """Return a hammer with a rigid backstop at 0, its drive, and the same system for the oracle."""
+
+    def log(low: float, high: float) -> float:
+        return float(low * (high / low) ** rng.random())
+
+    mass, restitution, angle = 1e-3, float(rng.uniform(0.1, 0.9)), float(rng.uniform(-1.5, 1.5))
+    preload, stiffness, amplitude, width = -log(0.05, 0.5), log(50.0, 1e3), log(1.0, 6.0), log(0.5e-3, 2e-3)
+    hammer = ph.Hammer.build(
+        mass,
+        spring={"law": "preload", "preload": preload, "stiffness": stiffness},
+        backstop={"law": "rigid", "position": 0.0, "restitution": restitution},
+        waveform={"shape": "half-sine", "amplitude": f"{amplitude!r} N", "width": width},
+    )
+    terms: dict[str, dict[str, object]] = {"force.weight": {"law": "gravity", "angle": angle}}
+    forces: list[Spring | Constant] = [Spring(stiffness, preload), gravity(mass, angle)]
+    if rng.random() < 0.5:
+        k, cubic, center = log(10.0, 500.0), log(1e6, 1e8), float(rng.uniform(0.0, STROKE))
+        terms["force.cubic"] = {"law": "cubic", "stiffness": k, "cubic": cubic, "center": center}
+        forces.append(Spring(k, 0.0, center, cubic))
+    contacts = []
+    for i in range(int(rng.integers(1, 5))):
+        side = "back" if rng.random() < 0.25 else "front"
+        position = float(rng.uniform(0.02, 0.3) if side == "back" else rng.uniform(0.3, 1.0)) * STROKE
+        exponent = 1.5 if rng.random() < 0.5 else 1.0
+        k = log(1e3, 1e6) * (1e4**0.5 if exponent == 1.5 else 1.0)
+        law = "hertz" if exponent == 1.5 else "linear"
+        terms[f"contact.c{i}"] = {"law": law, "side": side, "position": position, "stiffness": k}
+        contacts.append(Contact(f"c{i}", side, position, k, exponent))
+    for key, term in terms.items():
+        hammer = hammer.replace(key, term)
+    period, pulses = width + log(0.2e-3, 2e-3), 3
+    pieces = tuple(
+        Piece(n * period, n * period + width, amplitude=amplitude, rate=math.pi / width)
+        for n in range(pulses)
+    )
+    stop = Stop("backstop", "back", 0.0, restitution)
+    system = System(mass, tuple(forces), (Drive(pieces),), contacts=tuple(contacts), stops=(stop,))
+    return hammer, ph.PulseTrain(hammer.waveform, period=period, pulses=pulses), system
+
+
+def horizon(system: System, x: float, v: float, times: np.ndarray, truth: Run) -> int:
+    """Return the number of times up to which a start moved by 1e-12 strokes gives the same motion."""
+    moved = simulate(system, x + 1e-12 * STROKE, v, END)
+    apart = np.abs(moved.at(times)[0] - truth.at(times)[0]) > 1e-10 * STROKE
+    return int(np.argmax(apart)) if apart.any() else times.size
+
+
+def check(seed: int, count: int) -> int:
+    """Compare random hammers; return the number of closings compared."""
+    rng = np.random.default_rng([38, seed])
+    closings = 0
+    times = np.linspace(0.0, END, 121)
+    for _ in range(count):
+        hammer, drive, system = draw(rng)
+        x, v = float(rng.uniform(0.05, 0.3)) * STROKE, float(rng.uniform(-0.5, 0.5))
+        motion = ph.simulate(hammer, drive, duration=END, times=times, state=(x, v), tolerance=1e-12)
+        truth = simulate(system, x, v, END)
+        stop = horizon(system, x, v, times, truth)
+        assert abs(motion.energy.residual) < 1e-8 * motion.energy.throughput
+        np.testing.assert_allclose(motion.x[:stop], truth.at(times[:stop])[0], rtol=0.0, atol=1e-8 * STROKE)
+        end = float(times[stop - 1])
+        for contact in system.contacts:
+            mine = [each for each in motion.closings if each.contact == contact.name and not each.initial]
+            found = [each.t_in for each in mine if each.t_in < end]
+            expected = [time for time in truth.times("touch", contact.name) if 0.0 < time < end]
+            np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-10)
+            closings += len(found)
+        # Bounces slower than the speed below are left to the definition of rest of either side.
+        hits = [e.time for e in truth.events if e.kind == "impact" and abs(e.v) > 1e-3 and e.time < end]
+        blows = [each.t_in for each in motion.contacts if (each.v_out or 0.0) > 1e-3 and each.t_in < end]
+        np.testing.assert_allclose(blows, hits, rtol=0.0, atol=1e-10)
+    return closings
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_random_lists(seed: int) -> None:
+    assert check(seed, 6) > 12
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(100, 120))
+def test_a_thousand_random_lists(seed: int) -> None:
+    assert check(seed, 50) > 100
