@@ -12,7 +12,8 @@ magnet    ``magnet_force(c, x, current)``, ``magnet_energy(c, x)``; for a coil d
           ``magnet_linkage(c, x, current)``, ``magnet_emf(c, x, current)``,
           ``magnet_inductance(c, x, current)`` and ``magnet_current(c, x, linkage, inductance)``
 coil      none: its circuit is the kernel's, `printhammer.kernel.model.circuit`
-spring    ``spring_force(c, x)``, ``spring_energy(c, x)``
+spring    ``spring_force(c, x)``, ``spring_energy(c, x)``; a law whose slope jumps also ``LEVELS`` = True and
+          ``spring_level(c, k)``, the position of the k-th jump
 pack      ``MEMORY``, ``pack_loading(c, x, v)``, ``pack_memory(c, peak)``, ``pack_unloading(c, x, v, q)``,
           ``pack_switch(c, x, v)``
 backstop  ``RIGID``, ``backstop_rebound(c, v_in)``, or with w = sqrt(b - x) ``backstop_elastic(c, w)``,
