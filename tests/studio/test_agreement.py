@@ -204,6 +204,38 @@ def test_a_page_fires_records_and_drivers_of_the_coil(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_a_page_follows_forces_and_contacts(tmp_path: Path) -> None:
+    contact = {"law": "hertz", "side": "front", "position": 0.3e-3, "stiffness": 1e5}
+    hammer = ph.Hammer.build(1e-3, name="listed").replace(
+        {
+            "spring": {"law": "preload", "preload": -0.5, "stiffness": 100.0},
+            "backstop": {"law": "rigid", "position": 0.0, "restitution": 0.3},
+            "force.weight": {"law": "gravity", "angle": "60 deg"},
+            "contact.make": contact,
+        }
+    )
+    wave = {"shape": "half-sine", "amplitude": 3.0, "width": 1.5e-3, "quantity": "force"}
+    state = {**STATE, "hammer": "listed", "waveform": wave, "rate": 300.0, "pulses": 3}
+    assert [control["key"] for control in describe(hammer)["constants"]] == [
+        "backstop.position",
+        "backstop.restitution",
+    ]
+    with Engine(Shelf(hammer, only=True), tmp_path) as engine:
+        curve = engine.work("curves", state)[0]
+    drive = ph.PulseTrain(
+        SHAPES["half-sine"](amplitude=3.0, width=1.5e-3, quantity="force"), rate=300.0, pulses=3
+    )
+    problem = Problem(hammer, drive, (hammer.rest, 0.0), 0.0, DISPLAY_TOLERANCE)
+    record = problem.run(end_of_run(hammer, drive, None))
+    motion = Motion(problem, record, float(record.nodes[-1, 0]), record.nodes[:, 0].copy(), "default")
+    assert len(motion.closings) >= 2
+    assert (curve["status"], curve["steps"]) == ("ok", motion.steps)
+    # Velocities are left out: at an impact, two of them belong to one time.
+    places = motion.at(np.minimum(curve["data"]["t"], motion.end))[0]
+    np.testing.assert_allclose(curve["data"]["x"], places, rtol=0.0, atol=SINGLE * np.abs(places).max())
+
+
+@pytest.mark.slow
 def test_the_page_agrees_with_python_for_500_states(tmp_path: Path) -> None:
     rng, names = np.random.default_rng(36), shipped()
     counts: dict[str, int] = {}
