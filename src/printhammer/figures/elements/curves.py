@@ -11,6 +11,7 @@ import numpy as np
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
+from printhammer.parts.spring.forces import LinearContact
 from printhammer.run.motion import Motion
 from printhammer.support.arrays import FloatArray
 
@@ -42,9 +43,14 @@ def fired(hammer: Hammer, times: Iterable[float] = (0.0,), duration: float | str
 
 
 def places(hammer: Hammer) -> dict[str, float]:
-    """Return the positions of backstop, pack and platen of a hammer, m, by name; absent ones omitted."""
+    """Return the positions of backstop, pack, platen and further contacts that exist, m, by name."""
     own = {"backstop": hammer.position, "pack": hammer.front, "platen": hammer.platen}
-    return {name: place for name, place in own.items() if place is not None}
+    contacts = {
+        key.partition(".")[2]: term.position
+        for key, term in hammer.terms.items()
+        if isinstance(term, LinearContact)
+    }
+    return {name: place for name, place in own.items() if place is not None} | contacts
 
 
 def times_of(motion: Motion, start: float | None = None, end: float | None = None) -> FloatArray:

@@ -111,6 +111,25 @@ def place_lines(ax: Axes, hammer: Hammer, shown: Scale, side: Literal["x", "y"] 
             beside(ax, name, (at, 1.0), (-2.5, -4), "right top", xycoords=ALONG_X, **how)
 
 
+def closed(ax: Axes, motion: Motion, time: Scale, way: Scale, colour: str) -> None:
+    """Draw a bar at the position of a further contact wherever the contact is closed."""
+    at = places(motion.hammer)
+    for closing in motion.closings:
+        end = motion.end if closing.t_out is None else closing.t_out
+        span = time.shown(np.array([closing.t_in, end]))
+        level = float(way.shown(at[closing.contact]))
+        ax.plot(
+            span,
+            [level, level],
+            color=colour,
+            lw=4.0,
+            alpha=0.45,
+            solid_capstyle="butt",
+            zorder=1.5,
+            gid="closed",
+        )
+
+
 def name_lines(ax: Axes, hammer: Hammer, shown: Scale) -> None:
     """Label the horizontal position lines near the right edge, away from curves."""
     low, high = ax.get_ylim()

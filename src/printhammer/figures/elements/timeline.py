@@ -72,6 +72,7 @@ def timeline(
         # Where motions coincide, the first one is on top.
         order = 3.0 - 0.1 * number
         marks.curve(panel, time.shown(grid), way.shown(path), gid, colour, zorder=order)
+        marks.closed(panel, motion, time, way, colour)
         if show_firings:
             fired = motion.drive.times[motion.drive.times <= until]
             marks.firings(panel, fired, time, colour if several else style.BLUE)
