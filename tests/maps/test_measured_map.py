@@ -1,5 +1,6 @@
 """Measured maps: what was recorded comes back, in whatever form, and odd files are told in one sentence."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -166,6 +167,16 @@ def test_odd_tables_are_told_with_column_and_line(write: Write, kind: str) -> No
     text, key = BAD_TABLES[kind]
     with refused(key):
         load_measured_map(write(text))
+
+
+def test_the_refusal_of_an_export_advises_columns_that_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "pico.csv"
+    path.write_text("Time,Channel A\n(ms),(V)\n\n0,-1\n1,1\n", encoding="utf-8")
+    with refused("Channel A", "Channel A") as caught:
+        load_measured_map(path)
+    (columns,) = re.findall("--columns such as '([^']*)'", str(caught.value.expected))
+    chart = load_measured_map(path, columns=columns)
+    np.testing.assert_allclose(chart["displacement"], [[-50e-6, 50e-6]])
 
 
 def test_odd_files(tmp_path: Path) -> None:

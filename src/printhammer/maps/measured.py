@@ -127,12 +127,14 @@ def _one_column_a_rate(table: Table, names: list[str], told: Columns | None) -> 
             continue
         try:
             rate = parse(name, "Hz")
-        except InputError as error:
+        except InputError:
+            number = told.sources[name].place if told else place + 1
             raise InputError(
-                f"{table.where}: column {name!r}: {error}; expected {_HEADINGS}",
+                f"{table.where}: {name!r}, the name of column {number}, is not a firing rate",
                 file=table.where,
                 key=name,
                 value=name,
+                expected=f"{_HEADINGS}, or --columns such as 'time=1, 500 Hz={number}*50 um/V'",
             ) from None
         if rate in rates.values():
             raise InputError(
@@ -143,7 +145,10 @@ def _one_column_a_rate(table: Table, names: list[str], told: Columns | None) -> 
         rates[name if told else name.lower()] = rate
     if not rates:
         raise InputError(
-            f"{table.where}: no column is named by a rate", file=table.where, key="rate", expected=_HEADINGS
+            f"{table.where}: no column is named by a rate",
+            file=table.where,
+            key="rate",
+            expected=f"{_HEADINGS}, or --columns such as 'time=1, 500 Hz=2*50 um/V'",
         )
     wanted = {"time": "s", **dict.fromkeys(rates, "m")}
     found = readings_of(table, wanted, gaps=list(rates), columns=told)
