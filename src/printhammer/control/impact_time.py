@@ -41,7 +41,7 @@ _CELLS: Final = "noise sampling_rate bits"
 
 
 class ImpactTime(Result, rows=_CELLS):
-    """Errors of impact times that are estimated from the coil's current or voltage, by sampling setting.
+    """Errors of impact times estimated from the coil's current or voltage, by sampling setting.
 
     Bias and standard deviation on the nominal hammer are due to noise, sampling and quantisation; bias and
     standard deviation over units also contain the differences between hammers, which averaging over dots does

@@ -52,7 +52,7 @@ def share_view(share: Share, floor: float | None = None) -> dict[str, Any]:
 
 
 def rates_view(report: Report) -> dict[str, Any] | None:
-    """Return the base rates of the claims, rarest first, on a logarithmic axis; None without base rates."""
+    """Return the base rates of the claims, rarest first, on a logarithmic axis; None without any."""
     rates = report.reconstruction.base_rates
     if rates is None:
         return None

@@ -52,7 +52,7 @@ _TIMES: Final = "member strobe"
 
 
 class Strobes(Result):
-    """States of all members at requested times, padded to the largest number of times; NaN after a run."""
+    """States of all members at requested times, NaN-padded and NaN after the end of a run."""
 
     t: FloatArray = column("s", "time", _TIMES)
     x: FloatArray = column("m", "displacement", _TIMES)

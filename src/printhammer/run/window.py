@@ -42,7 +42,7 @@ class Window(NamedTuple):
 
 
 class Single(NamedTuple):
-    """Outcome of a single pulse at the end of a window: completed run, flight time, distance from rest."""
+    """Outcome of a single pulse at the end of a window: completion, flight time, distance from rest."""
 
     ok: bool
     flight: float  # Flight time, s; NaN without a dot

@@ -225,7 +225,7 @@ class _Unit(NamedTuple):
 
 @dataclass(frozen=True)
 class LearningLaw:
-    """Learning law of a production: prior, test pulses, update of corrections; stores no unit's readings."""
+    """Learning law of a production: prior, test pulses, and update of corrections; holds no readings."""
 
     entries: Adjustable
     production: Production

@@ -58,7 +58,7 @@ def csv_head(head: Mapping[str, Any]) -> str:
 
 
 def read_table(text: str, suffix: str) -> dict[str, Any]:
-    """Parse the text of a table to the arguments of a `CompensationTable`; `suffix` is ".csv" or ".json".
+    """Parse a table file (suffix ".csv" or ".json") to the arguments of a `CompensationTable`.
 
     Raises
     ------

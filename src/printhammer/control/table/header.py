@@ -36,7 +36,7 @@ _ADVANCE, _, _DELAY, _BRAKE = range(len(COLUMNS))
 
 
 def bits_of(times: Mapping[str, FloatArray], tick: float) -> int:
-    """Return the integer width of a header's times, bits: 32 for nanoseconds, else 16 if all times fit."""
+    """Return the integer width of a header's times, bits: 32 for nanoseconds, else 16 if they fit."""
     largest = max(float(np.abs(np.rint(values / tick)).max()) for values in times.values())
     return 32 if tick == NANOSECOND or largest > np.iinfo(np.int16).max else 16
 
