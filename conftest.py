@@ -50,7 +50,6 @@ FIRST = [
     "test_orbits_closed_forms",
     "test_coil",
     "test_known_results",
-    "test_server",
     "test_continuation_impacts",
     "test_impact_print_hammer",
     "test_circuit_tangent",

@@ -2,11 +2,13 @@
 
 import json
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 from tests.studio.browser import Page
+from tests.studio.conftest import WHOLE
 
 import printhammer as ph
 from printhammer.hammer.file import VIEWS
@@ -23,6 +25,12 @@ FRAMES = {"line": "line", "strobe": "strobe", "map": "map"}
 @pytest.fixture
 def page(whole_page: Page) -> Page:
     return whole_page
+
+
+@pytest.fixture
+def kept_page(tabs: Callable[..., Page]) -> Page:
+    """The page with all views, for tests that leave only another state."""
+    return tabs(WHOLE)
 
 
 def state(page: Page) -> dict[str, Any]:
@@ -172,7 +180,8 @@ def test_the_keyboard_reaches_everything(page: Page) -> None:
 
 
 @pytest.mark.slow
-def test_the_pulse_is_dragged_at_its_handles(page: Page) -> None:
+def test_the_pulse_is_dragged_at_its_handles(kept_page: Page) -> None:
+    page = kept_page
     before = page.run("window.studio.studio.described.waveform")
     plane = page.box(".pulse canvas")
     # The axes of the editor: 1.3 times the peak above, 0.12 times below, and a quarter more than the pulse.
@@ -230,7 +239,8 @@ def test_presets_patterns_shapes_and_units(page: Page) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("dark", [False, True])
-def test_no_serious_finding_about_accessibility(page: Page, dark: bool) -> None:
+def test_no_serious_finding_about_accessibility(kept_page: Page, dark: bool) -> None:
+    page = kept_page
     page.size(1280, 720, dark=dark)
     page.run("for (const part of document.querySelectorAll('details')) part.open = true")
     page.run(AXE.read_text("utf-8") + "; 1")
@@ -244,7 +254,8 @@ def test_no_serious_finding_about_accessibility(page: Page, dark: bool) -> None:
 
 
 @pytest.mark.slow
-def test_rates_that_failed_are_counted_in_the_map(page: Page) -> None:
+def test_rates_that_failed_are_counted_in_the_map(kept_page: Page) -> None:
+    page = kept_page
     page.run(HELPERS)
     # So strong a current drives the armature away from where the law of the magnet holds.
     pulse = {"shape": "half-sine", "amplitude": -90.0, "width": 4e-4, "quantity": "current"}

@@ -1,5 +1,6 @@
 """The page in a browser: its header, its stories, the map under the finger, views that suit the device."""
 
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
@@ -13,11 +14,22 @@ QUIET = f"!{STUDIO}.busy && !{STUDIO}.stale && !document.querySelector('.outdate
 SHOWN = "[...document.querySelectorAll('.panel')].filter((each) => each.checkVisibility())"
 
 
+LINK = "#hammer=hendriks-1983"
+
+
 @pytest.fixture
-def page(address: str, opened_browser: Any) -> Any:
+def page(tabs: Callable[..., Page]) -> Iterator[Page]:
+    opened = tabs(LINK, 1440, 900)
+    yield opened
+    assert opened.complaints == []
+
+
+@pytest.fixture
+def own_page(address: str, opened_browser: Any) -> Iterator[Page]:
+    """The page opened for one test, which leaves it with another tab chosen, or with frames held back."""
     opened = opened_browser()
     opened.size(1440, 900)
-    opened.open(f"{address}#hammer=hendriks-1983")
+    opened.open(f"{address}{LINK}")
     opened.wait(f"window.studio && {SETTLED}")
     yield opened
     assert opened.complaints == []
@@ -122,7 +134,8 @@ def test_a_trace_has_offsets_a_name_a_residual_and_an_undo(page: Page) -> None:
     assert page.run(f"{STUDIO}.overlay === null && document.querySelector('.trace').hidden")
 
 
-def test_a_page_that_becomes_wide_or_narrow_shows_what_is_chosen(page: Page) -> None:
+def test_a_page_that_becomes_wide_or_narrow_shows_what_is_chosen(own_page: Page) -> None:
+    page = own_page
     shown = f"{SHOWN}.map((each) => each.classList[1])"
     page.size(390, 844)
     page.wait(f"{shown}.join() === 'view-map'")
@@ -132,7 +145,8 @@ def test_a_page_that_becomes_wide_or_narrow_shows_what_is_chosen(page: Page) -> 
     page.wait(f"{shown}.length === 4 && {shown}.includes('view-strobe')")
 
 
-def test_a_state_that_follows_another_is_marked_while_it_takes_long(page: Page) -> None:
+def test_a_state_that_follows_another_is_marked_while_it_takes_long(own_page: Page) -> None:
+    page = own_page
     page.run(
         "{ const { accept } = window.studio; let first = true; window.held = [];"
         " window.studio.accept = (frame) => { if (frame.kind !== 'motion' || first) accept(frame);"
