@@ -123,6 +123,26 @@ def test_the_file_beside_a_table(path: Path) -> None:
             read(path, None)
 
 
+@pytest.mark.parametrize(
+    ("columns", "advised", "first"),
+    [
+        ("current=2*-10", "2*-10 A/mV", -100.0),
+        ("current=2", "2*1 A/mV", 10.0),
+        ("current=2*-10 A", "2*-10 A/mV", -100.0),
+        ("voltage=2*3 mV", "2*3 mV/mV", 30e-3),
+    ],
+)
+def test_a_factor_without_its_unit_is_advised_with_it(
+    path: Path, columns: str, advised: str, first: float
+) -> None:
+    with refused("A") as caught:
+        read(path, columns)
+    assert str(caught.value.expected).endswith(advised)
+    name = columns.partition("=")[0]
+    values = read(path, f"{name}={advised}").values[name]
+    assert values[1] == pytest.approx(first)
+
+
 def test_advice_for_a_table_that_another_file_names(tmp_path: Path) -> None:
     """A sampled waveform has no option --columns: its columns are declared in the file beside the table."""
     path = tmp_path / "s.csv"

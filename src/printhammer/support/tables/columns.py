@@ -70,11 +70,20 @@ class Source:
                 expected=f"a factor, such as --columns '...={self.place}*1 {si}'",
             )
         if not self.unit:
+            if not is_unit_of(own, si):
+                raise InputError(
+                    f"column {self.place} is in {own}",
+                    value=own,
+                    expected=f"a factor per {own}, such as {self.place}*{self.factor:g} {si}/{own}",
+                )
             return self.factor * factor_of(own, si)
         if is_unit_of(self.unit, si):
             if own:
+                bare = f"{self.place} alone, or " if is_unit_of(own, si) else ""
                 raise InputError(
-                    f"{self.unit} is not a unit per {own}", value=self.unit, expected=f"{self.unit}/{own}"
+                    f"column {self.place} is in {own}, and {self.unit} is not a unit per {own}",
+                    value=self.unit,
+                    expected=f"{bare}{self.place}*{self.factor:g} {self.unit}/{own}",
                 )
             return self.factor * factor_of(self.unit, si)
         above, _slash, below = self.unit.rpartition("/")

@@ -338,9 +338,7 @@ def _values(table: Table, name: str, source: Source, si: str, gaps: bool) -> Flo
     numbers = _floats(table, name, cells, heading.unit or source.unit, si, gaps)
     place = heading.name or name
     with located(f"{table.where}: {place}", file=table.where, key=place):
-        if heading.unit and (source.factor, source.unit) == (1.0, ""):
-            # The unit is checked separately from the range of the number.
-            to_si(1.0, heading.unit, si)
+        if is_unit_of(heading.unit, si) and (source.factor, source.unit) == (1.0, ""):
             array = _to_si(numbers, heading.unit, si)
         else:
             array = np.array(numbers, dtype=np.float64) * source.scale(heading.unit, si)
