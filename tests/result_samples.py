@@ -82,6 +82,7 @@ def learning(hammer: Hammer) -> Result:
         multiplier=np.array([np.nan, 0.7]),
         expected=np.array([np.nan, 0.9]),
         certainty=np.array([np.nan, 0.6]),
+        loop_certainty=np.array([np.nan, 0.8]),
         slot=np.array([192, 194, 195]),
         force_deviation=off,
         arrival_deviation=1e-4 * off,

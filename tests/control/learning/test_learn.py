@@ -10,9 +10,20 @@ from tests.hammers import crude
 
 import printhammer as ph
 from printhammer.control.learning.belief import Belief, Mode
-from printhammer.control.learning.law import IN_CYCLE, MARGIN, RUNS, WIDTH, LearningLaw, order_good
+from printhammer.control.learning.law import (
+    COMPARED,
+    IN_CYCLE,
+    MARGIN,
+    RUNS,
+    WIDTH,
+    LearningLaw,
+    Verdict,
+    better_loop,
+    order_good,
+    order_loops,
+)
 from printhammer.control.learning.learn import table_of
-from printhammer.control.learning.learner import Learner
+from printhammer.control.learning.learner import Learner, is_explained
 from printhammer.control.learning.lines import DOTS, LINE, Press, Rung, candidates, printed
 from printhammer.control.learning.sensor import ImpactSensor, Readings
 from printhammer.control.pulses import of_width
@@ -92,6 +103,54 @@ def test_the_open_loop_is_left_for_a_gain_without_harm_only(
     monkeypatch.setattr(Press, "multipliers", lambda self, settings: growing)
     assert not gains(law, believed(law, 0.01))
     assert gains(replace(law, doubt=0.1), believed(law, 0.01))
+
+
+def test_the_usual_open_loop_is_left_if_the_posterior_is_sure_only() -> None:
+    """Shares of good dots on ten hammers: the usual loop prints 0.7 of them, the other the values below."""
+    usual = np.full(10, 0.7)
+    for other, expected in (
+        (np.full(10, 0.8), (0, 1.0)),  # Better on all
+        (np.append(np.full(9, 0.8), 0.6), (0, 0.9)),  # Worse on one of ten
+        (np.append(np.full(8, 0.8), [0.6, 0.6]), (1, 0.2)),  # Worse on two: not decided
+        (np.append(np.full(9, 0.7), 0.1), (1, 1.0)),  # Never better
+        (usual, (1, 1.0)),  # Equal
+        (np.append(np.full(9, 0.71), 0.0), (1, 0.1)),  # Better on nine, and worse in the mean
+    ):
+        assert better_loop(np.array([other, usual]), 1) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("usual", [0, 1])
+def test_a_posterior_that_knows_the_unit_chooses_its_better_open_loop(law: LearningLaw, usual: int) -> None:
+    """The nominal hammer prints more dots in one of the open loops, whichever is usual."""
+    (unit,) = law.production.hammers(np.zeros((1, law.production.size)))
+    assert unit is not None
+    loops, task = law.entries.loops, law.entries.task
+    press = law.production.press([unit])
+    shares = [good.mean() for good in printed(order_loops(press, law.entries), task)]
+    assert abs(shares[0] - shares[1]) > 0.1
+    verdict = Verdict(False, loops[usual], np.nan, np.nan, np.nan, np.nan)
+    other = replace(law, first=loops[usual])
+    chosen = printed(other.choose_loop(believed(law, 1e-4), verdict), task)
+    assert chosen.loop.pulse is loops[int(np.argmax(shares))].pulse
+    assert chosen.loop_certainty == 1.0
+    assert chosen.expected == pytest.approx(max(shares), abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("level", "misfit", "explained"), [(0.0, 1.05, True), (0.1, 1.05, False), (0.0, 1.3, False)]
+)
+def test_a_search_that_ended_on_the_way_decides_nothing(level: float, misfit: float, explained: bool) -> None:
+    """The misfit of 145 readings is 1 with a standard error of 6 %."""
+    mode = Mode(np.zeros(3), np.eye(3), np.zeros(145), level, 1.0, misfit)
+    assert is_explained(Belief.of([mode])) is explained
+
+
+def test_the_line_that_compares_open_loops_has_their_histories_and_rows() -> None:
+    """Three rows, with a dot in each slot, each second and each third, each from rest."""
+    assert COMPARED[: len(LINE)] == LINE
+    steps = np.diff(COMPARED[len(LINE) :])
+    assert len(COMPARED) == 60
+    assert steps.tolist() == [*[1] * 23, 9, *[2] * 11, 9, *[3] * 7]
 
 
 def test_a_start_from_the_hammer_believed_in_prints_all_its_dots(law: LearningLaw) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import printhammer as ph
-from printhammer.control.learning.law import IN_CYCLE, JUDGED, PRINTED, RUNS, LearningLaw
+from printhammer.control.learning.law import COMPARED, IN_CYCLE, JUDGED, PRINTED, RUNS, SURE, LearningLaw
 from printhammer.control.learning.learn import Progress, calibrate
 from printhammer.control.learning.learner import MISFIT, Learner
 from printhammer.control.learning.lines import DOTS, LINE, Press, Rung
@@ -57,6 +57,8 @@ def test_learning_depends_on_readings_and_on_nothing_else_of_the_unit(
         len(time): Readings(time, force),
         len(LINE): Readings(line.flight_time[0], line.peak_force[0] / single.force),
     }
+    longer = press.line([law.entries.open_loop], COMPARED)[0]
+    shown[len(COMPARED)] = Readings(longer.flight_time[0], longer.peak_force[0] / single.force)
 
     class Deaf(ImpactSensor):
         def read(self, flight: np.ndarray, force: np.ndarray, unit: int, run: int) -> Readings:
@@ -67,14 +69,14 @@ def test_learning_depends_on_readings_and_on_nothing_else_of_the_unit(
     assert one.corrections.any()
     assert set(vars(one)) == {
         *("law", "stage", "corrections", "belief", "contractions"),
-        *("verdict", "_started", "_ladders", "_line", "_first"),
+        *("verdict", "_started", "_ladders", "_line", "_first", "_compared"),
     }
 
 
 @pytest.mark.slow
 def test_expectations_come_from_readings(learned: tuple[list[Learner], list[Progress]]) -> None:
     first, *others = learned[1]
-    for name in ("misfit", "multiplier", "expected", "certainty"):
+    for name in ("misfit", "multiplier", "expected", "certainty", "loop_certainty"):
         assert np.isnan(getattr(first, name)).all()
     for stage in others:
         assert (stage.misfit < MISFIT).all()
@@ -111,6 +113,29 @@ def test_nothing_is_lost_where_the_own_pulse_prints_every_dot() -> None:
     (unit,) = Variability().times(0.5).draw(nominal(), 1, 1)
     _learners, stages = calibrate(law, [unit], ImpactSensor(seed=7))
     assert (worse(law, unit, stages) <= 0.0).all()
+
+
+class Hidden(ImpactSensor):
+    """A sensor with another constant offset for each unit, up to 50 us, which nobody states."""
+
+    def read(self, flight: np.ndarray, force: np.ndarray, unit: int, run: int) -> Readings:
+        delay = np.random.default_rng(unit).uniform(-50e-6, 50e-6)
+        return Readings(super().read(flight, force, unit, run).time + delay, None)
+
+
+@pytest.mark.slow
+def test_no_unit_is_below_the_better_open_loop_where_the_readings_decide(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """After one run of random units at the safe rate; otherwise the result says that they do not decide."""
+    monkeypatch.setattr("printhammer.control.learning.learn.RUNS", RUNS[:1])
+    law, count = law_for(nominal(), 850.0, members=100)[0], 6
+    units = Variability().draw(nominal(), count, 4403)
+    stages = calibrate(law, units, Hidden(seed=3))[1]
+    below = np.array([worse(law, unit, stages, k)[0] for k, unit in enumerate(units)])
+    decided = stages[1].learned | (stages[1].loop_certainty >= SURE)
+    assert decided.any()
+    assert (below[decided] <= 0.0).all()
 
 
 class Odd(ImpactSensor):

@@ -173,6 +173,9 @@ _LEAST_LAW: Final = 1e-2  # Lower bound of the fraction a of the model error tha
 _OTHERS: Final = 4  # Number of posterior samples on which the convergence condition is checked
 _ALIKE: Final = 24  # Number of posterior samples on which table and open loops are compared
 _GAIN: Final = 0.02  # Smallest mean gain of a table, as a fraction of the dots, with which it is used
+SURE: Final = 0.9
+"""Smallest fraction of posterior samples that agree on the better open loop, to choose it; arbitrary."""
+
 TRIED: Final = slots_of(cycle_with_lead_in(6, 0))
 """Slots of the line that evaluates corrections by simulation: the de Bruijn cycle of order 6."""
 
@@ -189,6 +192,21 @@ PRINTED: Final = _judged_slots()
 """Slots of the pattern that tables are tested with: the cycle with its lead-in, and rows of 200 slots, each
 from rest."""
 
+_BRIEF: Final = 24  # Number of slots of a row of `COMPARED`; arbitrary
+
+
+def _compared_slots() -> tuple[int, ...]:
+    """List the slots of the line that compares open loops: the short cycle, and short rows from rest."""
+    slots = LINE
+    for step in STEPS:
+        slots += tuple(slots[-1] + 1 + SLOTS + slot for slot in range(0, _BRIEF, step))
+    return slots
+
+
+COMPARED: Final = _compared_slots()
+"""Slots of the line that is printed once in each open loop, so that the readings decide between them: the
+cycle of the test line, and rows of 24 slots, each from rest."""
+
 JUDGED: Final = np.asarray(PRINTED) >= LEAD_IN
 """Mask of the dots of `PRINTED` that are evaluated, shape (dots,): all except the lead-in."""
 
@@ -204,6 +222,9 @@ class Verdict(NamedTuple):
     multiplier: float  # Largest absolute multiplier of rows printed with the table; NaN if no row is periodic
     expected: float  # Mean fraction of dots within limits, with the drive that is used
     certainty: float  # Fraction of the samples that print every dot within limits with the drive that is used
+    # Fraction of the samples that print no fewer dots in `loop` than in another open loop; NaN if no
+    # posterior explains the readings in both
+    loop_certainty: float
 
 
 class Update(NamedTuple):
@@ -239,6 +260,11 @@ class LearningLaw:
     rows: FloatArray  # Constants of simulated hammers, (members, size): starting points of searches
     seen: FloatArray  # Readings of the simulated hammers, (members, readings)
     first: OpenLoop  # Open-loop drive with the larger mean fraction of good dots over the production
+
+    @property
+    def alone(self) -> float:
+        """Certainty of the choice of an open loop without a comparison: 1 for a single open loop, or NaN."""
+        return 1.0 if len(self.entries.loops) == 1 else float("nan")
 
     def update(self, belief: Belief, corrections: FloatArray, unexplained: FloatArray) -> Printing[Update]:
         """Compute the corrections after a stage; yield the test lines that simulated hammers have to print.
@@ -278,6 +304,22 @@ class LearningLaw:
             left, found = min((left, found), other, key=lambda end: end[0])
         verdict = yield from self._compare(alike, found)
         return Update(found, contraction, verdict, left)
+
+    def choose_loop(self, belief: Belief, verdict: Verdict) -> Printing[Verdict]:
+        """Choose the open loop of a unit from its posterior given readings of `COMPARED` in all loops."""
+        drawn = self.production.hammers(belief.draw(_ALIKE, self.seed))
+        press = self.production.press([each for each in drawn if each is not None])
+        others = yield from order_loops(press, self.entries)
+        loops = self.entries.loops
+        usual = next(k for k, loop in enumerate(loops) if loop.pulse is self.first.pulse)
+        chosen, certainty = better_loop(np.array([good.mean(axis=1) for good in others]), usual)
+        good = others[chosen]
+        return verdict._replace(
+            loop=loops[chosen],
+            expected=float(good.mean()),
+            certainty=float(good.all(axis=1).mean()),
+            loop_certainty=certainty,
+        )
 
     def started_anew(self, belief: Belief) -> LearningLaw | None:
         """Return a copy of the law that starts from a table tuned for the most probable hammer.
@@ -379,12 +421,26 @@ class LearningLaw:
         chosen = next((k for k in range(len(loops)) if self._leads(shares[k], shares[[chosen]])), chosen)
         good = table if gains else others[chosen]
         every = float(good.all(axis=1).mean())
-        return Verdict(gains, loops[chosen], float(np.fmax.reduce(growth)), float(good.mean()), every)
+        most = float(np.fmax.reduce(growth))
+        return Verdict(gains, loops[chosen], most, float(good.mean()), every, self.alone)
 
     def _leads(self, share: FloatArray, others: FloatArray) -> bool:
         """Whether a drive gains `_GAIN` on average, and loses dots on at most `doubt` of the hammers."""
         harmless = np.quantile(share - others.max(axis=0), self.doubt) >= 0.0
         return bool(harmless and share.mean() - others.mean(axis=1).max() >= _GAIN)
+
+
+def better_loop(shares: FloatArray, usual: int) -> tuple[int, float]:
+    """Choose an open loop from the fraction of good dots in each loop on each sample, (loops, samples).
+
+    The usual open loop, with index `usual`, is left only for a loop with a larger mean fraction, in which at
+    least the fraction `SURE` of the samples print no fewer dots than in any other. The result is the index of
+    the chosen loop, and the fraction of the samples that print no fewer dots with this loop.
+    """
+    mean, sure = shares.mean(axis=1), (shares >= shares.max(axis=0)).mean(axis=1)
+    better = (sure >= SURE) & (mean > mean[usual])
+    chosen = int(np.argmax(np.where(better, mean, -np.inf))) if better.any() else usual
+    return chosen, float(sure[chosen])
 
 
 def order_loops(press: Press, entries: Adjustable) -> Printing[list[BoolArray]]:

@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple, SupportsIndex, Unpack
 
 import numpy as np
 
-from printhammer.control.learning.law import JUDGED, PRINTED, RUNS, LearningLaw
+from printhammer.control.learning.law import COMPARED, JUDGED, PRINTED, RUNS, SURE, LearningLaw
 from printhammer.control.learning.learner import Learner
 from printhammer.control.learning.lines import DOTS, LINE, Press, printed
 from printhammer.control.learning.preparation import DOUBT, FORGETTING, MEMBERS, law_for
@@ -46,6 +46,7 @@ class Progress(NamedTuple):
     multiplier: FloatArray
     expected: FloatArray
     certainty: FloatArray
+    loop_certainty: FloatArray
 
     @property
     def good(self) -> BoolArray:
@@ -53,7 +54,29 @@ class Progress(NamedTuple):
         return np.asarray(self.cycle.good[:, JUDGED])
 
 
-_SAID: Final = ("multiplier", "expected", "certainty")  # Fields of `Verdict`, in the order of `Progress`
+# Fields of `Verdict`, in the order of `Progress`
+_SAID: Final = ("multiplier", "expected", "certainty", "loop_certainty")
+
+
+def compare(press: Press, learners: Sequence[Learner], sensor: ImpactSensor) -> None:
+    """Print the line `COMPARED` once in each open loop, and store the readings in the learners.
+
+    All learners have the same learning law. With a single open loop there is nothing to compare.
+    """
+    loops, single = learners[0].law.entries.loops, press.task.single.nominal
+    if len(loops) == 1:
+        return
+    count = len(learners)
+    dots = [press.line([loop.settings] * count, COMPARED, [loop.pulse] * count)[0] for loop in loops]
+    for unit, learner in enumerate(learners):
+        learner.compare(
+            [
+                sensor.read(
+                    shown.flight_time[unit], shown.peak_force[unit] / single.force, unit, 2 * sum(RUNS) + k
+                )
+                for k, shown in enumerate(dots)
+            ]
+        )
 
 
 def calibrate(
@@ -73,6 +96,7 @@ def calibrate(
     learners = [Learner(law) for _ in units]
     single = task.single.nominal
     run, history = 0, []
+    compare(press, learners, sensor)
 
     def record(line: Judgement) -> None:
         settings, pulses = ([getattr(each, name) for each in learners] for name in ("printed", "pulse"))
@@ -140,7 +164,11 @@ class Learning(Result, rows=_DOTS):
     variability: Variability = part("the variability of the production")
     limits: Limits = part("the limits of force and arrival")
     dots: IntArray = coordinate(
-        "1", "number of test dots printed before the stage", "stage", name="dots_learned"
+        "1",
+        "number of test dots printed before the stage",
+        "stage",
+        name="dots_learned",
+        more="without the line that compares the open loops",
     )
     learned: BoolArray = column(
         "1", "whether the learned table is used, rather than an open loop", "stage", dtype=np.int8
@@ -168,6 +196,13 @@ class Learning(Result, rows=_DOTS):
         "fraction of posterior samples that print every dot within limits",
         "stage",
         more="NaN without an expected fraction",
+    )
+    loop_certainty: FloatArray = column(
+        "1",
+        "fraction of posterior samples that print no fewer dots in the open loop in use than in the other",
+        "stage",
+        more="below 0.9, the readings do not decide between the two; NaN where no posterior explains the"
+        " readings in both, or the table is used; 1 for a single open loop",
     )
     slot: IntArray = coordinate("1", "number of the slot", "dot", name="slot")
     force_deviation: FloatArray = column(
@@ -201,6 +236,7 @@ class Learning(Result, rows=_DOTS):
             Cells("multiplier\nof rows", self.multiplier, "", ".2f"),
             Cells("dots expected\nwithin limits", [_percent(share) for share in self.expected]),
             Cells("all dots\nlikely", [_percent(share) for share in self.certainty]),
+            Cells("this loop\nbetter", [_percent(share) for share in self.loop_certainty]),
             Cells("within limits\non the unit", [_percent(share) for share in self.share]),
             Cells("worst force", [f"{100.0 * _worst(force):.1f} %" for force in self.force_deviation]),
             Cells("worst arrival", [_worst(arrival) for arrival in self.arrival_deviation], "s"),
@@ -216,9 +252,14 @@ class Learning(Result, rows=_DOTS):
             ),
         ]
         unit = self.table.serial
+        undecided = (
+            "The readings do not decide which of the two open loops prints more dots on this unit."
+            " Force readings help."
+        )
         return Summary(
             [
                 Grid(stages, f"Unit {unit} of {self.hammer.name} at {self.rate:g} Hz"),
+                *([undecided] if not self.learned[-1] and not self.loop_certainty[-1] >= SURE else []),
                 Grid(constants, f"Constants of unit {unit}, from its readings"),
             ]
         )
@@ -290,7 +331,11 @@ def learn(
     and the variability of the production. The first line is printed in open loop. The table is used only if
     the posterior explains the readings, and if no posterior sample prints fewer dots of the test cycle and of
     rows of 200 slots with the table than in open loop, or a row in which errors grow from dot to dot.
-    Otherwise the better of two open-loop drives is used: the pulse of the driver, or the hammer's own pulse.
+    Otherwise one of two open-loop drives is used: the pulse of the driver, or the hammer's own pulse. Before
+    the first run, the unit prints a short line in both. Of the two, the drive that prints more dots over the
+    production is used, unless 90 % of the posterior samples given all readings print no fewer dots with the
+    other. `loop_certainty` of the result is that fraction for the drive in use; below 0.9, or NaN, the
+    readings do not decide between the two drives.
 
     Parameters
     ----------

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from printhammer.control.learning.belief import Belief, Evidence, believe
-from printhammer.control.learning.law import BAD, RUNS, LearningLaw, Verdict
-from printhammer.control.learning.lines import LINE
+from printhammer.control.learning.belief import LEVELS, Belief, Evidence, believe
+from printhammer.control.learning.law import BAD, COMPARED, RUNS, LearningLaw, Verdict
+from printhammer.control.learning.lines import LINE, DrivenLine
 from printhammer.control.learning.sensor import Readings
 from printhammer.support.arrays import FloatArray
 from printhammer.support.threads import translated
@@ -28,6 +29,7 @@ MISFIT: Final = 2.0
 
 Arbitrary; units of the production leave 0.7 to 1.6, whatever the offset of the sensor."""
 
+_ERRORS: Final = 3.0  # Largest excess of the misfit over 1 of a comparison, in standard errors; arbitrary
 _STARTED: Final = 3  # Maximum number of tables tuned for the most probable hammer
 _LATE: Final = (
     2  # Stages before an unstable row leads to a new table; arbitrary, since early posteriors are wide
@@ -44,10 +46,11 @@ class Mean(NamedTuple):
 class Learner:
     """Run-to-run calibration of the compensation table of one unit by a learning law.
 
-    The better open loop is used during the first stage. Later stages use it in three cases: no hammer of the
-    production explains the readings; more posterior samples than the doubt allows would print fewer dots
-    within limits with the table than in open loop, or a row in which errors grow; or the mean gain is below 2
-    % of the dots.
+    An open loop is used during the first stage. Later stages use an open loop in three cases: no hammer of
+    the production explains the readings; more posterior samples than the doubt allows would print fewer dots
+    within limits with the table than in open loop, or a row in which errors grow; or the mean gain is below
+    2 % of the dots. The open loop is the better one of the production, or another one that readings of the
+    unit in both open loops show to be better.
 
     Parameters
     ----------
@@ -67,6 +70,7 @@ class Learner:
         self._ladders: list[FloatArray] = []
         self._line: list[FloatArray] = []
         self._first: Mean | None = None
+        self._compared: list[Mean] = []
 
     @property
     def finished(self) -> bool:
@@ -104,6 +108,11 @@ class Learner:
         self._ladders.append(self._normalise(ladder))
         self._line.append(self._normalise(line))
 
+    def compare(self, lines: Sequence[Readings]) -> None:
+        """Store the readings of the line `COMPARED`, printed once in each open loop."""
+        noise = self.law.production.noise[:, None]
+        self._compared = [mean([self._normalise(line)], noise) for line in lines]
+
     def _normalise(self, readings: Readings) -> FloatArray:
         """Normalise readings by the limits, shape (measured, dots)."""
         limits, shown = self.law.entries.task.limits, [readings.time]
@@ -121,8 +130,10 @@ class Learner:
         if self._first is None:
             self._first = line
         lines = [self._first] if not self.stage else [self._first, line]
-        settings = [law.entries.open_loop, self.settings][: len(lines)]
-        self.belief = yield from self._believe([mean(self._ladders, noise), *lines], settings)
+        means = [mean(self._ladders, noise), *lines]
+        drives = [DrivenLine(each, law.entries.task.pulse) for each in (law.entries.open_loop, self.settings)]
+        drives = drives[: len(lines)]
+        self.belief = yield from self._believe(means, drives, self.belief)
         unexplained = np.zeros((2, len(LINE)))
         if self.stage:
             shown = self.belief.modes[0].predicted.reshape(law.production.measured, -1)[:, -len(LINE) :]
@@ -144,23 +155,33 @@ class Learner:
         if self.misfit > MISFIT:
             # A posterior that does not explain the readings is no basis for a decision.
             self.verdict = _unknown(law)
+        elif self._compared and not self.verdict.gains:
+            loops = [DrivenLine(loop.settings, loop.pulse, COMPARED) for loop in law.entries.loops]
+            both = yield from self._believe([*means, *self._compared], [*drives, *loops], self.belief)
+            if is_explained(both):
+                self.verdict = yield from law.choose_loop(both, self.verdict)
         self.contractions.append(update.contraction)
         self._line = []
         self.stage += 1
 
-    def _believe(self, means: Sequence[Mean], settings: Sequence[FloatArray]) -> Printing[Belief]:
+    def _believe(
+        self, means: Sequence[Mean], drives: Sequence[DrivenLine], before: Belief | None
+    ) -> Printing[Belief]:
+        """Estimate the constants from mean readings of the ladder and of lines with drives."""
         law = self.law
         measured = law.production.measured
         value = np.concatenate([each.value for each in means], axis=1)
         count = np.concatenate([each.seen for each in means], axis=1)
         noise = np.hypot(law.production.noise[:, None] / np.sqrt(np.maximum(count, 1.0)), _FLOOR)
         rough = np.array([each.rest for each in law.shown]).reshape(measured, -1)
-        # All later lines are assigned the surrogate residual of the open-loop line.
-        rough = np.concatenate([rough, rough[:, -len(LINE) :]], axis=1)[:, : value.shape[1]]
+        # Later lines have the surrogate residuals of the line in open loop, repeated.
+        line = rough[:, -len(LINE) :]
+        rough = np.concatenate([rough, *[line] * -(-value.shape[1] // len(LINE))], axis=1)
+        rough = rough[:, : value.shape[1]]
         evidence = Evidence(value.ravel(), noise.ravel(), rough.ravel())
 
         def predict(asked: list[FloatArray]) -> Printing[list[FloatArray]]:
-            shown = yield from law.production.readings(np.concatenate(asked), law.rungs, settings)
+            shown = yield from law.production.readings(np.concatenate(asked), law.rungs, drives)
             return np.split(shown, np.cumsum([len(rows) for rows in asked])[:-1])
 
         # Searches start at the simulated hammers whose readings are nearest, at the coarsest level.
@@ -169,8 +190,8 @@ class Learner:
         off = value[shown] - law.seen.reshape(-1, measured, known)
         apart = (off / np.hypot(noise, rough)[shown]) ** 2
         places = np.argsort(np.nan_to_num(apart, nan=1.0).sum(axis=(1, 2)), kind="stable")[:_STARTS]
-        before = [] if self.belief is None else [mode.mean for mode in self.belief.modes]
-        search = believe(evidence, list(law.rows[places]), before)
+        modes = [] if before is None else [mode.mean for mode in before.modes]
+        search = believe(evidence, list(law.rows[places]), modes)
         return (yield from translated(search, predict))
 
 
@@ -188,7 +209,19 @@ def mean(readings: Sequence[FloatArray], noise: FloatArray) -> Mean:
 
 def _unknown(law: LearningLaw) -> Verdict:
     """Return the decision before the first reading: the better open-loop drive of the production."""
-    return Verdict(False, law.first, *[float("nan")] * 3)
+    unknown = float("nan")
+    return Verdict(False, law.first, unknown, unknown, unknown, law.alone)
+
+
+def is_explained(belief: Belief) -> bool:
+    """Whether a posterior explains readings within their noise, without a search that stopped on the way.
+
+    In a row in which errors hardly decay, readings are strongly nonlinear in the constants, and a search may
+    end at a local optimum. The misfit is then above 1 by more than its statistical error, 1 / sqrt(2 N).
+    """
+    mode = belief.modes[0]
+    most = 1.0 + _ERRORS / math.sqrt(2.0 * mode.predicted.size)
+    return mode.level == LEVELS[-1] and mode.misfit <= most
 
 
 def _model_error(rest: FloatArray, noise: FloatArray) -> FloatArray:

@@ -204,6 +204,14 @@ LINE: Final = slots_of(cycle_with_lead_in(5, 0))
 """Slots of the test line: the de Bruijn cycle of order 5, in which every history of two gaps occurs."""
 
 
+class DrivenLine(NamedTuple):
+    """Test line of a drive: table settings, shape (4, entries), waveform, and slots with a dot."""
+
+    settings: FloatArray
+    pulse: Waveform
+    slots: tuple[int, ...] = LINE
+
+
 class Order(NamedTuple):
     """Print job to simulate: hammers, a drive for each hammer, and the end time."""
 

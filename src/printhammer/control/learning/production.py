@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.control.learning.lines import LINE, Press, Rung
+from printhammer.control.learning.lines import DrivenLine, Press, Rung
 from printhammer.control.learning.sensor import ImpactSensor
 from printhammer.control.table.task import Task
 from printhammer.hammer.hammer import Hammer
@@ -86,7 +86,7 @@ class Production:
         return Press(self.task, self.rate, hammers)
 
     def readings(
-        self, rows: FloatArray, rungs: Sequence[Rung], lines: Sequence[FloatArray]
+        self, rows: FloatArray, rungs: Sequence[Rung], lines: Sequence[DrivenLine]
     ) -> Printing[FloatArray]:
         """Predict the readings of test pulses and test lines for parameter rows, shape (M, size).
 
@@ -95,13 +95,17 @@ class Production:
         hammers = self.hammers(rows)
         there = [k for k, hammer in enumerate(hammers) if hammer is not None]
         press = self.press([hammer for hammer in hammers if hammer is not None])
-        count = sum(rung.dots for rung in rungs) + len(LINE) * len(lines)
+        count = sum(rung.dots for rung in rungs) + sum(len(line.slots) for line in lines)
         shown = np.full((len(rows), 2, count), np.nan)
         if there:
             single = self.task.single.nominal
             parts = [press.order_ladder(rungs)] if rungs else []
             parts += [
-                _readings_of(press.order_line([settings] * len(there)), single.force) for settings in lines
+                _readings_of(
+                    press.order_line([line.settings] * len(there), line.slots, [line.pulse] * len(there)),
+                    single.force,
+                )
+                for line in lines
             ]
             told = yield from together(parts)
             shown[there] = np.concatenate([np.stack(part, axis=1) for part in told], axis=2)
