@@ -11,6 +11,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from tests.studio.reading import STATE, node
+from tests.support.tables import exports
 
 import printhammer as ph
 from printhammer.drive.file import read_drive
@@ -18,7 +19,9 @@ from printhammer.drive.waveforms.shapes import SHAPES, Sampled
 from printhammer.studio import Shelf, live
 from printhammer.studio.controls import fields_of
 from printhammer.studio.launch import FORMAT, KIND
+from printhammer.support.tables.layout import layout_of
 from printhammer.support.tables.readings import read_table
+from printhammer.support.tables.text import decoded
 from printhammer.units import parse
 
 NAME = "hendriks-1983-1"
@@ -37,6 +40,7 @@ ASKED = """
     return [...dropped({ name: "a.csv", text, columns: null }, shelf).data.t];
   },
   wide: (cell, n, between) => recordOf(Array(n).fill(cell).join(between), "a.csv", null, shelf.limits),
+  layout: (text) => layoutOf(text, "a.csv"),
   table: (text, told) => {
     const { data, ...rest } = recordOf(text, "a.csv", told, shelf.limits);
     return { ...rest, data: Object.fromEntries(Object.entries(data).map(([key, list]) => [key, [...list]])) };
@@ -272,17 +276,46 @@ heads = st.sampled_from(
 )
 
 
+facts = st.sampled_from(
+    [
+        "Model,XYZ",
+        "Sample Interval,1e-6",
+        "XInc:,2 us",
+        "t0 = -1 ms",
+        "dt = 10 us,t0 = 1",
+        "XOrg:,-4e-06",
+        "Start,0",
+        "Zero Index,2",
+        "Horizontal Units,ms",
+        "Vertical Units,V,mA",
+        "LECROY,1",
+        "# Sample rate: 1 MHz",
+        "; sigrok",
+        "Points,3",
+        "",
+    ]
+)
+
+
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 @given(
+    above=st.lists(facts, max_size=3),
     names=st.lists(heads, min_size=2, max_size=3),
     rows=st.lists(st.lists(cells, min_size=2, max_size=3), min_size=2, max_size=4),
     separator=st.sampled_from([",", ";", "\t"]),
     end=st.sampled_from(["\n", "\r\n"]),
 )
 def test_a_table_that_is_read_is_read_as_python_reads_it(
-    ask: Any, tmp_path: Path, names: list[str], rows: list[list[str]], separator: str, end: str
+    ask: Any,
+    tmp_path: Path,
+    above: list[str],
+    names: list[str],
+    rows: list[list[str]],
+    separator: str,
+    end: str,
 ) -> None:
-    text = end.join(separator.join(row) for row in [names, *rows])
+    written = [line.replace(",", separator) for line in above]
+    text = end.join([*written, *(separator.join(row) for row in [names, *rows])])
     found = ask("table", text, None)
     if found.get("found", {}).get("what") != "curves":
         return
@@ -293,3 +326,46 @@ def test_a_table_that_is_read_is_read_as_python_reads_it(
     assert {name.replace("time", "t") for name in expected} == set(data)
     for name, values in expected.items():
         np.testing.assert_allclose(data[name.replace("time", "t")], values, rtol=1e-12, atol=1e-300)
+
+
+def columns_said(export: exports.Export, headings: list[dict[str, Any]]) -> list[list[str]] | None:
+    """Return what is said of the columns of an export as answers of the page; None if its heading says all."""
+    if not export.columns:
+        return None
+    answers = [["", ""] for _ in headings]
+    for entry in export.columns.split(", "):
+        name, _, source = entry.partition("=")
+        place, _, factor = source.partition("*")
+        if place.isdigit():
+            # An offset is set in the page.
+            amount = factor.partition(" +")[0]
+            answers[int(place) - 1] = [name, amount or headings[int(place) - 1]["unit"]]
+    return answers
+
+
+@pytest.mark.parametrize("name", exports.EXPORTS)
+def test_the_layout_of_an_export_is_that_of_python(ask: Any, name: str) -> None:
+    """Separator, headings, units, numbers, and the times that metadata state."""
+    export = exports.EXPORTS[name]()
+    text = decoded(export.content, "a.csv")
+    expected, found = layout_of(text, "a.csv"), ask("layout", text)["found"]
+    assert [(each["name"], each["unit"]) for each in found["headings"]] == expected.columns
+    assert [each["cells"] for each in found["rows"]] == [
+        [cell.strip() for cell in row][: len(each["cells"])]
+        for row, each in zip(expected.rows, found["rows"], strict=True)
+    ]
+    assert [each["line"] for each in found["rows"]] == expected.lines
+    clock = found["clock"]
+    assert (clock and (clock["start"], clock["step"], clock["numbers"])) == expected.clock
+    # What the heading leaves open is answered.
+    answers = columns_said(export, found["headings"])
+    if name not in ("sigrok", "start and step"):
+        data = ask("table", text, answers)["found"]["data"]
+        if name == "Saleae, edges":
+            return
+        np.testing.assert_allclose(data["t"], exports.TIMES, rtol=1e-6, atol=1e-15)
+        if "current" in data:
+            np.testing.assert_allclose(data["current"], exports.CURRENT, atol=1e-5)
+        if "displacement" in data:
+            offset = data["displacement"][0] - exports.PLACES[0]
+            np.testing.assert_allclose(np.subtract(data["displacement"], offset), exports.PLACES, atol=1e-10)

@@ -4,7 +4,7 @@ import { energyView, lineView } from "./bars.js";
 import { buildControls } from "./controls.js";
 import { forcesView, motionView } from "./curves.js";
 import { element as make } from "./dom.js";
-import { thinned } from "./engine/records.js";
+import { thinned } from "./engine/table.js";
 import { bindKeys } from "./keys.js";
 import { mapView } from "./map.js";
 import { marksFor } from "./marks.js";

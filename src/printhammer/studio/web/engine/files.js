@@ -1,7 +1,8 @@
 // Files dropped on the page: a state, a hammer, a drive, measured curves.
 import { driveOf, isDrive, tomlOf } from "./drive.js";
 import { readFile, Refusal } from "./read.js";
-import { recordOf, sizeOf } from "./records.js";
+import { recordOf } from "./records.js";
+import { sizeOf } from "./table.js";
 
 /** Read a dropped file; returns what it holds, or refuses it in a sentence. */
 export function dropped({ name, text, columns }, shelf) {
