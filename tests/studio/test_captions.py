@@ -195,6 +195,49 @@ def test_a_link_states_every_entry_that_the_hammer_would_set(modules: Path) -> N
     assert json.loads(answer.stdout) == {"rate": 1200, "pulses": 9, "low": 500, "line": "HAMMER"}
 
 
+TRACE = """
+const { toText, traceOf, START } = await import("./state.js");
+const written = (trace) => new URLSearchParams({ trace: JSON.stringify(trace) }).toString();
+const answer = (text) => { try { return traceOf(text); } catch ({ message }) { return message; } };
+const [trace, wrong] = %s;
+const text = toText({ ...START, trace });
+const refused = wrong.map((each) => answer(written(each)));
+console.log(JSON.stringify([answer(text), answer(""), text.length, ...refused]));
+"""
+
+
+def test_a_trace_travels_in_a_link(modules: Path) -> None:
+    """With 9 digits of time and 6 of displacement; anything else is refused."""
+    times = 0.1 + np.arange(2000) * 1e-7
+    trace = {"name": "scope", "t": times.tolist(), "values": (1e-4 * np.sin(1e6 * times)).tolist()}
+    trace |= {"dt": -0.1, "dx": 2e-6}
+    small = {**trace, "t": [0.0, 1.0], "values": [0.0, 1.0]}
+    wrong = [
+        None,
+        [],
+        "scope",
+        {**trace, "t": []},
+        {**small, "t": [0.0, 0.0]},
+        {**small, "t": [1.0]},
+        {**small, "values": [0.0, "1"]},
+        {**small, "values": [0.0, 1e10]},
+        {**small, "values": [0.0, None]},
+        {**small, "dt": None},
+        {**small, "name": 1},
+        {**small, "t": list(range(2001)), "values": list(range(2001))},
+    ]
+    command, script = ["node", "--input-type=module", "-"], TRACE % json.dumps([trace, wrong])
+    answer = subprocess.run(command, cwd=modules, input=script, capture_output=True, text=True, check=True)
+    found, none, length, *refused = json.loads(answer.stdout)
+    assert none is None
+    assert length < 100_000
+    assert (found["name"], found["dt"], found["dx"]) == ("scope", -0.1, 2e-6)
+    np.testing.assert_allclose(found["t"], times, rtol=1e-8)
+    np.testing.assert_allclose(found["values"], trace["values"], rtol=1e-5)
+    assert len(refused) == len(wrong)
+    assert all(isinstance(text, str) and text.startswith("trace is expected") for text in refused)
+
+
 SHAPES = """
 const { isOffered } = await import("./pulses.js");
 const [hammers, { shapes, drivers }] = %s;

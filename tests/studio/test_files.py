@@ -329,7 +329,7 @@ def test_a_table_that_is_read_is_read_as_python_reads_it(
 
 
 def columns_said(export: exports.Export, headings: list[dict[str, Any]]) -> list[list[str]] | None:
-    """Return what is said of the columns of an export as answers of the page; None if its heading says all."""
+    """Return what is said of the columns of an export as answers of the page; None if nothing is."""
     if not export.columns:
         return None
     answers = [["", ""] for _ in headings]

@@ -132,6 +132,18 @@ def test_a_trace_has_offsets_a_name_a_residual_and_an_undo(page: Page) -> None:
     assert page.run(f"{STUDIO}.overlay.data.t.length") > 100
     page.run(f"{STUDIO}.undo(); 1")
     assert page.run(f"{STUDIO}.overlay === null && document.querySelector('.trace').hidden")
+    # The link contains a trace as a file would give it, of fewer points than the motion.
+    page.run(
+        f"{{ const {{ store, frames }} = {STUDIO}; const of = (name) =>"
+        " [...frames.motion.data[name]].filter((_each, k) => k % 4 === 0);"
+        " store.set({ trace: { name: 'scope', t: of('t').map((time) => time + 4e-5),"
+        " values: of('x').map((place) => place + 5e-6), dt: -4e-5, dx: 0 } }); } 1"
+    )
+    page.wait(f"location.hash.slice(1) === {STUDIO}.link()")
+    page.call("Page.reload")
+    page.wait("document.querySelector('.residual')?.textContent.startsWith('residual')")
+    assert page.run(residual) == pytest.approx(5.0, abs=0.01)
+    assert page.run("document.querySelector('.trace [type=text]').value") == "scope"
 
 
 def test_a_page_that_becomes_wide_or_narrow_shows_what_is_chosen(own_page: Page) -> None:

@@ -11,7 +11,7 @@ import { marksFor } from "./marks.js";
 import { layout } from "./panels.js";
 import { loopsView, phaseView, strobeView } from "./planes.js";
 import { sketchView } from "./sketch.js";
-import { bare, fromText, OPENING, pinsOf, START, Store, toText, VIEWS } from "./state.js";
+import { bare, fromText, OPENING, pinsOf, START, Store, toText, traceOf, VIEWS } from "./state.js";
 import { readColours } from "./theme.js";
 import { setSystem, setUnits } from "./units.js";
 import { openingOf } from "./words.js";
@@ -186,7 +186,9 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     const read = notes.length ? "" : text;
     const frame = await studio.ask("open", { state: fromText(read) });
     if (frame.kind === "refusal") { await take({ state: {}, notes: [...notes, frame.reason] }); return; }
-    await take({ state: { ...frame.state, pins: pinsOf(read) }, notes: [...notes, ...frame.notes] });
+    let trace = null;
+    try { trace = traceOf(read); } catch ({ message: reason }) { notes.push(reason); }
+    await take({ state: { ...frame.state, pins: pinsOf(read), trace }, notes: [...notes, ...frame.notes] });
   };
   /** Take the state of a pin up again, in the views that are shown; a pin of a link may hold anything. */
   studio.resume = async (state) => {

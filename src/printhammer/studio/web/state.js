@@ -10,6 +10,8 @@ const JOINED = 700; // ms within which changes of one control are one step of th
 export const DEEPEST = 200; // steps of the history
 
 export const MOST_PINS = 4;
+const MOST_SAMPLES = 2000; // of a trace
+const LARGEST = 1e9; // of its numbers, SI
 
 export const START = Object.freeze({
   hammer: "", text: "", constants: {}, waveform: null, rate: 1200, pulses: 9, pattern: "", overlap: "add",
@@ -75,8 +77,28 @@ export function toText(state, start = {}) {
   for (const [key, value] of Object.entries(state.constants)) found.set(key, value);
   if (state.waveform) found.set("waveform", JSON.stringify(state.waveform));
   if (state.pins?.length) found.set("pins", JSON.stringify(state.pins.map(({ name, state: pinned }) => ({ name, state: Object.fromEntries(Object.entries(pinned).filter(([key, value]) => JSON.stringify(value) !== JSON.stringify(START[key]))) }))));
+  if (state.trace) found.set("trace", JSON.stringify({ ...state.trace, ...rounded(state.trace) }));
   if (state.views.join() !== OPENING.join() || "views" in start) found.set("views", state.views.join("-"));
   return found.toString();
+}
+
+const short = new WeakMap(); // columns of traces for a link, by their times
+/** Return the columns of a trace with as many digits as a picture shows; times that begin late keep their steps. */
+function rounded({ t, values }) {
+  const digits = (list, count) => Array.from(list, (number) => Number(number.toPrecision(count)));
+  if (!short.has(t)) short.set(t, { t: digits(t, 9), values: digits(values, 6) });
+  return short.get(t);
+}
+
+/** Return the trace of a text, null where there is none; throws a sentence where it is not as a link holds it. */
+export function traceOf(text) {
+  const written = new URLSearchParams(text).get("trace");
+  if (written === null) return null;
+  const { name, t, values, dt, dx } = Object(parsed(written));
+  const isColumn = (list) => Array.isArray(list) && list.length > 1 && list.length <= MOST_SAMPLES && list.every((number) => typeof number === "number" && Math.abs(number) <= LARGEST);
+  const fine = typeof name === "string" && isColumn(t) && isColumn(values) && t.length === values.length && isColumn([dt, dx]) && t.every((time, k) => !k || time > t[k - 1]);
+  if (!fine) throw new Error(`trace is expected to have a name, 2 to ${MOST_SAMPLES} ascending times t, as many values, and the offsets dt and dx; it is not used`);
+  return { name: name.slice(0, 60), t, values, dt, dx };
 }
 
 /** Return a state without what only the page keeps. */
@@ -96,7 +118,7 @@ export function fromText(text) {
   const told = {};
   const constants = {};
   for (const [key, value] of new URLSearchParams(text)) {
-    if (key === "pins") continue;
+    if (key === "pins" || key === "trace") continue;
     if (TEXTS.includes(key)) told[key] = value;
     else if (key === "views") told.views = value.split("-");
     else if (key === "waveform") told.waveform = parsed(value);
