@@ -1,0 +1,132 @@
+"""A headless Firefox, driven over WebDriver BiDi; helpers only."""
+
+import base64
+import itertools
+import json
+import re
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from websockets.sync.client import ClientConnection, connect
+
+NAMES = ("firefox-esr", "firefox")
+WAIT = 60.0
+EVENTS = ["log.entryAdded", "network.beforeRequestSent"]
+
+
+def firefox() -> str | None:
+    """Return the program of a Firefox, or nothing."""
+    return next(filter(None, map(shutil.which, NAMES)), None)
+
+
+class Tab:
+    """One tab: what it runs, what it says on its console, what it asks the network for."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        self.socket = socket
+        self.numbers = itertools.count(1)
+        self.complaints: list[str] = []
+        self.requests: list[str] = []
+        self.call("session.new", capabilities={})
+        self.call("session.subscribe", events=EVENTS)
+        self.context = self.call("browsingContext.getTree")["contexts"][0]["context"]
+
+    def call(self, method: str, **arguments: Any) -> dict[str, Any]:
+        """Send a command and return its answer."""
+        number = next(self.numbers)
+        self.socket.send(json.dumps({"id": number, "method": method, "params": arguments}))
+        while True:
+            message = json.loads(self.socket.recv(timeout=WAIT))
+            if message.get("id") == number:
+                assert message["type"] == "success", message
+                return message["result"]
+            self._note(message)
+
+    def _note(self, message: dict[str, Any]) -> None:
+        told = message.get("params", {})
+        match message.get("method"):
+            case "log.entryAdded" if told["level"] in ("error", "warn"):
+                self.complaints.append(str(told["text"])[:2000])
+            case "network.beforeRequestSent":
+                self.requests.append(told["request"]["url"])
+
+    def run(self, expression: str) -> Any:
+        """Evaluate an expression in the page, which may be a promise, and return its value."""
+        found = self.call(
+            "script.evaluate",
+            expression=f"(async () => JSON.stringify((await ({expression})) ?? null))()",
+            target={"context": self.context},
+            awaitPromise=True,
+        )
+        assert found["type"] == "success", found["exceptionDetails"]
+        return json.loads(found["result"]["value"])
+
+    def wait(self, condition: str, seconds: float = WAIT) -> Any:
+        """Wait until an expression gives something true, and return that."""
+        end = time.monotonic() + seconds
+        while not (found := self.run(condition)):
+            assert time.monotonic() < end, f"waited for {condition}; {self.complaints}"
+            time.sleep(0.05)
+        return found
+
+    def open(self, address: str, width: int, height: int) -> None:
+        """Go to an address, in a window of a size."""
+        size = {"width": width, "height": height}
+        self.call("browsingContext.setViewport", context=self.context, viewport=size)
+        self.call("browsingContext.navigate", context=self.context, url=address, wait="complete")
+
+    def box(self, selector: str) -> dict[str, float]:
+        """Return the place and size of an element."""
+        return self.run(f"document.querySelector({json.dumps(selector)}).getBoundingClientRect()")
+
+    def drag(self, *places: tuple[float, float]) -> None:
+        """Press at the first place, move through the others, release at the last."""
+        moves = [{"type": "pointerMove", "x": round(x), "y": round(y), "duration": 50} for x, y in places[1:]]
+        x, y = places[0]
+        press = [{"type": "pointerMove", "x": round(x), "y": round(y)}, {"type": "pointerDown", "button": 0}]
+        actions = [*press, *moves, {"type": "pointerUp", "button": 0}]
+        mouse = {"type": "pointer", "id": "mouse", "actions": actions}
+        self.call("input.performActions", context=self.context, actions=[mouse])
+
+    def press(self, key: str) -> None:
+        """Press and release a key."""
+        actions = [{"type": kind, "value": key} for kind in ("keyDown", "keyUp")]
+        keys = {"type": "key", "id": "keys", "actions": actions}
+        self.call("input.performActions", context=self.context, actions=[keys])
+
+    def picture(self, path: Path) -> None:
+        """Write what is seen as PNG."""
+        taken = self.call("browsingContext.captureScreenshot", context=self.context)
+        path.write_bytes(base64.b64decode(taken["data"]))
+
+
+@contextmanager
+def opened() -> Iterator[Tab]:
+    """Start a Firefox and give its tab."""
+    program = firefox()
+    assert program is not None
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        command = (program, "--headless", "--no-remote", "--profile", folder, "--remote-debugging-port=0")
+        process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+        try:
+            with connect(f"{_address(process)}/session", max_size=None) as socket:
+                yield Tab(socket)
+        finally:
+            process.terminate()
+            process.wait(20)
+            assert process.stderr is not None
+            process.stderr.close()
+
+
+def _address(process: "subprocess.Popen[str]") -> str:
+    assert process.stderr is not None
+    for line in process.stderr:
+        if found := re.search(r"WebDriver BiDi listening on (ws://\S+)", line):
+            return found[1]
+    raise AssertionError("Firefox did not start")
