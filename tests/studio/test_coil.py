@@ -32,12 +32,12 @@ def test_open_constants_have_controls(name: str) -> None:
     for each in described["open"]:
         assert each["low"] < each["value"] < each["high"]
         assert (each["section"], len(each["equation"]) > 10) == ("coil", True)
-    assert json.dumps(controls.vocabulary(hammer))
+    assert json.dumps(controls.units_of(hammer))
 
 
 def test_slow_and_large_devices_are_shown_in_larger_units() -> None:
     names = {
-        name: [controls.vocabulary(load(name))["units"][si][0]["name"] for si in ("s", "m")]
+        name: [controls.units_of(load(name))[si][0]["name"] for si in ("s", "m")]
         for name in ("hendriks-1983", "relay-5v", "pinball-coil")
     }
     assert names == {"hendriks-1983": ["µs", "µm"], "relay-5v": ["ms", "µm"], "pinball-coil": ["ms", "mm"]}

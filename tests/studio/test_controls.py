@@ -63,9 +63,9 @@ def test_the_paper_lies_on_the_platen_whatever_is_moved() -> None:
             assert isinstance(hammer.replace(moved), Hammer)
 
 
-def test_units_are_shown_by_factors_of_the_unit_table() -> None:
-    units = controls.vocabulary()["units"]
-    for si, systems in units.items():
+@pytest.mark.parametrize("name", shipped())
+def test_units_are_shown_by_factors_of_the_unit_table(name: str) -> None:
+    for si, systems in controls.units_of(load(name)).items():
         for shown in systems:
             plain = shown["name"].replace("µ", "u").replace("·", " ").replace("°C", "degC")
             assert shown["factor"] * to_si(1.0, plain, si) == pytest.approx(1.0, rel=1e-12)

@@ -14,8 +14,8 @@ import printhammer as ph
 from printhammer.printing.page.page import print_page
 from printhammer.printing.page.pattern import Pattern
 from printhammer.studio import Shelf, live_page
+from printhammer.studio.bundle import page_files
 from printhammer.studio.controls import fields_of
-from printhammer.studio.widget import SCRIPT
 
 NAME = "hendriks-1983-1"
 
@@ -192,8 +192,9 @@ def test_a_notebook_shows_the_page_and_follows_its_state(address: str, opened_br
         "window.model = { get: (name) => kept[name], set: (name, value) => { kept[name] = value; },"
         " save_changes() {}, on: (kind, call) => { heard[kind] = call; }, off() {} }; 1"
     )
+    script = json.dumps(page_files()["widget.mjs"].decode())
     page.run(
-        f"import(URL.createObjectURL(new Blob([{json.dumps(SCRIPT)}], {{ type: 'text/javascript' }})))"
+        f"import(URL.createObjectURL(new Blob([{script}], {{ type: 'text/javascript' }})))"
         ".then((made) => made.default.render({ model, el: document.body })).then(() => 1)"
     )
     inside = "document.querySelector('iframe').contentWindow.studio?.studio"

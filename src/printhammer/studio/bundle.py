@@ -9,7 +9,7 @@ from functools import lru_cache
 from importlib.resources import files
 from typing import Final
 
-_ENDINGS: Final = (".js", ".css", ".svg")
+_ENDINGS: Final = (".js", ".mjs", ".css", ".svg", ".html")
 _IMPORT: Final = re.compile(r'from "(\.{1,2}/[\w./]+)"')
 _IMPORTS: Final = re.compile(r'^import .* from ".*";$\n?', re.MULTILINE)
 _EXPORT: Final = re.compile(r"^export (?=(async )?function|const|let|class)", re.MULTILINE)

@@ -6,7 +6,6 @@ import math
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, get_args
 
-from printhammer import __version__
 from printhammer.drive.waveforms.drivers import DRIVERS, Rail
 from printhammer.drive.waveforms.shapes import SHAPES, Sine, Waveform
 from printhammer.studio import bounds
@@ -226,33 +225,22 @@ def fields_of(waveform: Waveform) -> dict[str, Any]:
     return {"shape": waveform.shape, **waveform.model_dump()}
 
 
-def vocabulary(hammer: Hammer | None = None) -> dict[str, Any]:
-    """Return units with factors suited to a hammer, pulse shapes with their constants, and limits."""
-    named = SHOWN if hammer is None else {**SHOWN, **_large(hammer)}
-    units = {
+def units_of(hammer: Hammer) -> dict[str, list[dict[str, Any]]]:
+    """Return the units in which the page shows the quantities of a hammer, with factors, by SI unit."""
+    named = {**SHOWN, **_large(hammer)}
+    return {
         si: [{"name": _signed(name), "factor": from_si(1.0, si, name)} for name in names]
         for si, names in named.items()
     }
+
+
+def vocabulary() -> dict[str, Any]:
+    """Return the pulse shapes with their constants, the drivers among them, and the paths of decay."""
     shapes = {name: [_field(shape, field) for field in quantities(shape)] for name, shape in SHAPES.items()}
     # The frequency of a continuous force is the rate.
     shapes[Sine.shape] = [_field(Sine, field) for field in SINE]
-    limits = {
-        "pulses": bounds.MOST_PULSES,
-        "rates": bounds.RATES,
-        "file": bounds.LARGEST_FILE,
-        "state": bounds.LARGEST_MESSAGE,
-        "line": bounds.LONGEST_TEXT,
-    }
-    drivers = [shape.shape for shape in DRIVERS]
-    decays = list(get_args(Rail.model_fields["decay"].annotation))
-    return {
-        "version": __version__,
-        "units": units,
-        "shapes": shapes,
-        "drivers": drivers,
-        "decays": decays,
-        "limits": limits,
-    }
+    decays = get_args(Rail.model_fields["decay"].annotation)
+    return {"shapes": shapes, "drivers": [shape.shape for shape in DRIVERS], "decays": decays}
 
 
 def _field(shape: type[Waveform], name: str) -> dict[str, Any]:

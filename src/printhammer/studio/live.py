@@ -10,6 +10,7 @@ from __future__ import annotations
 import gzip
 import json
 import math
+import re
 import struct
 from base64 import b64decode, b64encode
 from dataclasses import fields
@@ -27,7 +28,7 @@ from printhammer.run.plain.page import REFUSALS
 from printhammer.run.problem import TOLERANCE, constants_of, fresh_carry, laws_of
 from printhammer.studio import bounds
 from printhammer.studio.bundle import deltas, inside, merged, page_files, sources, style
-from printhammer.studio.controls import SINE, describe, vocabulary
+from printhammer.studio.controls import SINE, describe, units_of, vocabulary
 from printhammer.studio.launch import FORMAT, KIND
 from printhammer.support.constants import quantities
 
@@ -37,42 +38,6 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.kernel.model.laws import Laws
     from printhammer.studio.shelf import Shelf
-
-_PAGE: Final = """<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; script-src 'unsafe-inline' blob: \
-'wasm-unsafe-eval'; worker-src blob:; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; \
-form-action 'none'">
-<title>printhammer studio</title>
-<link rel="icon" href="data:image/svg+xml;base64,{icon}">
-<style>{style}</style>
-</head>
-<body>
-<div id="studio"></div>
-<noscript>The studio needs JavaScript.</noscript>
-<script type="application/json" id="start">{start}</script>
-<script type="text/plain" id="content">{content}</script>
-<script type="module">
-const text = atob(document.getElementById("content").textContent);
-const packed = Uint8Array.from(text, (sign) => sign.charCodeAt(0));
-const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
-const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
-const end = 4 + new DataView(bytes.buffer).getUint32(0, true);
-const content = JSON.parse(new TextDecoder().decode(bytes.subarray(4, end)));
-const places = {{}};
-for (const [name, text] of content.scripts) {{
-  const whole = text.replace(/from "\\.\\/([\\w.\\/]+)"/g, (_all, part) => `from "${{places[part]}}"`);
-  places[name] = URL.createObjectURL(new Blob([whole], {{ type: "text/javascript" }}));
-}}
-const {{ begin }} = await import(places["engine/page.js"]);
-begin(content, bytes.subarray(end));
-</script>
-</body>
-</html>
-"""
 
 _SENTENCES: Final = {
     "kinds": "this page has no kernel for such a drive of this hammer: expected one whose first hammer it is,"
@@ -106,12 +71,13 @@ def live_page(shelf: Shelf, start: Mapping[str, Any] | str = "") -> str:
     }
     text = json.dumps(content, allow_nan=False, separators=(",", ":")).encode()
     packed = gzip.compress(struct.pack("<I", len(text)) + text + deltas(b"".join(modules)), 9, mtime=0)
-    return _PAGE.format(
-        style=style(),
-        icon=b64encode(page_files()["icon.svg"]).decode(),
-        start=inside({"text": start} if isinstance(start, str) else {"state": start}),
-        content=b64encode(packed).decode(),
-    )
+    parts = {
+        "style": style(),
+        "icon": b64encode(page_files()["icon.svg"]).decode(),
+        "start": inside({"text": start} if isinstance(start, str) else {"state": start}),
+        "content": b64encode(packed).decode(),
+    }
+    return re.sub(r"{{(\w+)}}", lambda place: parts[place[1]], page_files()["page.html"].decode())
 
 
 def content_of(shelf: Shelf) -> Any:
@@ -121,12 +87,10 @@ def content_of(shelf: Shelf) -> Any:
     for name, entry in described.items():
         entry["modules"] = _places(shelf.hammer(name), entry["described"], modules)
         entry["described"]["quantities"] = list(entry["modules"])
-    shared = vocabulary()
-    del shared["units"]
     content = {
         "version": __version__,
         "names": shelf.names,
-        "vocabulary": shared,
+        "vocabulary": vocabulary(),
         "hammers": described,
         "modules": list(modules.values()),
         "limits": _limits(),
@@ -203,7 +167,7 @@ def _hammer(shelf: Shelf, name: str, modules: dict[Laws, str]) -> dict[str, Any]
     described = describe(hammer)
     entry: dict[str, Any] = {
         "described": described,
-        "units": vocabulary(hammer)["units"],
+        "units": units_of(hammer),
         "text": hammer.to_toml(),
         "shipped": shelf.is_shipped(name),
     }

@@ -2,41 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from printhammer.errors import missing_extra
 
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
-
-SCRIPT: Final = """
-export default {
-  render({ model, el }) {
-    const frame = document.createElement("iframe");
-    frame.title = "printhammer studio";
-    // The page begins with the state that is the name of its window.
-    frame.name = model.get("state");
-    frame.srcdoc = model.get("page");
-    frame.style.cssText = "width: 100%; border: 0";
-    frame.style.height = model.get("height");
-    let told = frame.name;
-    const hear = ({ source, data }) => {
-      if (source !== frame.contentWindow || typeof data?.printhammer !== "string") return;
-      told = data.printhammer;
-      model.set("state", told);
-      model.save_changes();
-    };
-    const tell = () => {
-      if (model.get("state") === told) return;
-      frame.contentWindow?.postMessage({ printhammer: model.get("state") }, "*");
-    };
-    window.addEventListener("message", hear);
-    model.on("change:state", tell);
-    el.append(frame);
-    return () => { window.removeEventListener("message", hear); model.off("change:state", tell); };
-  },
-};
-"""
 
 
 def widget(*hammers: Hammer, state: str = "", height: str = "760px") -> Any:
@@ -66,13 +37,14 @@ def widget(*hammers: Hammer, state: str = "", height: str = "760px") -> Any:
         import traitlets
     except ImportError as error:
         raise missing_extra(f"the widget needs {error.name}", "notebook") from None
+    from printhammer.studio.bundle import page_files
     from printhammer.studio.live import live_page
     from printhammer.studio.shelf import Shelf
 
     class StudioWidget(anywidget.AnyWidget):
         """Notebook widget that shows the page."""
 
-        _esm = SCRIPT
+        _esm = page_files()["widget.mjs"].decode()
         page = traitlets.Unicode("").tag(sync=True)
         state = traitlets.Unicode("").tag(sync=True)
         height = traitlets.Unicode("").tag(sync=True)

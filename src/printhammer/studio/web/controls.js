@@ -32,7 +32,7 @@ export function buildControls(holder, studio) {
   // On a phone the rate stays below the view.
   studio.parts.pinned.replaceChildren();
   add(studio.parts.pinned, { ...rate, id: "pinned rate" });
-  const most = studio.limits.pulses;
+  const most = studio.limits.MOST_PULSES;
   add(front, {
     id: "pulses", name: "pulses", hint: "Number of firings.", unit: "1", low: 1, high: most, whole: true,
     get: (state) => state.pulses, set: (value) => ({ pulses: value }), reset: () => ({ pulses: start.pulses }),
@@ -40,8 +40,8 @@ export function buildControls(holder, studio) {
   for (const control of described.combined) add(front, { ...control, id: control.key, name: control.key, hint: control.meaning, ...moving(control, studio) });
   if (prints(described)) {
     put(front, textRow({
-      name: "line", hint: `Text that is printed, nine wires high, slot by slot at this rate, at most ${studio.limits.line} characters; empty: the dots of the burst.`, wanted: `at most ${studio.limits.line} characters`,
-      get: (state) => state.line, set: (value) => (value.length <= studio.limits.line ? { line: value } : null),
+      name: "line", hint: `Text that is printed, nine wires high, slot by slot at this rate, at most ${studio.limits.LONGEST_TEXT} characters; empty: the dots of the burst.`, wanted: `at most ${studio.limits.LONGEST_TEXT} characters`,
+      get: (state) => state.line, set: (value) => (value.length <= studio.limits.LONGEST_TEXT ? { line: value } : null),
     }, studio));
   }
   rows.push(waveformEditor(front, studio, sliderRow));

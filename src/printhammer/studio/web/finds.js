@@ -49,7 +49,7 @@ export function findRow(studio) {
     const { state } = studio.store;
     const fired = state.pattern ? [...state.pattern].filter((mark) => mark === "1").length : Math.max(state.pulses, number + 1);
     if (fired < number) return { text: `the pattern fires ${fired} times, there is no ${ordinal(number)} dot` };
-    const pulses = state.pattern ? state.pulses : Math.min(fired, studio.limits.pulses);
+    const pulses = state.pattern ? state.pulses : Math.min(fired, studio.limits.MOST_PULSES);
     // Nothing is known where a run is refused, or ends before its firing.
     const gone = async (rate) => {
       const dot = (await asked("dots", { rate, pulses })).dots?.[number - 1];

@@ -206,13 +206,13 @@ export function mount(element, send, address = { read: () => "", write: () => {}
   };
   async function readDropped(file) {
     const isTable = !/\.(toml|json)$/i.test(file.name);
-    const most = isTable ? LARGEST_TABLE : file.name.toLowerCase().endsWith(".json") ? studio.limits.state : studio.limits.file;
+    const most = isTable ? LARGEST_TABLE : file.name.toLowerCase().endsWith(".json") ? studio.limits.LARGEST_MESSAGE : studio.limits.LARGEST_FILE;
     if (file.size > most) {
       studio.say(`${file.name} has ${file.size} bytes, expected at most ${most}`, true);
       return;
     }
     const decodedText = decoded(await file.arrayBuffer());
-    const text = isTable ? thinned(decodedText, studio.limits.file) : decodedText;
+    const text = isTable ? thinned(decodedText, studio.limits.LARGEST_FILE) : decodedText;
     const ask = (columns) => studio.ask("drop", { name: file.name, text, columns });
     let frame = await ask(null);
     if (frame.what === "columns") {

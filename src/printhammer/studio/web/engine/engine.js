@@ -102,7 +102,7 @@ export function engineOf(shelf, script, receive, page, crew = crewOf(script, she
       const asked = text ? shelf.adopt(text) : name || shelf.names[0];
       if (!Object.hasOwn(shelf.hammers, asked)) throw new Refusal(`hammer = '${asked.slice(0, 100)}': expected one of ${shelf.names.join(", ")}`);
       const { described, units } = shelf.hammers[asked];
-      return { kind: "hammer", hammer: described, offered: shelf.names, asked: text ? "" : asked, text, units, ...shelf.vocabulary };
+      return { kind: "hammer", hammer: described, offered: shelf.names, asked: text ? "" : asked, text, units, limits: shelf.limits, version: shelf.version, ...shelf.vocabulary };
     },
     open: (serial, { state }) => ({ kind: "open", ...taken(state && Object.keys(state).length ? state : shelf.start, shelf) }),
     texts: (serial, { state }) => ({ kind: "texts", texts: textsOf(read(state), shelf) }),
