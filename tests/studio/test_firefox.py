@@ -39,7 +39,7 @@ def test_the_first_curves_and_the_map_are_there(tab: Tab) -> None:
         " return new Set(new Uint32Array(data.buffer)).size; })()"
     )
     assert tab.run(colours) > 100
-    assert "lost" in tab.run("document.querySelector('.view-map .caption').textContent")
+    tab.wait("document.querySelector('.view-map .caption').textContent.includes('lost')")
 
 
 def test_a_slider_and_the_map_move_the_curves(tab: Tab) -> None:
