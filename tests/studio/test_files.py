@@ -226,6 +226,23 @@ def test_columns_are_asked_for_where_the_heading_does_not_say_what_they_hold(ask
     np.testing.assert_allclose(data["t"], TIMES, atol=1e-20)
 
 
+def test_a_unit_in_capital_letters_is_asked_for(ask: Any) -> None:
+    text = "TIME [MS],CURRENT [MA]\n0,0\n1,800\n"
+    assert ask("table", text, None)["found"]["what"] == "columns"
+    assert "may be mA" in ask("table", text, [["time", "ms"], ["current", "MA"]])["refused"]
+    found = ask("table", text, [["time", "ms"], ["current", "mA"]])["found"]
+    assert found["data"]["current"] == pytest.approx([0.0, 0.8])
+
+
+def test_times_come_from_a_column_or_from_the_file(ask: Any) -> None:
+    text = "CH1 [V]\n0\n1\n2\n"
+    told = [["displacement", "20 um/V"]]
+    assert "a line such as 't0 = -1 ms, dt = 2 us'" in ask("table", text, told)["refused"]
+    data = ask("table", "t0 = -1 ms, dt = 2 us\n" + text, told)["found"]["data"]
+    assert data["t"] == pytest.approx([-1e-3, -0.998e-3, -0.996e-3])
+    assert data["displacement"] == pytest.approx([0.0, 20e-6, 40e-6])
+
+
 @pytest.mark.parametrize(
     ("text", "reason"),
     [

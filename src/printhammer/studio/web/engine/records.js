@@ -6,6 +6,7 @@ import { factorOf, isNumber, layoutOf, quantityOfName } from "./table.js";
 const COLUMNS = { time: "s", displacement: "m", current: "A", force: "N", voltage: "V" };
 const BY_UNIT = { time: "s", current: "A", force: "N" }; // what a unit identifies without a name
 const LARGEST = 1e9; // of a measured value, SI
+const CAPITALS = ["MA", "MV", "MN"]; // headings in capital letters write these for mA, mV and mN
 const BEFORE = 0.1; // of the peak, that a drive may have before time 0
 
 /** The quantity of each column by its name, or by a unit that occurs once. */
@@ -25,6 +26,7 @@ function valuesOf({ where, headings, rows }, place, what, unit) {
   const per = volts === null ? si : `${si}/V`;
   const amount = /^[-+]?(\d|\.\d)/.test(unit) ? readQuantity(unit, per, { factor: 1, name: per }) : null;
   const factor = amount ? (amount.value ?? NaN) * (volts ?? 1) : factorOf(unit, si);
+  if (CAPITALS.includes(unit)) throw new Refusal(`${where}: ${what}: ${unit} may be ${unit.replace("M", "m")} in capital letters: expected ${unit.replace("M", "m")} or 1 ${unit}`);
   if (factor === null || !Number.isFinite(factor)) throw new Refusal(`${where}: ${what}: '${unit.slice(0, 40)}': expected a unit such as ${si}, or what 1 stands for`);
   return Float64Array.from(rows, ({ line, cells }) => {
     const cell = cells[place] ?? "";
@@ -39,7 +41,7 @@ function valuesOf({ where, headings, rows }, place, what, unit) {
 function isOpen({ headings, clock }, found) {
   const nameless = headings.every(({ name }) => !name);
   const isUnknown = ({ name, unit }, k) => !found[k] && k !== clock?.numbers && (name || unit || nameless);
-  return found.some((what, k) => what && !headings[k].unit) || headings.some(isUnknown) || !(clock || found.includes("time")) || !found.some((what) => what && what !== "time");
+  return found.some((what, k) => what && (!headings[k].unit || CAPITALS.includes(headings[k].unit))) || headings.some(isUnknown) || !(clock || found.includes("time")) || !found.some((what) => what && what !== "time");
 }
 
 /** Read a table: its curves over a common time, or its columns where the page has to ask what they hold. */

@@ -160,7 +160,9 @@ function withoutFactsBeside(rows) {
 /** The number of columns: the length of the heading up to metadata behind it, or else of the longest row. */
 function widthOf(data, last) {
   if (!last.some(isNamed) && !isUnitRow(last)) return widest(data);
-  const isFact = (cell) => [...START, ...STEP].includes(keyOf(cell)) || assignedOf(cell) || (isNumber(cell) && !/^\d+$/.test(cell));
+  const isClock = (key) => START.includes(key) || STEP.includes(key);
+  // "Ix(u1:out)" is the name of a column.
+  const isFact = (cell) => isClock(keyOf(cell)) || isClock(assignedOf(cell)?.[0]) || (isNumber(cell) && !/^\d+$/.test(cell));
   const end = last.findIndex(isFact);
   return end < 0 ? last.length : end;
 }
