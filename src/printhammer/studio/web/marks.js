@@ -16,11 +16,11 @@ export function marksFor(panel) {
     panel(view).dataset.why = reasons.get(view);
   };
 
-  function mark(views, why, atOnce = false) {
+  function mark(views, why, wait = LATE) {
     for (const view of views) {
       reasons.set(view, why);
-      if (atOnce || panel(view).classList.contains("outdated")) show(view);
-      else if (!timers.has(view)) timers.set(view, setTimeout(() => show(view), LATE));
+      if (wait <= 0 || panel(view).classList.contains("outdated")) show(view);
+      else if (!timers.has(view)) timers.set(view, setTimeout(() => show(view), wait));
     }
   }
   function clear(views) {
@@ -37,15 +37,15 @@ export function marksFor(panel) {
   let latest = 0; // the number of the newest state that was sent
 
   return {
-    /** A state is on its way. */
-    sent: (serial) => {
+    /** A state is on its way that was set at a time; it may have waited for the one before. */
+    sent: (serial, set) => {
       latest = serial;
-      mark(ALL, "being computed for what is set now");
+      mark(ALL, "being computed for what is set now", LATE - (performance.now() - set));
     },
     /** Nothing is computed, and why; what still comes of states up to a number is outdated too. */
     none(why, serial = 0) {
       refused = serial;
-      mark(ALL, why, true);
+      mark(ALL, why, 0);
     },
     /** A frame has come. */
     arrived(frame) {

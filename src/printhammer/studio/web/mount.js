@@ -57,7 +57,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     const now = studio.changedAt ?? performance.now();
     studio.sentAt.set(message("state", { state: bare(studio.store.state) }), now);
     studio.changedAt = null;
-    marks.sent(studio.serial);
+    marks.sent(studio.serial, now);
     for (const serial of studio.sentAt.keys()) if (serial < studio.serial - 64) studio.sentAt.delete(serial);
   };
 
