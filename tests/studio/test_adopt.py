@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -53,6 +54,7 @@ def test_a_hammer_file_gives_the_numbers_of_python(ask: Any, name: str) -> None:
         (('law = "power"', 'law = "hertz"'), "pack.law"),
         (("value = 0.803171", "value = -0.8"), "magnet.F0"),
         (("[waveform]", "[wave]"), "wave is not known"),
+        (('law = "inverse-root"', 'law = "table"\nfile = "forces.csv"'), "magnet.file names a table"),
         (("mass = {", "mass = 3 #{"), "mass has no unit"),
         (("format = 1", "format = 1\n__proto__ = 1"), "not known"),
         (("format = 1", "format = 1\nviews = ['plan']"), "views is expected to be one of"),
@@ -69,6 +71,18 @@ def test_a_file_lists_its_views(ask: Any) -> None:
     text = ph.load(NAMES[0]).replace("views", ["phase", "motion"]).to_toml()
     assert ask("adopt", text)["found"]["described"]["views"] == ["phase", "motion"]
     assert ask("adopt", ph.load(NAMES[0]).to_toml())["found"]["described"]["views"] == []
+
+
+def test_a_table_of_another_hammer_is_not_taken(tmp_path: Path) -> None:
+    """A hammer of the page may name a table of the same name, with other numbers."""
+    rows = [(x, i, 0.8 - 0.3 * i + 0.01 * x) for x in (0.0, 200.0, 400.0) for i in (0.0, 1.0, 2.0)]
+    table = "displacement [um],current [A],force [N]\n" + "".join(f"{x},{i},{f}\n" for x, i, f in rows)
+    (tmp_path / "forces.csv").write_text(table, "utf-8")
+    hammer = ph.load(NAMES[0])
+    text = ph.Hammer.from_toml(hammer.to_toml(), folder=tmp_path)
+    own = text.replace("magnet", {"law": "table", "file": "forces.csv"}).replace("name", "own")
+    with node("engine/adopt.js", ASKED, Shelf(own, only=True)) as asked:
+        assert "magnet.file names a table" in asked("adopt", own.to_toml())["refused"]
 
 
 def test_a_value_in_another_unit_is_converted(ask: Any) -> None:
