@@ -1,4 +1,4 @@
-"""Tests in a browser: run where a Chromium is found; where none is, they are left out and that is said."""
+"""Tests in a browser: where no Chromium or no Firefox is found, its tests are left out and that is said."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -7,32 +7,36 @@ from typing import Any
 
 import pytest
 from tests.studio.browser import Page, browser, chromium
+from tests.studio.firefox import Tab, firefox, opened
 
 from printhammer.hammer.file import VIEWS
 from printhammer.hammer.hammer import load
 from printhammer.studio import Shelf, live_page
 from printhammer.studio.bundle import page_files
 
-NEEDS = "opened_browser"
+NEEDS = {"opened_browser": ("Chromium", chromium), "opened_firefox": ("Firefox", firefox)}
+"""Browsers by the fixture that starts them."""
 HAMMERS = ("hendriks-1983-1", "hendriks-1983", "bouncing-ball", "duffing-holmes")
 """Hammers of the page of the tests, the first of which is shown."""
 WHOLE = f"#views={'-'.join(VIEWS)}"
 """Link to the page with all views."""
-left_out: list[str] = []
+left_out: dict[str, int] = {}
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[Any]) -> None:
-    if chromium() is not None:
-        return
-    without = [item for item in items if NEEDS in getattr(item, "fixturenames", ())]
-    left_out.extend(item.nodeid for item in without)
-    config.hook.pytest_deselected(items=without)
-    items[:] = [item for item in items if item not in without]
+    for fixture, (name, program) in NEEDS.items():
+        if program() is not None:
+            continue
+        without = [item for item in items if fixture in getattr(item, "fixturenames", ())]
+        left_out[name] = len(without)
+        config.hook.pytest_deselected(items=without)
+        items[:] = [item for item in items if item not in without]
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
-    if left_out:
-        terminalreporter.write_line(f"{len(left_out)} tests in a browser left out: no Chromium found")
+    for name, count in left_out.items():
+        if count:
+            terminalreporter.write_line(f"{count} tests in a browser left out: no {name} found")
 
 
 @pytest.fixture(scope="session")
@@ -46,6 +50,12 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> str:
 @pytest.fixture(scope="module")
 def opened_browser() -> Iterator[Any]:
     with browser() as tab:
+        yield tab
+
+
+@pytest.fixture(scope="module")
+def opened_firefox() -> Iterator[Tab]:
+    with opened() as tab:
         yield tab
 
 

@@ -4,12 +4,9 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from tests.studio.firefox import Tab, firefox, opened
+from tests.studio.firefox import Tab
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(firefox() is None, reason="no Firefox found"),
-]
+pytestmark = pytest.mark.slow
 STUDIO = "window.studio.studio"
 SEEN = f"!{STUDIO}.busy && !{STUDIO}.stale"
 NUMBERS = (
@@ -19,14 +16,14 @@ RIGHT = "\ue014"  # the right arrow in WebDriver
 
 
 @pytest.fixture(scope="module")
-def tab(address: str) -> Iterator[Tab]:
+def tab(address: str, opened_firefox: Tab) -> Iterator[Tab]:
     """The page as it opens; nothing but the file itself is asked for, and nothing complains."""
-    with opened() as found:
-        found.open(address, 1440, 900)
-        found.wait("window.studio?.studio?.frames.map?.detail === 'full'")
-        yield found
-        assert found.complaints == []
-        assert [place for place in found.requests if not place.startswith(("blob:", "file:", "data:"))] == []
+    tab = opened_firefox
+    tab.open(address, 1440, 900)
+    tab.wait("window.studio?.studio?.frames.map?.detail === 'full'")
+    yield tab
+    assert tab.complaints == []
+    assert [place for place in tab.requests if not place.startswith(("blob:", "file:", "data:"))] == []
 
 
 def test_the_first_curves_and_the_map_are_there(tab: Tab) -> None:
