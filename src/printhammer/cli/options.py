@@ -116,7 +116,7 @@ def file(what: str, *endings: str, **more: Any) -> Files:
 
 
 # The functions below return default values for parameters of any type; hence the return type Any. Further
-# # keywords are attributes of `Option`.
+# keywords are attributes of `Option`.
 
 
 def text(metavar: str, what: str, **more: Any) -> Any:

@@ -3,8 +3,8 @@
 A warm coil draws less current, and on a low rail the current rises more slowly, so the dot comes later and
 softer. Firmware that knows both can fire earlier and longer. For each rail and temperature of a grid, the
 hammer's own pulse is simulated from rest; then the pulse width that gives a constant impact speed ("blow") is
-computed; by default, the blow is the impact speed of the own pulse at the rail and temperature of the hammer
-file. The results can be exported as a C header with tables and an interpolating function.
+computed. By default, the blow is the impact speed of the hammer's own pulse at nominal rail and temperature.
+The results can be exported as a C header with tables and an interpolating function.
 """
 
 from __future__ import annotations
@@ -267,7 +267,7 @@ def dead_time(
     temperature : sequence of float or str, optional
         Coil temperatures, degC; by default 20, 60 and 100 degC.
     blow : float or str, optional
-        Impact speed, m/s, for which widths are computed; by default the impact speed of the own pulse at
+        Impact speed, m/s, for which widths are computed; by default that of the hammer's own pulse at
         nominal rail and temperature, which a lower rail or a warmer coil may not reach.
 
     Raises

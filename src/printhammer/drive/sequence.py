@@ -203,7 +203,7 @@ class PulseSequence(Drive):
 
 
 def _validate(waveforms: Any) -> list[Waveform]:
-    """Validate the waveforms of a sequence: one common quantity, all finite in time."""
+    """Check that the waveforms of a sequence end and have a common quantity; return them as a list."""
     try:
         fired = [] if isinstance(waveforms, Waveform) else list(waveforms)
     except TypeError:

@@ -34,10 +34,10 @@ Edit = tuple[str, Any]
 def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, source: str) -> Edit:
     """Convert a key and value from the user to an edit of a TOML document.
 
-    The key is a constant or option, such as "mass" or "pack.stiffness", or a table, such as "backstop". The
-    value is, for a constant, text with a unit, a number in SI or a `Constant`; for an option, its value; for
-    a table, a part, a waveform or a mapping; None deletes the key. New constants get the `status` and
-    `source` that are passed.
+    The key is a constant or option, such as "mass" or "pack.stiffness", a table, such as "backstop", or an
+    entry of a list, such as "contact.pole". The value is, for a constant, text with a unit, a number in SI or
+    a `Constant`; for an option, its value; for a table, a part, a waveform or a mapping; None deletes the
+    key. New constants get the `status` and `source` that are passed.
     """
     section, _, name = key.rpartition(".")
     if key in SELECTORS:
@@ -75,7 +75,11 @@ def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, sour
 
 
 def _term_edit(document: Mapping[str, Any], key: str, value: Any, status: str, source: str) -> Edit:
-    """Convert a key such as "contact.pole.stiffness", or "contact.pole" for the whole entry, to an edit."""
+    """Convert a key and value of the lists ``[[force]]`` and ``[[contact]]`` to an edit.
+
+    The key "contact.pole.stiffness" is the constant `stiffness` of the entry named "pole"; the key
+    "contact.pole" is the whole entry, whose value is a mapping, or None to delete the entry.
+    """
     section, _, place = key.partition(".")
     label, _, name = place.partition(".")
     entry = next((entry for entry in entries_of(document, section) if entry["name"] == label), None)
@@ -101,7 +105,7 @@ def _term_edit(document: Mapping[str, Any], key: str, value: Any, status: str, s
 
 
 def _term_item(section: str, law: Any, key: str, value: Any, status: str, source: str) -> Any:
-    """Convert a constant or option of an entry of ``[[force]]`` or ``[[contact]]`` to its TOML value."""
+    """Convert the value of a constant or option of an entry of ``[[force]]`` or ``[[contact]]`` to TOML."""
     model = TERMS[section].get(law)
     if model is None:
         place = key.rpartition(".")[0]
@@ -115,6 +119,7 @@ def _term_item(section: str, law: Any, key: str, value: Any, status: str, source
 
 
 def _constant(key: str, si_unit: str, value: Any, status: str, source: str) -> dict[str, Any]:
+    """Convert text with a unit, a number in SI, a `Constant` or a mapping to the TOML table of a constant."""
     from printhammer.units import split
 
     if isinstance(value, Mapping):
@@ -239,7 +244,10 @@ def changed_text(text: str, edits: Iterable[Edit]) -> str:
 
 
 def _put_entry(document: MutableMapping[str, Any], key: str, value: Any, table: Callable[..., Any]) -> None:
-    """Put a value at a key such as "contact.pole" or "contact.pole.stiffness"; None deletes the key."""
+    """Set a key such as "contact.pole" or "contact.pole.stiffness" in a document; None deletes the key.
+
+    `table` converts a mapping to a TOML table. A new entry is appended to its list; an empty list is deleted.
+    """
     section, label, *rest = key.split(".")
     entries = document[section]
     at = next((k for k, entry in enumerate(entries) if entry["name"] == label), len(entries))
@@ -256,6 +264,7 @@ def _put_entry(document: MutableMapping[str, Any], key: str, value: Any, table: 
 
 
 def _put(document: MutableMapping[str, Any], key: str, value: Any, table: Callable[..., Any]) -> None:
+    """Set a key such as "mass" or "pack.stiffness" in a document; None deletes the key."""
     section, _, name = key.rpartition(".")
     holder: Any = document.setdefault(section, {}) if section else document
     if value is None:

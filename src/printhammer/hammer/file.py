@@ -7,8 +7,6 @@ A file has ``format = 1``, ``name``, optionally ``title``, ``note``, ``strike`` 
 ``[uncertainty]`` with standard errors of constants (`printhammer.hammer.uncertainty`). All but name and mass
 are optional. A constant is ``{ value = 0.008, unit = "in", status = "stated", source = "Fig. 3" }``, with the
 unit "1" for a pure number.
-constant is ``{ value = 0.008, unit = "in", status = "stated", source = "Fig. 3" }``, with the unit "1" for a
-pure number.
 """
 
 from __future__ import annotations
@@ -267,7 +265,7 @@ def _kind(table: Mapping[str, Any], section: str, selector: str) -> str:
 
 
 def entries_of(document: Mapping[str, Any], section: str) -> list[Mapping[str, Any]]:
-    """Return the entries of ``[[force]]`` or ``[[contact]]`` of a document, each with a name of its own."""
+    """Return the entries of ``[[force]]`` or ``[[contact]]``; check that their names are valid and unique."""
     entries = document.get(section, [])
     if not isinstance(entries, list) or not all(isinstance(entry, Mapping) for entry in entries):
         raise InputError.of(section, entries, f"tables [[{section}]]", written=shown(entries))
@@ -285,7 +283,7 @@ def entries_of(document: Mapping[str, Any], section: str) -> list[Mapping[str, A
 
 
 def _term(section: str, entry: Mapping[str, Any], constants: dict[str, Constant], folder: Path) -> Term:
-    """Parse an entry of ``[[force]]`` or ``[[contact]]``; add its constants to `constants`."""
+    """Parse an entry of ``[[force]]`` or ``[[contact]]``; add the constants of the entry to `constants`."""
     key, known = f"{section}.{entry['name']}", TERMS[section]
     law = entry.get("law")
     expected = f"one of {', '.join(known)}"

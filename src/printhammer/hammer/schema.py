@@ -28,8 +28,8 @@ _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 def schema() -> dict[str, Any]:
     """Return the JSON schema (draft 2020-12) of hammer files.
 
-    The schema does not express dimensions, the order of positions, or constants that replace others;
-    `printhammer hammer check` does.
+    The schema cannot express the dimensions of units, the order of positions, or which constants exclude each
+    other; `printhammer hammer check` tests these rules.
     """
     properties: dict[str, Any] = {"format": {"const": FORMAT, "description": "version of the file format"}}
     properties |= {name: {"type": "string", "description": meaning} for name, meaning in TEXTS.items()}
@@ -61,17 +61,19 @@ def schema() -> dict[str, Any]:
 
 
 def _term(section: str, law: str, model: type[BaseModel]) -> dict[str, Any]:
+    """Return the schema of an entry of ``[[force]]`` or ``[[contact]]`` with the given law."""
     table = _described(model, {"law": {"const": law}, "name": {"type": "string"}}, ["law", "name"])
     return {**table, "title": f"[[{section}]] {law}"}
 
 
 def _table(section: str, kind: str, selector: str) -> dict[str, Any]:
+    """Return the schema of a part or waveform table with the law or shape `kind`."""
     needed = [] if UNSAID.get(section) == kind else [selector]
     return _described(model_of(section, kind), {selector: {"const": kind}}, needed)
 
 
 def _described(model: type[BaseModel], properties: dict[str, Any], needed: list[str]) -> dict[str, Any]:
-    """Return the schema of a table with the constants and options of a model, after other `properties`."""
+    """Return the schema of a table: the given `properties`, then the constants and options of a model."""
     properties |= _constants(model)
     for name, annotation in file_options(model).items():
         description = model.model_fields[name].description
@@ -84,19 +86,25 @@ def _described(model: type[BaseModel], properties: dict[str, Any], needed: list[
 
 
 def _object(properties: dict[str, Any], required: list[str]) -> dict[str, Any]:
+    """Return the schema of an object that allows no other properties."""
     return {"type": "object", "properties": properties, "required": required, "additionalProperties": False}
 
 
 def _required(model: type[BaseModel]) -> list[str]:
+    """Return the names of the required constants of a model."""
     return [name for name, note in quantities(model).items() if note.required]
 
 
 def _constants(model: type[BaseModel]) -> dict[str, Any]:
+    """Return the schemas of the constants of a model, by name."""
     return {name: _constant_schema(note) for name, note in quantities(model).items()}
 
 
 def _constant_schema(note: Quantity) -> dict[str, Any]:
-    """Return the JSON schema of one constant; only the sign of a bound is independent of the unit."""
+    """Return the JSON schema of one constant.
+
+    The schema contains a bound only if it holds in every unit: a bound of zero, or a bound of a pure number.
+    """
     units = " or ".join((note.si, *(unit for unit in note.also if unit != note.si)))
     result: dict[str, Any] = {
         "$ref": "#/$defs/constant",

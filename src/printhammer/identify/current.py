@@ -198,7 +198,7 @@ def _sampled(table: Readings, times: FloatArray, volts: FloatArray) -> Waveform:
 
 
 FIT: Final = "fit"
-"""Setting of a probe error that is fitted."""
+"""Value that stands for a probe error to be fitted."""
 
 NOMINAL: Final = {"offset": 0.0, "gain": 1.0, "delay": 0.0, "time constant": 0.0}
 """Errors of an ideal probe, SI."""

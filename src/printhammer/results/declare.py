@@ -166,8 +166,8 @@ def column(unit: str, meaning: str, dims: str, *, default: Any = MISSING, **more
     default : object, optional
         Default value of the field.
     **more
-        `more`, further text of the docstring; `name` and `head`, name in the Dataset and heading in the
-        table, if different from the name of the field; `dtype`, `codes`, `attrs`; see `Column`.
+        Options of `Column`, such as `more`, additional text for the docstring, or `name` and `head`, the name
+        in the Dataset and the table heading if they differ from the name of the field.
     """
     note = Column(unit, meaning, tuple(dims.split()), "column", **more)
     return field(default=default, repr=False, metadata={_KEY: note})

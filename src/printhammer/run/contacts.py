@@ -74,7 +74,7 @@ class Dot(Declared):
 
 
 def touches_of(record: Record) -> list[tuple[Literal["pack", "backstop"], float]]:
-    """Return surface and time, s, of every touch in a run; contacts open at the start are excluded."""
+    """Return surface and time, s, of every touch in a run; contacts under way at the start are excluded."""
     return [
         ("pack" if int(row[0]) == PACK_SURFACE else "backstop", float(row[1]))
         for row in record.contacts
@@ -241,7 +241,7 @@ class ExtraDots(Result):
 
 
 class Closing(Declared):
-    """Interval in which a further contact is closed, from touch to opening."""
+    """Interval during which a contact of the list ``[[contact]]`` is closed."""
 
     contact: str = part("name of the contact")
     t_in: float = scalar("s", "time of closing", more="start of the run if the contact was closed then")
@@ -254,7 +254,7 @@ class Closing(Declared):
 
 
 def extrema(problem: Problem, record: Record, sign: float) -> tuple[FloatArray, FloatArray]:
-    """Locate all local maxima of `sign` times the displacement; return times, s, and displacements, m."""
+    """Locate all local maxima of `sign` * displacement; return their times, s, and displacements, m."""
     nodes = record.nodes
     before, after = sign * nodes[:-1, 2], sign * nodes[1:, 2]
     rows = np.flatnonzero((before > 0.0) & (after <= 0.0) & (nodes[1:, 0] > nodes[:-1, 0]))
@@ -269,7 +269,7 @@ def extrema(problem: Problem, record: Record, sign: float) -> tuple[FloatArray, 
 
 
 def closings_of(problem: Problem, record: Record) -> list[Closing]:
-    """Return the closings of all further contacts of a hammer, in order of time."""
+    """Return the closings of all contacts of the list ``[[contact]]``, in order of time."""
     closings: list[Closing] = []
     for key, term in problem.hammer.terms.items():
         if isinstance(term, LinearContact):
@@ -278,6 +278,7 @@ def closings_of(problem: Problem, record: Record) -> list[Closing]:
 
 
 def _closings(name: str, contact: LinearContact, problem: Problem, record: Record) -> list[Closing]:
+    """Return the closings of one contact, in order of time."""
     nodes = record.nodes
     sign = 1.0 if contact.side == "front" else -1.0
     inside = sign * (nodes[:, 1] - contact.position)
@@ -309,10 +310,10 @@ def _closings(name: str, contact: LinearContact, problem: Problem, record: Recor
 
 
 def _closed_steps(inside: FloatArray, inward: FloatArray) -> BoolArray:
-    """Return whether a contact is closed in each step, from indentation and inward velocity at the nodes.
+    """Mask of the steps in which a contact is closed, from indentation and inward velocity at the nodes.
 
-    A step does not cross the position of the contact. One that begins and ends there lies on the side to
-    which its initial velocity points.
+    No step crosses the position of the contact. In a step that begins and ends at this position, the contact
+    is closed if the initial velocity points inward.
     """
     first, last = inside[:-1], inside[1:]
     there = (first == 0.0) & (last == 0.0)

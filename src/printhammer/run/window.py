@@ -35,7 +35,7 @@ _known: dict[tuple[str, str], Window] = {}
 
 
 class Window(NamedTuple):
-    """Window of a device under a waveform (last firing to end of run), and single-pulse flight time."""
+    """Window of a run (last firing to end) for a device and waveform, and flight time of the single pulse."""
 
     wait: float  # Time from the last firing to the end of a run, s
     flight: float  # Flight time of the single pulse, s; NaN without a dot
@@ -90,7 +90,7 @@ def scaled_rate(hammer: Hammer, rate: float, waveform: Waveform | None = None) -
 
 
 def _window_of(hammer: Hammer, pulse: Waveform) -> Window:
-    """Determine the window of a device, from the cache if its single pulse was run before."""
+    """Compute the window of a run from single pulses of a device; windows are cached."""
     if not has_window(hammer, pulse):
         return Window(least_wait(pulse), math.nan)
     drive = PulseTrain(pulse)

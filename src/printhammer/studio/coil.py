@@ -75,10 +75,11 @@ TEMPERATURES: Final = Range(-40.0, 180.0, logarithmic=False)
 
 
 def span_of(hammer: Hammer, key: str, factor: float) -> Range | None:
-    """Return the control range of a constant or an unspecified coil constant; None for an unknown key.
+    """Return the range of the control of a constant; None for a constant without a control.
 
-    The page adds further forces and contacts up beforehand: their constants, those of the spring, and a mass
-    that has a weight have no control.
+    Coil constants that the hammer file leaves out have a control, too. If the file lists additional forces or
+    contacts, the page receives only their sum with the spring: the constants of spring, forces and contacts,
+    and the mass if a force is its weight, then have no control.
     """
     section = key.partition(".")[0]
     if section == "waveform" or section in TERMS or (hammer.terms and section == "spring"):

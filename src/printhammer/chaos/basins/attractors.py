@@ -1,4 +1,4 @@
-"""Attractors of pulse trains: identified from strobe states, and matched to further trains."""
+"""Attractors of pulse trains: identify attractors from strobe states, and assign trains to attractors."""
 
 from __future__ import annotations
 

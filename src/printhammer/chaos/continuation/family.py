@@ -58,7 +58,7 @@ class Touch(Declared):
 
 
 class Passage(Declared):
-    """Contacts of a motion between two sections, with the time between firings."""
+    """Contacts of a motion between two sections, period of the drive and number of firings."""
 
     touches: tuple[Touch, ...] = part("in order")
     period: float = scalar("s", "time between firings")

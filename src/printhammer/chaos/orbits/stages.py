@@ -282,7 +282,7 @@ class Search:
         ]
 
     def _batch(self, guesses: list[Guess], batch: int, period: int) -> list[Guess]:
-        """Select the guesses of one batch, i.e. those beyond the preceding batches."""
+        """Select the guesses that a batch adds to the preceding batches."""
         begin, end = (_share(count, period) // 2 for count in (0, *self.batches)[batch : batch + 2])
         return guesses[begin:end]
 

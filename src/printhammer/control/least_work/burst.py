@@ -377,7 +377,7 @@ def least_work(
     force : float, optional
         Least force of a dot, relative to the single pulse.
     largest : float or str, optional
-        Current limit of either sign, A, or text with a unit; by default 2 A or the peak of the own pulse.
+        Limit of the absolute current, A, or text with a unit; by default 2 A or the hammer's peak current.
     slew : float, optional
         Slope limit of the current, A/s; by default the steepest rise of the hammer's waveform.
     least : str, optional

@@ -1,7 +1,8 @@
 """Records in a folder of machine code: machine, versions and compile times of its content.
 
-A folder may have been copied from another machine, included in a container image, or be shared by different
-machines. The record explains why code in the folder cannot be used, and gives the expected compile time.
+A folder may have been copied from another machine, may be part of a container image, or may be shared by
+several machines. The record explains why code in the folder cannot be used, and gives the expected compile
+time.
 """
 
 from __future__ import annotations

@@ -238,7 +238,10 @@ def land_on_push(start: State, h: float, upper: float, law: ForceLaw, control: C
 def level_switch(
     start: State, end: State, h: float, level: float, sign: float, law: ForceLaw, control: Control
 ) -> tuple[int, float, float]:
-    """Detect a crossing of `level` in a step; return a code, the step fraction and its upper bound."""
+    """Detect where sign * x rises through sign * `level` in a step; return code, step fraction, upper bound.
+
+    The code is REACHED_FRONT for a crossing of any level, NO_SWITCH, or UNRESOLVED if the step is too long.
+    """
     x0, v0, a0 = sign * start[1], sign * start[2], sign * start[3]
     x1, v1, a1 = sign * end[1], sign * end[2], sign * end[3]
     code = rises_through(x0, v0, a0, x1, v1, a1, h, sign * level)
@@ -257,7 +260,7 @@ def level_switch(
 
 @inlined
 def is_beyond(x: float, v: float, a: float, level: float) -> bool:
-    """Whether a motion lies, or begins, on the far side of a displacement `level` [m]."""
+    """Whether x > `level` [m] holds for a motion now, or immediately after if the motion is at `level`."""
     return x > level or (x == level and (v > 0.0 or (v == 0.0 and a > 0.0)))
 
 
@@ -265,7 +268,15 @@ def is_beyond(x: float, v: float, a: float, level: float) -> bool:
 def first_switch(
     start: State, end: State, h: float, law: ForceLaw, peak: float, control: Control
 ) -> tuple[int, float, float, float, float]:
-    """Return the first event inside a step: code, fraction of the step, upper bound, level and direction."""
+    """Find the first event inside a step by tests on its quintic Hermite interpolant.
+
+    Returns
+    -------
+    tuple
+        Code of the event (NO_SWITCH if none, UNRESOLVED if the step is too long for the tests), estimated
+        fraction of the step, upper bound of this fraction, displacement [m] at the event (0 for a reversal),
+        and sign of the velocity at a crossing or before a reversal.
+    """
     mode, hammer = law.mode, law.hammer
     switch, fraction, upper, level, sign = M.NO_SWITCH, 2.0, 1.0, 0.0, 1.0
     if (
@@ -318,7 +329,7 @@ def first_switch(
 
 @compiled
 def is_near_level(x0: float, x1: float, hammer: Hammer) -> bool:
-    """Whether a step from `x0` to `x1` [m] begins or ends nearer to a kink than the step is long."""
+    """Whether `x0` or `x1` [m], the ends of a step, lies within the distance abs(x1 - x0) of a kink."""
     if LEVELS:
         for k in range(MOST_LEVELS):
             level = spring_level(hammer[SPRING:PACK], float(k))
@@ -372,7 +383,8 @@ def advance(
         else:
             end = land_on_level(start, h, fraction, upper, level, sign, law, control)
         if LEVELS and h > shortest and end[0] > t and is_near_level(x, end[1], law.hammer):
-            # Beyond a kink, a law may be a fractional power, whose error is as large as its estimate.
+            # Near a kink, a law may be a fractional power of the distance: the error of the step is then as
+            # large as its estimate, and must meet the smaller tolerance.
             _x, _v, _a, error_x, error_v, _electric, error_e = whole_step(t, x, v, a, end[0] - t, law)
             worst = max(abs(error_x) / control[0], abs(error_v) / control[1], error_e)
             if worst > control[3]:

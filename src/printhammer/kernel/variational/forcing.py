@@ -121,7 +121,10 @@ def force_with_value(x: float, value: float, hammer: Hammer, drive: Drive, forci
 
 @compiled
 def smooth_side(x: float, k: int, setting: Setting) -> int:
-    """Return the difference formula for constant k in which no kink of the spring law passes `x`."""
+    """Select the difference formula whose shifts of constant `k` move no kink of the spring law past `x` [m].
+
+    If a positive shift moves a kink past `x`, the formula is BACKWARD; if a negative shift does, FORWARD.
+    """
     if LEVELS:
         varied = setting.forcing.varied
         for j in range(MOST_LEVELS):

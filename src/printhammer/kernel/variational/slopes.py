@@ -52,11 +52,11 @@ NEAR_END = 1e-3
 """Limit of the step size, as a fraction of the distance to an end of the range, where the law may be
 singular."""
 NEAR_KINK = 1e-2
-"""Limit of the step size, as a fraction of the distance to a kink of the spring law; set by hand."""
+"""Limit of the step size, as a fraction of the distance to a kink of the spring law; chosen by hand."""
 DEPTH_SPACING = 3e-4
 """Step size in the pack, as a fraction of the depth, since the law may contain high powers of the depth."""
 LEAST_DEPTH_SPACING = 1e-7
-"""Smallest step size in the pack, as a fraction of the displacement scale."""
+"""Smallest step size in the pack or near a kink, as a fraction of the displacement scale."""
 ROOT_SPACING = 1e-3
 """Step size of w in the backstop, as a fraction of w, or of 1/100 of the root of the displacement scale if
 larger."""
@@ -82,9 +82,10 @@ def field_at(x: float, value: float, hammer: Hammer) -> float:
 
 @compiled
 def smooth_bounds(node: Any, after: Any, bounds: Any, hammer: Hammer) -> Any:
-    """Return the ends of the range of the laws, and the kinks of the spring law around a step [m].
+    """Return four displacements [m]: the range of the laws, and the interval without a kink around a step.
 
-    A step, from `node` to `after`, passes no kink; it may begin and end on one.
+    The step, from `node` to `after`, crosses no kink of the spring law, but may begin or end on a kink.
+    `bounds` holds the range of the laws.
     """
     low, high = bounds[0], bounds[1]
     if LEVELS:
@@ -108,7 +109,7 @@ def field_slope(x: float, value: float, scales: Any, bounds: Any, hammer: Hammer
     spacing = min(FIELD_SPACING * scales[0], NEAR_END * max(to_end, NEAR_END * scales[0]))
     low, high = bounds[2], bounds[3]
     if LEVELS:
-        # Beyond a kink, the law may contain a fractional power of the distance.
+        # Beyond a kink, the law may contain a fractional power of the distance from the kink.
         to_kink = min(x - low, high - x)
         spacing = min(spacing, max(NEAR_KINK * to_kink, LEAST_DEPTH_SPACING * scales[0]))
     # Round the step so that x + spacing is exact, as the difference formula assumes.

@@ -1,18 +1,19 @@
-"""Sum of the spring, of further forces and of further contacts, as one law of the displacement.
+"""Sum of the spring and of the additional forces and contacts of a hammer file, as one spring law.
 
-A hammer file lists them as ``[[force]]`` and ``[[contact]]``. With x0 a position, d the indentation:
+A hammer file lists the forces as ``[[force]]`` and the contacts as ``[[contact]]``. With the displacement x,
+the position x0 of an entry and the indentation d of a contact, the sum is
 
     Fs = sum of  F + B (x - x0) + D (x - x0)^3          forces: constant, gravity, spring, cubic
-       - sum of  K d^n,  d = x - x0 > 0                 contacts of the front side
-       + sum of  K d^n,  d = x0 - x > 0                 contacts of the back side
+       - sum of  K d^n,  d = x - x0 > 0                 contacts on the front side
+       + sum of  K d^n,  d = x0 - x > 0                 contacts on the back side
 
 Source: Newton's law of gravity near the ground, Hooke's law; H. Hertz (1882) for n = 3/2. A contact is
-elastic, touches without a jump of force, and may be closed together with others and with pack or backstop:
-the contact spring of a relay before the armature meets the pole. Validity: quasi-static contacts. Weakness:
-contacts without damping and mass of their own.
+elastic, and its force is continuous when it closes. Several contacts may be closed at once, also together
+with pack or backstop: in a relay, the contact spring engages before the armature meets the pole. Validity:
+quasi-static contacts. Weakness: contacts have neither damping nor mass.
 
-Packed constants: c = [number of rows, then five numbers a row]: 0, x0, F, B, D for a force; 1 (front) or -1
-(back), x0, K, n, 0 for a contact.
+Packed constants: c[0] is the number of rows. The five numbers of a row follow: 0, x0, F, B, D for a force; 1
+(front) or -1 (back), x0, K, n, 0 for a contact.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from printhammer.parts.base import SpringPart
 from printhammer.support.constants import quantity
 
 LEVELS = True
+"""Whether the slope of the law changes at the positions that `spring_level` returns."""
 
 ROOM: Final = 64
 """Number of packed constants that the kernel reserves for a spring."""
@@ -36,16 +38,17 @@ WIDTH: Final = 5
 """Number of packed constants of a force or contact."""
 
 MOST: Final = (ROOM - 1) // WIDTH
-"""Largest number of forces and contacts, the spring included."""
+"""Maximum number of forces and contacts, including the spring."""
 
 FRONT, BACK = 1.0, -1.0
+"""First number of the row of a contact, by the side of the armature that touches."""
 
 GRAVITY: Final = 9.80665
 """Standard acceleration of free fall, m/s^2: 3rd General Conference on Weights and Measures (1901)."""
 
 
 def spring_force(c: Any, x: float) -> float:
-    """Return the sum of all forces, N."""
+    """Return the sum of all forces and contact forces, N, at the displacement `x`, m."""
     total = 0.0
     for k in range(int(c[0])):
         row = 1 + WIDTH * k
@@ -60,7 +63,7 @@ def spring_force(c: Any, x: float) -> float:
 
 
 def spring_energy(c: Any, x: float) -> float:
-    """Return the sum of the potential energies, J; that of a contact is zero outside the contact."""
+    """Return the sum of the potential energies, J; the energy of an open contact is zero."""
     total = 0.0
     for k in range(int(c[0])):
         row = 1 + WIDTH * k
@@ -76,7 +79,7 @@ def spring_energy(c: Any, x: float) -> float:
 
 
 def spring_level(c: Any, k: float) -> float:
-    """Return the position of the k-th contact, m; infinity from the number of contacts on."""
+    """Return the position of contact `k`, counted from 0, m; infinity if there are fewer contacts."""
     left = k
     for i in range(int(c[0])):
         row = 1 + WIDTH * i
@@ -88,7 +91,7 @@ def spring_level(c: Any, k: float) -> float:
 
 
 def spring_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants; the positions that are NaN are those of the backstop; return the count."""
+    """Write the packed constants to `c`, with `origin` for NaN positions; return the number of constants."""
     count = 1 + WIDTH * int(q[0])
     for k in range(count):
         c[k] = origin if math.isnan(q[k]) else q[k]
@@ -96,7 +99,7 @@ def spring_packed(q: Any, origin: float, c: Any) -> int:
 
 
 Row = tuple[float, float, float, float, float]
-"""Packed constants of a force or contact; NaN for the position of the backstop."""
+"""Packed constants of a force or contact; a NaN position stands for the position of the backstop."""
 
 
 class Term(BaseModel):
@@ -139,7 +142,7 @@ class Gravity(Term):
 
 
 class FurtherSpring(Term):
-    """Linear spring: a preload at a position, by default that of the backstop, and a stiffness."""
+    """Linear spring with a preload at a position, by default the position of the backstop."""
 
     law: ClassVar[str] = "spring"
 
@@ -172,10 +175,10 @@ class LinearContact(Term):
 
     law: ClassVar[str] = "linear"
     power: ClassVar[float] = 1.0
-    """Power of the indentation in the force."""
+    """Exponent of the indentation in the force law."""
 
     side: Literal["front", "back"]
-    """Side of the armature that touches: front for a contact beyond `position`, back for one before it."""
+    """Side of the armature that touches: the front if x > `position`, the back if x < `position`."""
     position: float = quantity("m", "x0", "position at which the contact closes")
     stiffness: float = quantity("N/m", "K", "stiffness of the contact", gt=0)
 
@@ -201,11 +204,11 @@ TERMS: Final[dict[str, dict[str, type[Term]]]] = {
     "force": {term.law: term for term in (ConstantForce, CubicForce, Gravity, FurtherSpring)},
     "contact": {term.law: term for term in (HertzContact, LinearContact)},
 }
-"""Classes of forces and contacts, by the list of a hammer file and the law."""
+"""Classes of forces and contacts, by the list of the hammer file, "force" or "contact", and by law."""
 
 
 class ForceSum(SpringPart):
-    """Sum of the spring of a hammer and of its further forces and contacts; built from a hammer file."""
+    """Sum of the spring of a hammer and of its additional forces and contacts; see `sum_of`."""
 
     model_config = ConfigDict(allow_inf_nan=True)
 
@@ -214,7 +217,7 @@ class ForceSum(SpringPart):
     rows: tuple[Row, ...]
 
     def numbers(self) -> tuple[float, ...]:
-        """Return the number of rows and the rows."""
+        """Return the number of rows, followed by the rows."""
         return (float(len(self.rows)), *(number for row in self.rows for number in row))
 
     def packed(self, origin: float) -> tuple[float, ...]:
@@ -224,7 +227,7 @@ class ForceSum(SpringPart):
 
 
 def sum_of(spring: SpringPart | None, terms: Mapping[str, Term], mass: float) -> ForceSum:
-    """Return the sum of a spring, None without one, and of forces and contacts.
+    """Build the sum of a spring, if any, and of additional forces and contacts.
 
     Parameters
     ----------
@@ -238,8 +241,8 @@ def sum_of(spring: SpringPart | None, terms: Mapping[str, Term], mass: float) ->
     Raises
     ------
     InputError
-        The spring has a law that cannot be added, two contacts of a side have the same position, or there are
-        more than twelve forces and contacts.
+        The spring has a law that cannot be added, two contacts on the same side have the same position, or
+        there are more than `MOST` terms.
     """
     rows = [] if spring is None else [_spring_row(spring)]
     taken: dict[tuple[float, float], str] = {}
@@ -257,7 +260,7 @@ def sum_of(spring: SpringPart | None, terms: Mapping[str, Term], mass: float) ->
 
 
 def _spring_row(spring: SpringPart) -> Row:
-    """Return the row of the spring of a hammer, whose law is `linear`, `preload` or `cubic`."""
+    """Convert a spring to a row; raise InputError unless its law is `linear`, `preload` or `cubic`."""
     values = {name: getattr(spring, name) for name in spring.names()}
     if spring.law == "linear":
         return (0.0, math.nan, values["Bs"], -values["Bs"] / values["As"], 0.0)
