@@ -88,7 +88,7 @@ class DotHeat:
 
 
 def dot_heat(heat: float | str, feed: str = "voltage") -> DotHeat:
-    """Build the coil heat per dot from its value at 20 degC, J, and the quantity that stays constant."""
+    """Build the coil heat per dot from its value at 20 degC, J; `feed` is the quantity held constant."""
     if feed not in FEEDS:
         raise InputError.of("feed", feed, f"one of {', '.join(FEEDS)}")
     return DotHeat((REFERENCE,), (read_positive(heat, "J", "heat"),), feed)

@@ -249,7 +249,7 @@ class Hammer:
 
     @property
     def terms(self) -> Mapping[str, Term]:
-        """Further forces and contacts by key, such as "force.weight" or "contact.pole"."""
+        """Additional forces and contacts by key, such as "force.weight" or "contact.pole"."""
         return MappingProxyType(self._contents.terms)
 
     @property

@@ -459,7 +459,7 @@ def student(degrees_of_freedom: float) -> float:
 
 
 def _check_agreement(hammer: Hammer, key: str, text: str) -> None:
-    """Raise `InputError` if the hammer's constant differs from the value that the fit took as known."""
+    """Raise `InputError` if the hammer's constant differs from the value that the fit treated as known."""
     from printhammer.units import parse
 
     known = hammer.constants.get(key)

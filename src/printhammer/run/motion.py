@@ -286,7 +286,7 @@ class Motion(Result, fields=False):
 
     @cached_property
     def closings(self) -> Rows[Closing]:
-        """Closings of all further contacts in order of time; a tuple, shown as a table."""
+        """Closings of all contacts of the list ``[[contact]]`` in order of time, shown as a table."""
         return Rows(closings_of(self._problem, self._record), Closing)
 
     @cached_property

@@ -194,7 +194,10 @@ def _without_folds_at_crossings(points: list[BranchPoint], curve: Curve) -> list
 
 
 def _has_sign_change(before: float, after: float) -> bool:
-    """Whether a test function changes sign by more than rounding noise, as of area-preserving maps."""
+    """Whether a test function changes sign by more than rounding noise.
+
+    For area-preserving maps, a test function may be zero up to rounding along the whole curve.
+    """
     return before * after < 0.0 and max(abs(before), abs(after)) > _ROUNDING
 
 

@@ -261,7 +261,7 @@ _ON_CURVE: Final = 1e-5
 def grazing_end(
     family: RegimeFamily, scales: FloatArray, node: Node, *, impacts: bool = False
 ) -> tuple[list[Node], float] | None:
-    """Compute the last orbits of a branch before the grazing that ends it, and the parameter there.
+    """Compute the last orbits of a branch before a final grazing, and the parameter at the grazing.
 
     `node` is the last known orbit; with `impacts`, its turning points are ignored. None if the orbit is not
     close to a grazing.

@@ -48,7 +48,7 @@ _STEPS: Final = Steps(most=150, precision=1e-10)
 
 
 def crossings(orbit: Orbit) -> list[FloatArray]:
-    """Find further orbits at the same drive period: states where the branch of an orbit returns to it."""
+    """Find states of other orbits at an orbit's drive period, where its branch returns to this period."""
     regime, own = orbit.regime, orbit.regime.period
     if PERIOD not in regime.names:
         return []
@@ -342,7 +342,7 @@ class Search:
         )
 
     def _describe(self, described: list[tuple[Orbit, int]], known: Sequence[tuple[Regime, _Known]]) -> None:
-        """Compute the properties of orbits; append those not yet found at another section."""
+        """Compute the properties of orbits; append each orbit that was not yet found at another section."""
         quiet = self.effort.quiet
         orbits = quiet.mapped(lambda pair: orbit_of(pair[0], pair[1].closing, quiet.tolerance), known)
         for orbit, (_regime, own) in zip(orbits, known, strict=True):

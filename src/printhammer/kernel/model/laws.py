@@ -136,8 +136,8 @@ spring_force: Law1
 spring_energy: Law1
 """Potential energy of the spring [J], whose negative slope is the force; argument: displacement [m]."""
 spring_level: Law1
-"""Position [m] at which the slope of the spring force changes; argument: index of the position; infinity from
-the number of such positions on."""
+"""Position [m] at which the slope of the spring force changes; argument: index of the position, from 0;
+infinity if there are fewer positions."""
 damping_force: Law1
 """Damping force on the armature [N], a differentiable function; argument: velocity [m/s]."""
 pack_loading: Law2
