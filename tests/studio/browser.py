@@ -38,16 +38,14 @@ def chromium() -> str | None:
     return next(filter(None, map(shutil.which, NAMES)), None)
 
 
-class Page:
-    """One tab: what it runs, what it says on its console, what it asks the network for."""
+class Wire:
+    """Connection to a tab of a browser: what the tab says on its console, what it asks the network for."""
 
     def __init__(self, socket: ClientConnection) -> None:
         self.socket = socket
         self.numbers = itertools.count(1)
         self.complaints: list[str] = []
         self.requests: list[str] = []
-        for domain in ("Page", "Runtime", "Network", "Log"):
-            self.call(f"{domain}.enable")
 
     def call(self, method: str, **arguments: Any) -> dict[str, Any]:
         """Send a command and return its answer."""
@@ -59,6 +57,31 @@ class Page:
                 assert "error" not in message, message["error"]
                 return message["result"]
             self._note(message)
+
+    def _note(self, message: dict[str, Any]) -> None:
+        """Record a message of the browser that is no answer."""
+        raise NotImplementedError
+
+    def run(self, script: str) -> Any:
+        """Run a script in the page, which may be a promise, and return its value."""
+        raise NotImplementedError
+
+    def wait(self, condition: str, seconds: float = WAIT) -> Any:
+        """Wait until a script gives something true, and return that."""
+        end = time.monotonic() + seconds
+        while not (found := self.run(condition)):
+            assert time.monotonic() < end, f"waited for {condition}; {self.complaints}"
+            time.sleep(0.05)
+        return found
+
+
+class Page(Wire):
+    """One tab of a Chromium."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        super().__init__(socket)
+        for domain in ("Page", "Runtime", "Network", "Log"):
+            self.call(f"{domain}.enable")
 
     def _note(self, message: dict[str, Any]) -> None:
         told = message.get("params", {})
@@ -79,14 +102,6 @@ class Page:
         found = self.call("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)
         assert "exceptionDetails" not in found, found["exceptionDetails"]
         return found["result"].get("value")
-
-    def wait(self, condition: str, seconds: float = WAIT) -> Any:
-        """Wait until a script gives something true, and return that."""
-        end = time.monotonic() + seconds
-        while not (found := self.run(condition)):
-            assert time.monotonic() < end, f"waited for {condition}; {self.complaints}"
-            time.sleep(0.05)
-        return found
 
     def open(self, address: str) -> None:
         """Go to an address."""

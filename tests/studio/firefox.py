@@ -1,18 +1,17 @@
 """A headless Firefox, driven over WebDriver BiDi; helpers only."""
 
 import base64
-import itertools
 import json
 import re
 import shutil
 import subprocess
 import tempfile
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from tests.studio.browser import Wire
 from websockets.sync.client import ClientConnection, connect
 
 NAMES = ("firefox-esr", "firefox")
@@ -25,28 +24,14 @@ def firefox() -> str | None:
     return next(filter(None, map(shutil.which, NAMES)), None)
 
 
-class Tab:
-    """One tab: what it runs, what it says on its console, what it asks the network for."""
+class Tab(Wire):
+    """One tab of a Firefox."""
 
     def __init__(self, socket: ClientConnection) -> None:
-        self.socket = socket
-        self.numbers = itertools.count(1)
-        self.complaints: list[str] = []
-        self.requests: list[str] = []
+        super().__init__(socket)
         self.call("session.new", capabilities={})
         self.call("session.subscribe", events=EVENTS)
         self.context = self.call("browsingContext.getTree")["contexts"][0]["context"]
-
-    def call(self, method: str, **arguments: Any) -> dict[str, Any]:
-        """Send a command and return its answer."""
-        number = next(self.numbers)
-        self.socket.send(json.dumps({"id": number, "method": method, "params": arguments}))
-        while True:
-            message = json.loads(self.socket.recv(timeout=WAIT))
-            if message.get("id") == number:
-                assert message["type"] == "success", message
-                return message["result"]
-            self._note(message)
 
     def _note(self, message: dict[str, Any]) -> None:
         told = message.get("params", {})
@@ -66,14 +51,6 @@ class Tab:
         )
         assert found["type"] == "success", found["exceptionDetails"]
         return json.loads(found["result"]["value"])
-
-    def wait(self, condition: str, seconds: float = WAIT) -> Any:
-        """Wait until an expression gives something true, and return that."""
-        end = time.monotonic() + seconds
-        while not (found := self.run(condition)):
-            assert time.monotonic() < end, f"waited for {condition}; {self.complaints}"
-            time.sleep(0.05)
-        return found
 
     def open(self, address: str, width: int, height: int) -> None:
         """Go to an address, in a window of a size."""
