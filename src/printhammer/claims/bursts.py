@@ -252,8 +252,8 @@ def flight_time_spread(context: Context, claim: Claim) -> Measured:
     }
     return Measured(
         value,
-        f"Of {len(by_panel)} bursts, {over['dot_matrix_s']} have a spread above 200 us, the tolerance of"
-        f" dot-matrix printing, and {over['engraved_s']} one above 30 us.",
+        f"{over['dot_matrix_s']} of {len(by_panel)} bursts have a spread above 200 us, the tolerance of"
+        f" dot-matrix printing, and {over['engraved_s']} a spread above 30 us.",
     )
 
 
