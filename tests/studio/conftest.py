@@ -21,8 +21,6 @@ HAMMERS = ("hendriks-1983-1", "hendriks-1983", "bouncing-ball", "duffing-holmes"
 WHOLE = f"#views={'-'.join(VIEWS)}"
 """Link to the page with all views."""
 left_out: dict[str, int] = {}
-AGAIN_WAIT = 20.0
-"""Time in which a page must show the state with which it opened, s; about ten times the usual time."""
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[Any]) -> None:
@@ -36,8 +34,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[Any]) -> No
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
-    if reopened := left_out.pop("reopened", 0):
-        terminalreporter.write_line(f"{reopened} pages opened anew: their state could not be set again")
     for name, count in left_out.items():
         if count:
             terminalreporter.write_line(f"{count} tests in a browser left out: no {name} found")
@@ -109,15 +105,7 @@ def tabs(address: str, opened_browser: Any) -> Iterator[Callable[..., Page]]:
             found.size(width, height)
             found.complaints.clear()
             found.run(AGAIN % state)
-            try:
-                found.wait(COMPLETE, AGAIN_WAIT)
-            except AssertionError:
-                # Seen once in many runs, after a change of hammer; the last lines of the test run say so.
-                left_out["reopened"] = left_out.get("reopened", 0) + 1
-                found = stack.enter_context(visited(f"{address}{link}", opened_browser))
-                tabs[link] = found, state
-                found.size(width, height)
-                found.wait(COMPLETE)
+            found.wait(COMPLETE)
             return found
 
         yield tab

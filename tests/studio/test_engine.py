@@ -75,6 +75,18 @@ def test_a_map_that_comes_late_does_not_replace_that_of_a_newer_state(modules: P
     assert shown(modules, late) == [[2, "preview"], [2, "full"]]
 
 
+def test_a_map_that_comes_late_does_not_replace_a_complete_one_to_which_the_page_went_back(
+    modules: Path,
+) -> None:
+    back = (
+        "await set(1, {}); await draw(500);"
+        "await set(2, { low: 600 }); await answer('curves', 600); await answer('piece', 600);"
+        "await set(3, {}); await answer('curves', 500); await answer('codes', 600); await draw(600);"
+        "await draw(500);"
+    )
+    assert shown(modules, back) == [[1, "preview"], [1, "full"]]
+
+
 def test_a_map_that_follows_a_refused_one_is_drawn_again(modules: Path) -> None:
     back = (
         "await set(1, {}); await draw(500); await set(2, { low: 1000 }); await draw(1000);"

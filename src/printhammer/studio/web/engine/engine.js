@@ -52,7 +52,10 @@ export function engineOf(shelf, script, receive, page, crew = crewOf(script, she
       receive({ ...motion, serial, outdated });
       receive({ ...dots, serial });
       const isBehind = (view) => isWanted(state, view) && whole[view] !== keyOf(state, KEYS[view]);
+      // A view that is complete for this state takes no late frame of an older one, whose orders are dropped.
+      for (const view of state.views) if (view in KEYS && !isBehind(view)) seen[view] = serial;
       if (isBehind("map")) draw(serial, state);
+      else drawn = serial;
       if (isBehind("line")) follow(serial, state, "line");
       if (isBehind("strobe")) follow(serial, state, "strobe", section());
     });
