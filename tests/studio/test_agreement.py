@@ -28,7 +28,7 @@ from printhammer.studio.controls import describe
 
 NUDGE, DRIFT, AGREES = 5e-16, 5e-13, 1e-9
 SINGLE, ASIDE = 1e-7, 1e-10
-"""Rounding to single precision, and time by which rounding may move the end of a step, in parts of the run."""
+"""Rounding to single precision, and shift of the end of a step by rounding, as a fraction of the run."""
 NAME = "hendriks-1983-1"
 LENGTHS = {"indentation": 1e-15}
 THROUGHPUT = 1e-4  # Rounding moves the ends of steps, on which the sum of the works of all steps depends
