@@ -229,8 +229,8 @@ def _next_held(solution: Solution, data: FloatArray) -> int | None:
 def _held_at(law: Law, data: FloatArray, solution: Solution, free: BoolArray, held: int) -> FloatArray:
     """Hold a parameter at its default, or at its estimate if the data exclude the default; refit the rest.
 
-    A parameter at a bound stays there, but the value `rest` is tried first: where two parameters have the same
-    effect, one can end at its bound because the other compensates for it.
+    A parameter at a bound stays there, but the value `rest` is tried first: where two parameters have the
+    same effect, one can end at its bound because the other compensates for it.
     """
     p, space = solution.p.copy(), solution.parameters
     if space.rest is None and _at_bound(solution)[held]:
