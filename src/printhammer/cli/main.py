@@ -52,7 +52,7 @@ GROUPS: Final = {"hammer": (hammer.GROUP, None), "fit": (fit.GROUP, fit.EXAMPLE)
 
 BAD_INPUT: Final = 2  # Exit status, by convention of command lines
 _COLUMNS: Final = 76
-"""Largest line length of an example in the help; arbitrary."""
+"""Largest line length of an example in the help, in characters; arbitrary."""
 
 HELP: Final = (
     "A laboratory for impact print hammers: motion, contacts, dots, and the claims of Hendriks (1983)."

@@ -47,7 +47,7 @@ class Option:
     type: Any = str
     """Type into which typer converts the text: str, Path, int, float, bool or an enumeration."""
     read: Callable[[str, str], Any] | None = None
-    """Parser of (text, flag) that replaces the conversion by typer; raises `InputError`."""
+    """Parser, called with text and flag instead of the conversion by typer; raises `InputError`."""
     many: bool = False
     """Whether the option is repeatable."""
     least: float | None = None
@@ -59,7 +59,7 @@ class Option:
     writes: bool = False
     """Whether the option names a file or folder that the verb writes."""
     hammer: Literal["named", "loaded", "fired"] | None = None
-    """Role of a hammer: "named" (not loaded), "loaded" (warnings shown), "fired" (must have a waveform)."""
+    """For a hammer: "named" (not loaded), "loaded" (warnings shown) or "fired" (must have a waveform)."""
 
     def flag_of(self, name: str) -> str:
         """Return the command-line flag that sets a parameter, such as --largest-current."""
@@ -80,7 +80,7 @@ class Option:
         return Annotated[type_ | None if self.default is None else type_, entry]
 
     def typer_default(self) -> Any:
-        """Return the default for typer: as text if `read` parses the text."""
+        """Return the default value for typer; as text if the option has a parser of its own, `read`."""
         if self.read is None or self.default in (None, ...):
             return self.default
         return format(self.default, "g") if isinstance(self.default, float) else str(self.default)
@@ -88,7 +88,7 @@ class Option:
 
 @dataclass(frozen=True)
 class Files(Option):
-    """Option that names output files, which the runner checks before the computation and writes."""
+    """Option for output files; the runner checks them before the computation and writes them after it."""
 
     endings: tuple[str, ...] = ()
     """Accepted file endings besides those of pictures; if empty, every ending is accepted."""
@@ -104,7 +104,7 @@ def files(what: str, *endings: str, many: bool = True, **more: Any) -> Files:
 
 
 def results(what: str, *more: str, **options: Any) -> Files:
-    """Declare the option `--out` that saves `what`: as data, as a picture, or with one of `more` endings."""
+    """Declare an option for result files: data, pictures, and `more` endings; `what` names the result."""
     endings = (*DATA, *more)
     kinds = f"Output file for {what} ({', '.join(endings)}; SI)"
     return files(f"{kinds} or a picture (.svg, .png, .pdf); repeatable.", *endings, **options)
@@ -120,7 +120,7 @@ def file(what: str, *endings: str, **more: Any) -> Files:
 
 
 def text(metavar: str, what: str, **more: Any) -> Any:
-    """Declare an option whose text is passed verbatim, or converted by typer."""
+    """Declare an option whose value is text, or is converted by typer to the keyword `type`."""
     return Option(what, metavar, **more)
 
 
@@ -212,7 +212,7 @@ def source(what: str, **more: Any) -> Any:
 
 
 def folder(what: str, **more: Any) -> Any:
-    """Declare an option for an output folder (or, with another placeholder, a single output file)."""
+    """Declare an option for an output folder; with another `metavar`, also for an output file."""
     return Option(what, **{"metavar": "FOLDER", "type": Path, "writes": True, **more})
 
 
@@ -252,7 +252,7 @@ def read_span(written: str, name: str) -> tuple[str, str, int]:
 
 
 def between(span: tuple[str, str, int] | None, si: str, name: str) -> list[float]:
-    """Return the evenly spaced values of a `span` in an SI unit; an empty list for None."""
+    """Return the evenly spaced values of a range in the unit `si`; an empty list for None."""
     import numpy as np
 
     from printhammer.drive.input import read_number

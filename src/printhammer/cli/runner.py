@@ -91,7 +91,7 @@ class Answer:
     failed: bool = False
     """Whether the exit status is 1 even without a complaint."""
     interrupted: bool = False
-    """Whether Ctrl-C stopped the computation; the answer then holds the finished part."""
+    """Whether Ctrl-C stopped the computation; the answer then covers what was computed until then."""
 
 
 class Job:
@@ -122,7 +122,7 @@ class Job:
     def check(self, *inputs: Path) -> None:
         """Check, before the computation, that all output files are writable, new, and not input files.
 
-        Errors as for `check_endings`, `check_outputs` and `check_new`.
+        Raises the errors of `check_endings`, `check_outputs` and `check_new`.
         """
         from printhammer.results.files import need_for
         from printhammer.support.files import check_outputs
@@ -228,11 +228,11 @@ def verb(
 ) -> Callable[[Callable[..., Answer]], Verb]:
     """Decorate a function as the verb `name`, with a runnable example.
 
-    The function declares options as defaults of its parameters, and receives the `Job` in a parameter `job`
-    if it has one. `passed` are options with the names of the library function's parameters: options that are
-    set arrive as further keywords; the library supplies the defaults of the others. `files` declare output
-    files, in the order of writing. A verb that writes new files has the option --force; a verb that reads a
-    hammer or a spec, or names `part` among `passed`, has the option --part.
+    The function declares its options as default values of its parameters; a parameter `job` receives the
+    `Job`. `passed` declares options by the parameter names of the library function that the verb calls; the
+    verb receives, as keywords, only those that the user sets. `files` declares the options for output files,
+    in the order of writing. The runner adds --force to verbs that write new files, and --part to verbs that
+    read a hammer or a spec file or have `part` in `passed`.
     """
 
     def made(function: Callable[..., Answer]) -> Verb:
@@ -317,7 +317,7 @@ def _values(job: Job, options: Mapping[str, Option], texts: dict[str, Any]) -> d
 def load_hammer(name: str, *, fired: bool) -> Hammer:
     """Load a hammer for a simulation and print its warnings.
 
-    Raises InputError for an unknown hammer, one without a rest state, or, if `fired`, one without a waveform.
+    Raises InputError for an unknown hammer, without a rest state, or, if `fired`, without a waveform.
     """
     from printhammer.hammer.hammer import load
 
@@ -335,7 +335,7 @@ def load_hammer(name: str, *, fired: bool) -> Hammer:
 
 
 def tables_beside(path: Path, *parts: object) -> list[Path]:
-    """Return the paths of the tables that parts refer to by name, relative to the folder of `path`."""
+    """Return the paths of the table files that parts of a hammer refer to; names are relative to its file."""
     names = [getattr(part, "file", None) for part in parts]
     return [path.parent / name for name in names if name]
 
@@ -359,7 +359,7 @@ def check_endings(paths: Iterable[Path], endings: Sequence[str], option: str = "
 
 
 def ended_early(statuses: Iterable[object], total: int | None = None) -> list[str]:
-    """Return a complaint that counts the runs whose status is not ok, out of `total` runs."""
+    """Return one complaint, with run count and statuses, if any status is not "ok"; else an empty list."""
     every = [str(status) for status in statuses]
     failed = [status for status in every if status != "ok"]
     kinds = ", ".join(sorted(set(failed)))
@@ -367,14 +367,14 @@ def ended_early(statuses: Iterable[object], total: int | None = None) -> list[st
 
 
 def period_text(hammer: Hammer, period: float) -> str:
-    """Format a firing period of the paper's hammer, s, scaled to a device, such as "1.05 ms"."""
+    """Scale a period [s] of the paper's hammer to the time scale of a hammer; format it as "1.05 ms"."""
     from printhammer.run.window import time_scale
 
     return f"{1e3 * period * time_scale(hammer):.4g} ms"
 
 
 def rate_text(hammer: Hammer, rate: float) -> str:
-    """Format a firing rate of the paper's hammer, Hz, scaled to a device, such as "952 Hz"."""
+    """Scale a rate [Hz] of the paper's hammer to the time scale of a hammer; format it as "952 Hz"."""
     from printhammer.run.window import scaled_rate
 
     return f"{scaled_rate(hammer, rate):.4g} Hz"

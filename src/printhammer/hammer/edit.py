@@ -1,6 +1,6 @@
-"""Edits of a hammer file, applied to its parsed dictionary and to its TOML text alike.
+"""Edits of a hammer file, applied both to its parsed dictionary and to its TOML text.
 
-An edit of the text preserves everything else, including comments and layout.
+The text outside the edited entries is unchanged, including comments and layout.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ Edit = tuple[str, Any]
 def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, source: str) -> Edit:
     """Convert a key and value from the user to an edit of a TOML document.
 
-    The key is a constant or option, such as "mass" or "pack.stiffness", a table, such as "backstop", or an
-    entry of a list, such as "contact.pole". The value is, for a constant, text with a unit, a number in SI or
-    a `Constant`; for an option, its value; for a table, a part, a waveform or a mapping; None deletes the
-    key. New constants get the `status` and `source` that are passed.
+    The key names a constant or option, such as "mass" or "pack.stiffness", a table, such as "backstop", or
+    an entry of a list, such as "contact.pole". The value of a constant is text with a unit, a number in SI or
+    a `Constant`; the value of a table is a part, a waveform or a mapping; None deletes the key. `status` and
+    `source` are those of new constants.
     """
     section, _, name = key.rpartition(".")
     if key in SELECTORS:
@@ -119,7 +119,7 @@ def _term_item(section: str, law: Any, key: str, value: Any, status: str, source
 
 
 def _constant(key: str, si_unit: str, value: Any, status: str, source: str) -> dict[str, Any]:
-    """Convert text with a unit, a number in SI, a `Constant` or a mapping to the TOML table of a constant."""
+    """Convert a value (text, SI number, `Constant` or mapping) to the TOML table of a constant."""
     from printhammer.units import split
 
     if isinstance(value, Mapping):

@@ -46,7 +46,7 @@ NO_REST: Final = {
     LIFTED: ("at the backstop the net force at zero current is {1:.6g} N", "a negative force"),
     UNSTABLE: ("it has no stable equilibrium at zero current", None),
 }
-"""Reason why a hammer has no rest state, and what is expected, by outcome of the search."""
+"""Reason why a hammer has no rest state, and the expectation in the error message, by search outcome."""
 
 
 @dataclass(frozen=True)
@@ -272,7 +272,7 @@ def _work() -> Work:
 
 
 def _ascending(numbers: list[float], count: int) -> int:
-    """Sort the first `count` numbers of a list, distinct ones to the front; return their number."""
+    """Sort the first `count` numbers of a list and drop duplicates; return the number of distinct numbers."""
     different = sorted(set(numbers[:count]))
     numbers[: len(different)] = different
     return len(different)
@@ -300,7 +300,7 @@ def _equilibrium_at(force: StaticForce, root: Root, current: float) -> Equilibri
 
 
 def _is_stable(root: Root, force: StaticForce) -> bool:
-    """Whether the force points to the root from both sides; a rigid backstop replaces the lower."""
+    """Whether the force points to the root from both sides; a rigid backstop replaces the lower side."""
     return is_stable(root.x, root.before, root.after, force.statics)
 
 
@@ -323,7 +323,7 @@ def _roots(force: StaticForce, current: float, within: tuple[float, float] | Non
 
 
 def _same_rest(force: StaticForce, current: float, within: tuple[float, float] | None) -> list[Root]:
-    """Find all roots of the net force; a root at the backstop is replaced by the value of `rest_state`."""
+    """Find all roots of the net force; the root at the backstop equals the result of `rest_state` exactly."""
     crossings = _roots(force, current, within)
     backstop = force.hammer.backstop
     if backstop is None or force.rigid or not force.free(backstop.position, current) < 0.0:
@@ -342,7 +342,7 @@ def _grid(force: StaticForce, low: float, high: float) -> list[float]:
 
 
 def _away_from_zero(first: float, limit: float) -> list[float]:
-    """Return the currents 0 and a geometric sequence up to a limit, with 12 points per decade, A."""
+    """Return 0 and a geometric sequence of currents [A] up to `limit`, with 12 points per decade."""
     if limit <= first:
         return [0.0, limit]
     count = max(2, math.ceil(12.0 * math.log10(limit / first)) + 1)

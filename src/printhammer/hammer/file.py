@@ -70,13 +70,13 @@ _EXPECTED: Final = {
     "length_unit": (re.compile("um|mm|m"), "um, mm or m"),
     "time_unit": (re.compile("us|ms|s"), "us, ms or s"),
 }
-"""Regular expressions for optional text entries, with the expectation stated in error messages."""
+"""Regular expression of each optional text entry, and the expectation stated in error messages."""
 
 SELECTORS: Final = {**dict.fromkeys(ROLES, "law"), "waveform": "shape"}
 """Tables of a hammer file, each with the key that selects its law or shape."""
 
 UNSAID: Final = {"coil": "winding"}
-"""Default law or shape of the tables that may omit the selecting key."""
+"""Default law or shape of the tables that need not contain the key `law` or `shape`."""
 
 _M = TypeVar("_M", bound=BaseModel)
 
@@ -145,7 +145,7 @@ def build(
 
 
 def model_of(section: str, kind: str) -> type[BaseModel]:
-    """Return the model class for a section and kind of a hammer file, such as "pack" and "power"."""
+    """Return the model class of a table with a given law or shape, such as the table "pack", law "power"."""
     if section == "waveform":
         from printhammer.drive.waveforms.shapes import SHAPES
 
@@ -166,7 +166,7 @@ def kinds_of(section: str) -> tuple[str, ...]:
 
 
 def file_options(model: type[BaseModel]) -> dict[str, Any]:
-    """List the options of a model that a file may set; the unit of a waveform implies its driven quantity."""
+    """List the options of a model that a file may set: all but `quantity`, which follows from the unit."""
     return {name: kind for name, kind in options(model).items() if name != "quantity"}
 
 
@@ -318,7 +318,7 @@ def _read(
 ) -> _M:
     """Parse the constants and options of one table into its model; add the constants to `constants`.
 
-    Constants shared with the table `before` are already parsed.
+    Constants that are the identical objects in the table `before` are copied from the contents `read`.
     """
     known, choices = quantities(model), file_options(model)
     _check_keys(table, (*known, *choices), prefix)

@@ -166,13 +166,13 @@ class Hammer:
 
     @property
     def shown_units(self) -> dict[str, str]:
-        """Units in which the file asks to show lengths and times, by SI unit."""
+        """Display units of lengths and times set in the file, by SI unit; omitted if not set."""
         units = {"m": self._contents.length_unit, "s": self._contents.time_unit}
         return {si: unit for si, unit in units.items() if unit}
 
     @property
     def views(self) -> tuple[str, ...]:
-        """Names of the studio views that apply, in the order of the file; empty if the parts decide."""
+        """Names of the studio views, in the order of the file; if empty, the parts determine the views."""
         return self._contents.views
 
     @property
@@ -187,12 +187,12 @@ class Hammer:
 
     @property
     def platen(self) -> float | None:
-        """Position of the platen, m."""
+        """Position of the platen, m; None without a platen."""
         return self._contents.body.platen
 
     @property
     def coil_resistance(self) -> float | None:
-        """Resistance of the coil, ohm."""
+        """Resistance of the coil, ohm; None if unspecified."""
         return getattr(self.coil, "resistance", None)
 
     @cached_property
@@ -331,7 +331,7 @@ class Hammer:
         return self._with(wanted, status, source, f"{self._where.removesuffix(_CHANGED)}{_CHANGED}")
 
     def _with(self, wanted: Mapping[str, Any], status: str, source: str, where: str) -> Hammer:
-        """Return a new hammer with keys replaced; error messages begin with `where`."""
+        """Return a new hammer with the values of `wanted` replaced; error messages begin with `where`."""
         document = dict(self._document)
         edits: list[Edit] = []
         with located(where):
@@ -377,7 +377,7 @@ class Hammer:
             ) from None
 
     def _tables(self, target: Path) -> dict[str, bytes]:
-        """Return the contents of the referenced files that are missing beside `target`."""
+        """Return the contents, by name, of the tables that are missing in the folder of the file `target`."""
         missing: dict[str, bytes] = {}
         for model in (self.magnet, self.waveform):
             name = getattr(model, "file", None)
@@ -398,13 +398,13 @@ class Hammer:
         return rest_state(self)
 
     def check(self) -> None:
-        """Raise InputError if the armature does not rest at the backstop.
+        """Raise InputError if a hammer with magnet and backstop does not rest at the backstop.
 
         Raises
         ------
         InputError
-            With a magnet and a backstop, the net force at zero current at the backstop is not negative, or
-            the backstop does not hold the armature.
+            At the backstop, the net force at zero current is not negative, or compresses the backstop
+            beyond the range of the magnet's law.
         """
         if self.magnet is not None and self.backstop is not None:
             with located(self._where):

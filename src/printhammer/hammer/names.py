@@ -67,10 +67,9 @@ class Range:
 def range_of(hammer: Hammer, name: str, factor: float = 10.0) -> Range:
     """Return the control range of a constant, around its value in a hammer.
 
-    The ranges are arbitrary: wide enough for every hammer of the paper, narrow enough for a slider. Positions
-    move by half the distance from backstop to platen; other constants range from 1 / `factor` to `factor`
-    times their value, a coefficient of restitution at most to 1; a constant that is zero gets a range typical
-    of its dimension.
+    Positions vary by half the distance from backstop to platen in either direction; other constants range
+    from 1 / `factor` to `factor` times their value, a coefficient of restitution at most to 1; the range of a
+    constant that is zero is typical of its dimension. These rules are arbitrary.
     """
     constant = hammer.constants[name]
     value = constant.si
@@ -103,17 +102,17 @@ def quantity_of(hammer: Hammer, name: str) -> Quantity | None:
 
 
 def quantities_of(waveform: Waveform) -> dict[str, Quantity]:
-    """Return the declarations of a waveform's constants, amplitudes in the driven unit."""
+    """Return the declarations of a waveform's constants, by name, with the unit of its amplitude."""
     return {name: in_unit_of_drive(note, waveform.unit) for name, note in quantities(type(waveform)).items()}
 
 
 def in_unit_of_drive(note: Quantity, unit: str) -> Quantity:
-    """Return a declaration with the unit of the waveform, for a constant in A or N."""
+    """Return a declaration with `unit` as its only unit, if the constant may have several units, A or N."""
     return replace(note, si=unit, also=()) if note.also else note
 
 
 def unknown(name: str, known: Collection[str], where: str = "") -> InputError:
-    """Return the error for an unknown constant, with the nearest name or a list of names."""
+    """Return the error for an unknown constant; the message suggests the nearest of the known names."""
     file, _, key = where.rpartition(": ")
     return InputError(
         f"{where or 'constant'} = {shown(name)} is not known",

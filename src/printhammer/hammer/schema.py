@@ -73,7 +73,7 @@ def _table(section: str, kind: str, selector: str) -> dict[str, Any]:
 
 
 def _described(model: type[BaseModel], properties: dict[str, Any], needed: list[str]) -> dict[str, Any]:
-    """Return the schema of a table: the given `properties`, then the constants and options of a model."""
+    """Return the schema of a table with `properties` and the constants and options of a model."""
     properties |= _constants(model)
     for name, annotation in file_options(model).items():
         description = model.model_fields[name].description

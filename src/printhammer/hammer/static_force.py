@@ -55,8 +55,8 @@ class StaticForce:
     Magnet, spring and the elastic force of the backstop are functions of x; the pack acts on its loading
     branch, as when fresh paper is pressed slowly. A `rigid` backstop excludes positions below its surface.
     `limits`, m, is the range in which the magnet's law is valid and no rigid backstop is penetrated. `low`
-    and `high`, m, bound the default search for equilibria: from the lower limit, but at most 1 m below the
-    origin, to the platen, the end of the pack, or the upper limit.
+    and `high`, m, bound the default search for equilibria: from the lower limit to the platen, the end of the
+    pack or the upper limit, and at most 1 m from the origin.
     """
 
     def __init__(self, hammer: HammerLike) -> None:
@@ -115,7 +115,7 @@ class StaticForce:
         return total
 
     def _spring_slope(self, x: float) -> float:
-        """Compute the derivative of the spring force, N/m; at a kink of the law, the one-sided one above."""
+        """Compute the derivative of the spring force, N/m; at a kink of the law, from the right."""
         step = 1e-3
         level_at, constants = self.statics.spring_level, self.statics.spring
         for level in takewhile(math.isfinite, (level_at(constants, float(k)) for k in count())):
@@ -125,7 +125,7 @@ class StaticForce:
         return derivative(self.spring, x, step)
 
     def anchors(self) -> list[float]:
-        """Return the positions, m, near which forces vary on short length scales."""
+        """Return the positions, m, near which the search grid for equilibria is refined."""
         places = [self.low, self.high, self.statics.position, self.front, self.hammer.origin, 0.0]
         return sorted({place for place in places if self.low <= place <= self.high})
 

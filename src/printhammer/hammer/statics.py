@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple
 from printhammer.support.roots import bisected, find_roots
 
 NEAREST: Final = 1e-18
-"""Smallest distance from an anchor in the search for equilibria, m: far below any compression; arbitrary."""
+"""Smallest distance from an anchor in the search for equilibria, m; arbitrary, far below any compression."""
 
 LEAST: Final = 5e-324
 """Smallest positive number of double precision."""
@@ -34,7 +34,7 @@ RESTS, CRUSHED, LIFTED, UNSTABLE, EMPTY = range(5)
 magnet law; the force at the backstop is not negative; no stable equilibrium; an empty range."""
 
 MOST_PLACES: Final = 8192
-"""Largest number of points of the search grid for equilibria."""
+"""Largest number of points of the search grid for equilibria, i.e. the length of its array; arbitrary."""
 
 
 class Statics(NamedTuple):
@@ -92,7 +92,7 @@ def force_at(x: float, about: tuple[float, Statics]) -> float:
 
 
 def nearest_level(x: float, s: Statics) -> float:
-    """Return the distance, m, from `x` to the nearest kink of the spring law away from `x`, else infinity."""
+    """Return the distance, m, from `x` to the nearest kink of the spring law other than `x`; or infinity."""
     nearest = math.inf
     k = 0.0
     level = float(s.spring_level(s.spring, k))
@@ -276,7 +276,7 @@ def rest_position(s: Statics, work: Work, out: Any) -> int:
 
 
 def sorted_in_place(numbers: Any, count: int) -> int:
-    """Heapsort the first `count` numbers, distinct ones to the front; return their number."""
+    """Heapsort the first `count` numbers and drop duplicates; return the number of distinct numbers."""
     for step in range(count // 2 + count - 1, 0, -1):
         if step >= count:
             root, end = step - count, count

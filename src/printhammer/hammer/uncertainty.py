@@ -1,9 +1,9 @@
-"""Uncertainty of the constants of a hammer: standard errors and correlations, as stored in its file.
+"""Standard errors and correlations of the constants of a hammer, as stored in its file.
 
-A fit writes these errors beside its constants, and the next fit uses them as priors. In the file they are a
-table ``[uncertainty]``: ``constants``, their ``standard_errors`` with units, the ``correlation`` of each
-constant with the preceding constants, and ``records``, the fingerprints of the records of motion already
-used.
+A fit writes these errors with its constants, and the next fit uses them as priors. The table
+``[uncertainty]`` of the file has the entries ``constants``, their ``standard_errors`` with units, the
+``correlation`` of each constant with the preceding constants, and ``records``, the fingerprints of the
+records of motion from which the constants were fitted.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import Constant, shown
 
 UNCERTAINTY: Final = "uncertainty"
-"""Name of the table in a hammer file."""
+"""Name of the table of standard errors in a hammer file."""
 
 ENTRIES: Final = {
     "constants": "dotted keys of the constants that are not known exactly",
-    "standard_errors": "of each, text with its unit",
-    "correlation": "of each constant but the first, with all those before it",
-    "records": "fingerprints of the records of motion that the constants were fitted to",
+    "standard_errors": "standard error of each constant, text with its unit",
+    "correlation": "correlations of each constant but the first with the preceding constants",
+    "records": "fingerprints of the records of motion to which the constants were fitted",
 }
 _NEGATIVE: Final = -1e-9
 """Smallest eigenvalue accepted for a correlation matrix, to allow for rounding errors."""
@@ -47,7 +47,7 @@ class Uncertainty:
         return float(np.sqrt(self.covariance.diagonal()[self.keys.index(key)])) if key in self.keys else 0.0
 
     def without(self, gone: Container[str]) -> Uncertainty:
-        """Return the marginal uncertainty of the other constants, without the constants `gone`."""
+        """Return a copy without the constants `gone`: the marginal covariance of the remaining constants."""
         rows = [row for row, key in enumerate(self.keys) if key not in gone]
         keys = tuple(self.keys[row] for row in rows)
         return Uncertainty(keys, self.covariance[np.ix_(rows, rows)], self.records)

@@ -53,7 +53,7 @@ LAYOUT: Final = {
 """Unit, meaning and dimensions of each variable of a map, by name."""
 
 PLACES: Final = {"backstop": "backstop_m", "pack": "pack_front_m", "platen": "platen_m"}
-"""Attribute of a map that contains the position of backstop, pack or platen, m, by surface."""
+"""Names of the map attributes with the positions of backstop, pack and platen, m, by surface."""
 
 
 def map_dataset(
@@ -79,12 +79,12 @@ def map_dataset(
 
 
 def places_of(chart: xr.Dataset) -> dict[str, float]:
-    """Return the positions of backstop, pack and platen stored in a map, m, by name; absent ones omitted."""
+    """Return the positions [m] of backstop, pack and platen, as far as a map contains them, by surface."""
     return {name: float(chart.attrs[key]) for name, key in PLACES.items() if key in chart.attrs}
 
 
 def failed_rates(chart: xr.Dataset) -> dict[str, list[float]]:
-    """Return the firing rates of the runs that ended early, Hz, by name of the status."""
+    """Return the firing rates [Hz] of the runs that ended early, grouped by the status of the run."""
     if "status" not in chart:
         return {}
     codes = str(chart["status"].attrs.get("codes", ""))
@@ -109,7 +109,7 @@ def hammer_attributes(hammer: Hammer) -> dict[str, Any]:
 
 
 def matching(chart: xr.Dataset, other: xr.Dataset) -> tuple[IntArray, IntArray]:
-    """Return the row indices of the rates that two maps share, up to a relative difference of 1e-9."""
+    """Return the rows, in each of two maps, of the rates that agree to a relative difference of 1e-9."""
     here, there = chart["rate"].values, other["rate"].values
     nearest = np.abs(here[:, np.newaxis] - there).argmin(axis=1)
     same = np.isclose(here, there[nearest], rtol=1e-9, atol=0.0)
@@ -143,10 +143,10 @@ def interpolated(at: npt.ArrayLike, values: npt.ArrayLike, times: FloatArray) ->
 
 
 LOWEST: Final = 500.0
-"""Default lowest rate of a map, Hz, as in Figs. 8 and 9; scaled for hammers unlike the paper's."""
+"""Default lowest rate of a map, Hz, as in Figs. 8 and 9; lower for a slower device."""
 
 HIGHEST: Final = 2000.0
-"""Default highest rate of a map, Hz, as in Figs. 8 and 9; scaled for hammers unlike the paper's."""
+"""Default highest rate of a map, Hz, as in Figs. 8 and 9; lower for a slower device."""
 
 RATES: Final = 512
 """Default number of rates of a map; arbitrary."""
@@ -158,7 +158,7 @@ TAIL: Final = 1e-3
 """Default time simulated after the last firing at the lowest rate, s; longer for slow devices. Arbitrary."""
 
 MOST_CELLS: Final = 200_000_000
-"""Largest number of cells of a map; arbitrary, catches typing errors in rates and times."""
+"""Largest number of cells of a map, to catch typing errors in rates and times; arbitrary."""
 
 
 @computation
@@ -263,7 +263,7 @@ def rms_difference(computed: xr.Dataset, measured: xr.Dataset) -> tuple[FloatArr
         Rates common to both maps, Hz.
     difference : array, shape (n,)
         Root mean square of the difference of their displacements, m, over the times at which both are known;
-        NaN without such a time.
+        NaN if no such time exists.
     """
     rows, others = matching(computed, measured)
     times = max((chart["time"].values for chart in (measured, computed)), key=_spacing)
@@ -318,7 +318,7 @@ def _spacing(times: FloatArray) -> float:
 
 
 def default_rates(hammer: Hammer, waveform: Waveform | None = None, count: int = RATES) -> FloatArray:
-    """Return the default rates of a map, Hz: those of the paper's hammer, scaled to the device."""
+    """Return the default rates of a map [Hz], evenly spaced: 500 Hz to 2 kHz, lower for a slower device."""
     lowest, highest = (scaled_rate(hammer, rate, waveform) for rate in (LOWEST, HIGHEST))
     return np.linspace(lowest, highest, count)
 

@@ -158,7 +158,7 @@ def _one_column_a_rate(table: Table, names: list[str], told: Columns | None) -> 
 
 
 MOST_TIMES: Final = 8192
-"""Largest number of times of a common grid; a finer grid is coarsened to this number. Arbitrary."""
+"""Largest number of times in the common time grid of a map, beyond which the grid is coarsened; arbitrary."""
 
 _CLASSIC, _HDF5 = b"CDF", b"\x89HDF"
 
@@ -172,8 +172,8 @@ def load_measured_map(
     ----------
     path : path
         A CSV file (`printhammer.maps.measured`), or a NetCDF file or Zarr store with the variables `rate`,
-        `time` and `displacement`, each with any unit in the attribute `units`. The dimensions of
-        `displacement` are `rate` and one more; those of `time` are the latter, or both if each rate has
+        `time` and `displacement`, each with any unit in the attribute `units`. `displacement` has
+        the dimension `rate` and a second one; `time` has the second one only, or both if the rates have
         different times.
     times : array, optional
         Times from the first firing, s, ascending, at which the records are interpolated linearly. By default

@@ -68,7 +68,7 @@ def bifurcation(
 ) -> Answer:
     """Compute a bifurcation diagram: periodic and chaotic (strange) motions against a parameter.
 
-    The exit status is 1 if a run stopped early. Ctrl-C writes the finished part.
+    The exit status is 1 if a run stopped early. Ctrl-C stops the computation and saves the finished values.
     """
     from printhammer.chaos.bifurcation.bifurcation import InterruptedDiagram
     from printhammer.chaos.bifurcation.bifurcation import bifurcation as computed

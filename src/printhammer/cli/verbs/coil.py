@@ -40,7 +40,7 @@ def dead_time(
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:
-    """Tabulate the dead time, from switch-on to impact, and the pulse width that keeps the impact speed."""
+    """Tabulate the dead time, from switch-on to impact, and the pulse width for a constant impact speed."""
     from printhammer.control.dead_time import dead_time as timed
 
     grid: dict[str, Any] = {

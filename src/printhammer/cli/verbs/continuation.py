@@ -101,7 +101,7 @@ def continue_(
 ) -> Answer:
     """Continue a periodic orbit, stable or unstable, in a parameter; report why the branch ends.
 
-    Ctrl-C keeps the branches that have been found. The exit status is 1 if there are none.
+    Ctrl-C stops the search and keeps the branches found so far. The exit status is 1 if no branch is found.
     """
     from printhammer.chaos.continuation.regimes import InterruptedBranches
     from printhammer.chaos.continuation.regimes import regimes as all_regimes

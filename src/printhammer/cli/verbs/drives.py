@@ -58,7 +58,7 @@ def energy(
     pulses: bool = opt.switch(
         "Use only pulses of the hammer's waveform, and optimise their firing times and widths."
     ),
-    supply: bool = opt.switch("Add the dots of the same burst with all currents scaled by 0.97 to 1.03."),
+    supply: bool = opt.switch("Report also the dots of the burst with all currents scaled by 0.97 to 1.03."),
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:
@@ -159,7 +159,7 @@ def feedback(
 ) -> Answer:
     """Simulate all patterns of eight slots, and two dots at all distances, with position feedback.
 
-    The exit status is 1 if a pattern exceeds the limits with feedback.
+    The exit status is 1 if, with feedback, a dot exceeds the limits on force and arrival time.
     """
     from printhammer.control.feedback.comparison import feedback as compared
     from printhammer.control.feedback.sensor import PositionSensor

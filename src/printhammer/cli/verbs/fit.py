@@ -262,9 +262,9 @@ def motion(
 ) -> Answer:
     """Fit the mass, the damping of the backstop and other constants to records of single shots.
 
-    Constants with standard errors in the hammer file, as written by --into of other fits, enter as priors and
-    are refined; all other constants count as exact. The tables of --magnet, --spring, --pack and --backstop
-    are fitted before the records.
+    Constants with standard errors in the hammer file, such as those that an earlier fit wrote with --into,
+    are priors and are refined; all other constants count as exact. Tables passed with --magnet, --spring,
+    --pack and --backstop are fitted first, and their constants are priors too.
     """
 
     def made(known: Hammer | None) -> Fit:
@@ -347,7 +347,7 @@ def _keys(text: str) -> list[str]:
 
 
 def _earlier_fits(tables: dict[str, Path], known: Hammer, robust: bool) -> list[Fit]:
-    """Fit the tables of single parts; the hammer supplies the remaining constants."""
+    """Fit the tables of magnet, spring, pack and backstop; the hammer supplies all other constants."""
     from printhammer.identify.fitting import fit
 
     rest = dict(tables)
@@ -365,7 +365,7 @@ def _earlier_fits(tables: dict[str, Path], known: Hammer, robust: bool) -> list[
 def _run_fit(
     job: Job, hammer: str | None, strict: bool, fitted: Callable[[Hammer | None], Fit], zero: str = ""
 ) -> Answer:
-    """Run a fit; return its summary and its files. `zero` states the time zero of records over time."""
+    """Run a fit; return its summary and files. `zero` is a remark that states the time 0 of the records."""
     from printhammer.hammer.hammer import load
     from printhammer.support.files import write_file
 

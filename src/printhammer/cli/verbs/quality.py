@@ -28,13 +28,13 @@ FEEDBACK: Final = opt.switch("Drive with position feedback, as in `printhammer f
 def chosen_strategy(
     job: Job, hammer: Hammer, table: Path | None, feedback: bool, serial: str | None = None
 ) -> tuple[dict[str, Any], CompensationTable | None]:
-    """Return the keyword `strategy` of printing functions (empty: open loop), and any table.
+    """Return the drive strategy as a keyword `strategy` (empty for open loop), and the table, if any.
 
     Raises
     ------
     InputError
-        Both a table and feedback are requested, a serial without a table, or the table belongs to another
-        hammer.
+        Both a table and feedback are requested; a serial number is set without a table; or the table
+        belongs to another hammer.
     """
     if serial is not None and table is None:
         raise InputError(f"--serial {serial}: expected a learned table, --table, as well", key="--serial")

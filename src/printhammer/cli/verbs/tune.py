@@ -26,7 +26,7 @@ def tuned_along(
     options: dict[str, Any],
     units: Units,
 ) -> Answer:
-    """Tune one table per value of an axis, such as 'rail 90 V, 110 V, 3'; tick in `header`."""
+    """Tune a table for each value of an axis, such as 'rail 90 V, 110 V, 3'; show and save the result."""
     from printhammer.control.axes import tune_along
 
     axis, values = _read(along)
@@ -44,7 +44,7 @@ def tuned_along(
 
 
 def _show_table(job: Job, made: Any, header: dict[str, Any], budget: int | None, units: Units) -> Any:
-    """Round a table to the timer tick, if any; print its summary and check its size; return the table."""
+    """Round a table to the tick in `header`, if any; check its size, show its summary; return the table."""
     made = made.quantised(header["tick"]) if header else made
     made.to_header(budget=budget, **header)
     size = f", {made.size(**header)} bytes in a C header"
