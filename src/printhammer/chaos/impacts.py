@@ -132,7 +132,7 @@ def section(
     surface : str, optional
         "backstop" or "pack".
     touches : int, optional
-        Number of touches.
+        Number of touches to record.
     transient : int, optional
         Number of firings to discard before the first touch.
     firings : int, optional

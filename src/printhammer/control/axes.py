@@ -90,14 +90,14 @@ AXES: Final = {
 
 @dataclass(frozen=True)
 class AxisTables:
-    """Compensation tables for ascending values of an axis, SI, with interpolation between the values."""
+    """Compensation tables at ascending values of an operating condition (the axis), with interpolation."""
 
     axis: str
     values: tuple[float, ...]
     tables: tuple[CompensationTable, ...]
 
     def at(self, value: float | str) -> CompensationTable:
-        """Interpolate the tables at an axis value; between solution branches, use the nearer entry."""
+        """Interpolate the tables at an axis value; where two solution branches meet, use the nearer entry."""
         asked = read_number(value, AXES[self.axis].unit, self.axis)
         least, most = self.values[0], self.values[-1]
         if not least <= asked <= most:
@@ -114,7 +114,7 @@ class AxisTables:
         return replace(first, **times, deviation=np.full_like(first.deviation, np.nan))
 
     def strategy(self, hammer: Hammer, value: float | str) -> TableStrategy:
-        """Return the drive strategy of the table at an axis value, with the hammer's pulses at that value."""
+        """Return a drive strategy: the table at an axis value, and the hammer's pulses at that value."""
         table = self.at(value)
         table.check_hammer(hammer)
         place = read_number(value, AXES[self.axis].unit, self.axis)
@@ -189,7 +189,7 @@ class AxisTables:
             save_dataset(self.to_dataset(), path)
 
     def summary(self) -> Summary:
-        """Tabulate the pulse from rest and the worst deviation, one row per axis value."""
+        """Tabulate the pulse from rest and the worst deviation of a dot, one row per axis value."""
         columns = [
             Cells(self.axis, self.values, AXES[self.axis].unit, ".6g"),
             Cells("width from rest", [float(table.width[0, 0]) for table in self.tables], "s"),
@@ -216,7 +216,7 @@ def tune_along(
     progress: Callable[[int, int], None] | None = None,
     **options: Any,
 ) -> AxisTables:
-    """Tune a table for each axis value, always to the single-pulse dot of the nominal hammer.
+    """Tune a table for each axis value; all tables print the single-pulse dot of the nominal hammer.
 
     Parameters
     ----------

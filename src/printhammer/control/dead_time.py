@@ -50,8 +50,8 @@ def header_text(
 ) -> str:
     """Render dead times and pulse widths as a C header (C99); units: mV, 0.1 degC and ns.
 
-    `tables` are times, s, by name, over rails, V, and temperatures, degC; NaN becomes 0. `blow` is the impact
-    speed, m/s, that the pulse widths give.
+    `tables` maps names to arrays of times, s, with one row per rail `voltage`, V, and one column per coil
+    `temperature`, degC; NaN is written as 0. `blow` is the impact speed, m/s, at the tabulated pulse widths.
     """
     from printhammer import __version__
 
@@ -237,7 +237,7 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
 
 @dataclass(frozen=True)
 class _Fired:
-    """Firing from rest: time, s, speed, m/s, current, A, heat, J; NaN without an impact."""
+    """Firing from rest: time, s, and speed, m/s, of the impact, peak current, A, and coil heat, J; or NaN."""
 
     time: float = np.nan
     speed: float = np.nan
@@ -263,12 +263,13 @@ def dead_time(
     hammer : Hammer
         The hammer, whose waveform must be a driver on a rail.
     voltage : sequence of float or str, optional
-        Rail voltages, V, in any order; by default that of the waveform, and 10 % below and above.
+        Rail voltages, V, in any order; by default the rail of the waveform, and 10 % below and above.
     temperature : sequence of float or str, optional
         Coil temperatures, degC; by default 20, 60 and 100 degC.
     blow : float or str, optional
-        Impact speed, m/s, for which widths are computed; by default that of the hammer's own pulse at
-        nominal rail and temperature, which a lower rail or a warmer coil may not reach.
+        Impact speed, m/s, for which widths are computed; by default the impact speed of the hammer's own
+        pulse at nominal rail and temperature, which may be out of reach on a lower rail or with a warmer
+        coil.
 
     Raises
     ------
@@ -327,7 +328,7 @@ def dead_time(
 
 
 def _reference(hammer: Hammer, waveform: Waveform, tolerance: float) -> tuple[_Fired, float]:
-    """Simulate a firing at the nominal rail; return its outcome and the time span for other firings, s."""
+    """Simulate a firing at the nominal rail; return its outcome and the duration of later simulations, s."""
     span = 4.0 * float(waveform.width)  # type: ignore[attr-defined]
     for _ in range(_DOUBLINGS):
         fired = _fire(hammer, waveform, span, tolerance)

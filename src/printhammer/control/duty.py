@@ -88,7 +88,7 @@ class DotHeat:
 
 
 def dot_heat(heat: float | str, feed: str = "voltage") -> DotHeat:
-    """Build the coil heat per dot from its value at 20 degC, J; `feed` is the quantity held constant."""
+    """Build a `DotHeat` from the coil heat per dot at 20 degC, J; the driver keeps `feed` constant."""
     if feed not in FEEDS:
         raise InputError.of("feed", feed, f"one of {', '.join(FEEDS)}")
     return DotHeat((REFERENCE,), (read_positive(heat, "J", "heat"),), feed)

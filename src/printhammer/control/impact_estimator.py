@@ -18,8 +18,8 @@ temperature, rail. The signature s and the reference r come from simulations of 
 
 The estimator knows the samples, the fired pulse and the nominal hammer, but nothing of the unit. Delay and
 bandwidth of the probe, if known, are part of the template. An estimate is flagged if the samples do not
-resemble an impact, in particular near an edge of the driver, which an unstated probe delay leaves in the
-difference; or if the estimate is at the end of the search range. `Sampling` describes the converter: noise,
+resemble an impact, for instance because an unstated probe delay leaves an edge of the driver in the samples,
+or if the estimate lies at the end of the search range. `Sampling` describes the converter: noise,
 rate, resolution and range.
 """
 
@@ -66,12 +66,12 @@ _SOFT: Final = 1e-9  # Factor on the pack's constants that makes its force negli
 _UNLIKE: Final = 0.5
 """Ratio of unexplained to explained signal energy above which an estimate is flagged.
 
-Units of `impact-wire` reach 0.4 with errors of 2 us; an unstated probe delay of 5 us gives 1.5, and errors of
-30 us.
+Units of the hammer `impact-wire` reach a ratio of 0.4, with impact-time errors of 2 us; an unstated probe
+delay of 5 us gives 1.5, with errors of 30 us.
 """
 
 _TOO_LARGE: Final = 2.5
-"""Amplitude, over nominal, above which an estimate is rejected; units of `impact-wire` reach 1.3."""
+"""Amplitude, relative to nominal, above which an estimate is flagged; units of `impact-wire` reach 1.3."""
 
 UNSEEN, EDGE, UNLIKE, END = "unseen", "edge", "unlike", "end"
 """Flags of an estimate: no impact detected; samples unlike an impact, near an edge of the driver or

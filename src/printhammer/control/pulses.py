@@ -34,7 +34,7 @@ _DOUBLINGS: Final = 6  # Iteration limit of the doublings of the simulated time;
 def current_bound(hammer: Hammer, largest: float | str | None = None, key: str = "largest_current") -> float:
     """Return the current limit, A: `largest` if stated, by default the limit of the hammer.
 
-    The default limit is 2 A or, if that is more, the peak current of the hammer's own pulse at the largest
+    The default limit is 2 A or, if larger, the peak current of the hammer's own pulse at the largest
     width, rounded up to 0.1 A.
     """
     if largest is not None:

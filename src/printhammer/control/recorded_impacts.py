@@ -108,7 +108,8 @@ def recorded_impacts(
         else unlimited.
     columns : str, optional
         Contents of the columns of all tables, such as "time=1, current=2*-10 A/V"; by default as described in
-        a file beside each table, else by its heading; see `printhammer.support.tables.columns`.
+        the file TABLE.toml beside a table, else by the headings of the table; see
+        `printhammer.support.tables.columns`.
 
     Raises
     ------

@@ -28,7 +28,7 @@ SETTLING: Final = 1000
 points agree."""
 
 LONGEST: Final = 16_000
-"""Maximum number of discarded firings; a train that drifts even after them stays undecided. Arbitrary."""
+"""Maximum number of discarded firings; a train that still drifts stays undecided. Arbitrary."""
 
 REACH: Final = 0.99
 """Quantile of nearest-neighbour distances that is used as the reach of a strange attractor."""

@@ -5,7 +5,7 @@ active. Trains are continued, round by round, until their attractors are known. 
 the cells themselves. A cell whose train is periodic, by the rule of `printhammer.chaos.strobe.verdict`,
 belongs to the basin of that periodic orbit. A few of the aperiodic trains are followed for thousands of
 firings. If the exponent of such a train shows that it is strange, its points define a strange attractor, and
-cells whose trains have their points among them belong to its basin. Cells that fit neither case after the
+cells whose trains lie on this attractor belong to its basin. Cells that fit neither case after the
 last round are undecided.
 
 Basin entropy measures how uncertain the attractor is if the initial state is known only to lie in a box.
@@ -349,8 +349,8 @@ def basins(
     Parameters
     ----------
     hammer : Hammer or Regime
-        The hammer, or a regime; a hammer needs the keywords `firing`. States are taken at a firing,
-        independent of the phase of the regime.
+        The hammer, or a regime; a hammer requires the keywords of `printhammer.Regime.of`. States are taken
+        at a firing, independent of the phase of the regime.
     x, v : tuple, optional
         Least and largest displacement, m, and velocity, m/s, or text with a unit, and number of values, both
         ends included; by default the window of `printhammer.run.regime` and 128.

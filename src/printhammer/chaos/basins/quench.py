@@ -215,7 +215,7 @@ def quench_map(
         the device.
     widths : tuple, optional
         As `gaps`, for the width of the second pulse; by default 128 from 0.5 to 1.5 times the width of the
-        first.
+        first pulse.
     waveform : Waveform, optional
         The first pulse; by default the waveform of the hammer. It needs a width.
     tail : float or str, optional

@@ -29,7 +29,7 @@ FIRINGS: Final = 1000
 """Default number of firings per train of a bifurcation diagram."""
 
 _JUDGED: Final = 200
-"""Default number of recorded firings per train, counted from the end of the transient."""
+"""Default number of recorded firings per train, after the transient."""
 
 REFINE: Final = 2
 """Default number of times to halve the parameter step where neighbouring trains differ."""
@@ -79,7 +79,7 @@ def bifurcation(
     Parameters
     ----------
     hammer : Hammer or Regime
-        The hammer, or a regime; a hammer needs the keywords `firing`.
+        The hammer, or a regime; a hammer requires the keywords of `printhammer.Regime.of`.
     periods, rates : array, optional
         Times between firings, s, or firings per second, Hz, ascending.
     parameter, values : str and array, optional
@@ -152,7 +152,7 @@ def bifurcation(
 
 
 def _result(builder: DiagramBuilder) -> Bifurcation:
-    """Build the diagram from the trains finished at the end or at an interrupt."""
+    """Build the diagram from all trains or, after an interrupt, from the finished trains."""
     order = np.argsort(builder.values, kind="stable")
     rows = (len(builder.ways) * order + np.arange(len(builder.ways))[:, np.newaxis]).astype(np.int64)
     table = builder.table

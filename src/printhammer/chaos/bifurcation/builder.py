@@ -302,7 +302,7 @@ class DiagramBuilder:
         return bool(count and rests_of(regime, points[-count:], self.effort.tolerance))
 
     def compare(self) -> None:
-        """Mark the trains whose period changes at finer tolerances, i.e. whose cycle rounding decides.
+        """Mark the trains whose period changes at finer tolerances, i.e. depends on rounding errors.
 
         An armature that comes to rest on the backstop forgets its past, but between two rests a small error
         may grow to the size of the motion.

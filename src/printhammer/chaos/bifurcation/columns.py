@@ -175,7 +175,7 @@ def run_in_stretches(
 ) -> Columns:
     """Run memoryless trains one period at a time; otherwise as `run_columns`.
 
-    Slower than one long run, but the rounding error does not grow with time; see
+    The computation is slower than one long run, but the rounding error does not grow with time; see
     `printhammer.chaos.strobe.train.STRETCH`.
     """
     columns = blank_columns(len(regimes), firings - transient)

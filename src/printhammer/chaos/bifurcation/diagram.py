@@ -290,8 +290,8 @@ class Bifurcation(Result, rows="direction column"):
     def verdicts(self) -> TextArray:
         """Classification of each train, shape (D, C), as in `printhammer.chaos.strobe.verdict`.
 
-        "period-q", "strange", "undecided"; or "superstable": the armature comes to rest on the backstop, in a
-        cycle longer than 64 firings.
+        The classes are "period-q", "strange", "undecided" and "superstable": the armature comes to rest on
+        the backstop, in a cycle longer than 64 firings.
 
         A train is undecided if its run ended early, or if it has no period and its exponent was not computed
         or is not positive by three standard errors.

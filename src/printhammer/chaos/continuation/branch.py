@@ -171,10 +171,10 @@ class Branch(Result):
     """Branch: a curve of periodic orbits in one parameter, with its bifurcations and grazings.
 
     Every array has one row for each orbit, in order along the curve; the values of the parameter need not
-    ascend. Reasons for stopping are "bound"; "closed"; "period doubling": the orbit is born there; "grazing"
-    of a rigid backstop; "merged" with an orbit of fewer firings; "no value": a run ended early; "lost":
-    Newton's method does not converge; "jump": it converges to another curve; "length": the maximum number of
-    steps is reached.
+    ascend. Reasons for stopping are "bound", of the parameter; "closed", back at the start; "period
+    doubling", where the orbit is born; "grazing" of a rigid backstop; "merged" with an orbit of fewer
+    firings; "no value", where a run ended early; "lost", where Newton's method does not converge; "jump",
+    where Newton's method converges to another curve; and "length", at the maximum number of steps.
     """
 
     regime: Regime = part("hammer and periodic drive at the start, and phase of the section")

@@ -319,10 +319,10 @@ def follow_doubled(
     """Follow the orbits of twice the period that are born at a period doubling.
 
     The first orbit is sought at a scaled distance `amplitude` from the doubling `point`, in the direction of
-    the eigenvector whose multiplier is -1; its parameter is an unknown, too, and may lie on either side. The
-    orbit is accepted if, to first order, it lies in that direction, with the parameter and the multipliers of
-    the doubling. Otherwise the search is repeated closer to the doubling. `doubled` is the map applied twice;
-    the other arguments are those of `follow`. InputError if there is no such orbit.
+    the eigenvector whose multiplier is -1; its parameter is an unknown, too, and may lie on either side of
+    the doubling. The orbit is accepted if, to first order, it lies in that direction, with the parameter and
+    the multipliers of the doubling. Otherwise the search is repeated closer to the doubling. `doubled` is the
+    map applied twice; the other arguments are those of `follow`. Raises InputError if no such orbit is found.
     """
     widths = np.asarray(scales, dtype=np.float64)
     jacobian = point.node.value.jacobian

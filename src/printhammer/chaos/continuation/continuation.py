@@ -66,8 +66,8 @@ def continuation(
     most : int, optional
         Maximum number of steps in each direction.
     steps : Steps, optional
-        Step sizes and maximum number of steps, replacing `most`; lengths in half-widths of the strobe window
-        and fifths of the parameter range.
+        Step sizes and maximum number of steps, replacing `most`; lengths are in half-widths of the strobe
+        window and fifths of the parameter range.
     **firing
         Firing of the hammer, as for `printhammer.Regime.of`; for an orbit only its phase may be given.
 

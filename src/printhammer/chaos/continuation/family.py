@@ -1,7 +1,7 @@
 """Strobe map of a regime as a map with a parameter, for pseudo-arclength continuation.
 
-Beside image and derivatives, the map returns the contacts between the two states; their sequence is the label
-of the motion.
+Besides the image of a state and its derivatives, the map returns the contacts on the way from the state to
+its image; the sequence of contacts is the label of the motion.
 """
 
 from __future__ import annotations
@@ -180,7 +180,7 @@ class RegimeFamily:
         return None if beside[0] is None else np.asarray((image - beside[0]) / step)
 
     def end_of(self, state: FloatArray, parameter: float) -> FloatArray | None:
-        """Compute only the state, (m, m/s), at the last section; None if the run ends early."""
+        """Compute the state, (m, m/s), at the last section, no derivatives; None if the run ends early."""
         try:
             problem, end = self._problem(self.regime.with_(self.name, parameter), state)
         except InputError:

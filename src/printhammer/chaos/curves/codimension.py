@@ -6,7 +6,7 @@
 | fold-flip | fold, doubling | the other multiplier is -1, or 1 |
 | 1:1 resonance | fold, Neimark-Sacker | both multipliers are 1 |
 | 1:2 resonance | doubling, Neimark-Sacker | both multipliers are -1 |
-| degenerate doubling | doubling | c: it goes from super- to subcritical |
+| degenerate doubling | doubling | c, where super- and subcritical doublings meet |
 | fold meets grazing, doubling meets grazing | all three | a contact appears while a multiplier is 1 or -1 |
 | resonant grazing | grazing, fold, doubling | the element (1, 2) of A^n |
 | degenerate grazing | grazing | the acceleration at the touch |
@@ -130,7 +130,7 @@ def points_along(
     """Locate the points of codimension two on a curve, in order.
 
     `coefficients` are the normal-form coefficients of a period doubling at the nodes; `coefficient` computes
-    the coefficient at any further point.
+    the coefficient at any other point.
     """
     points: list[CodimensionTwo] = []
     tests = _tests(kind, rigid)

@@ -157,8 +157,8 @@ def stability_chart(
     ----------
     branch : Branch, Regime or Hammer
         Branch from `printhammer.continuation`, usually along the rate; its parameter and bounds are the first
-        parameter and its range. For a regime, or a hammer with the keywords `firing`, the branch along
-        `first` is computed.
+        parameter and its range. For a regime, or a hammer with the keywords of `printhammer.Regime.of`, the
+        branch along `first` is computed.
     second : str
         Name of the second parameter, such as "backstop.damping" or "waveform.amplitude".
     bounds : tuple

@@ -192,7 +192,7 @@ class CurveTracer:
         return np.array([surface, unknown[1]])
 
     def watch(self, system: System) -> Watch:
-        """Build the callback that ends a curve between two nodes: lost, grazing, resonance or bound."""
+        """Build the callback that ends a curve that is lost or meets a grazing, a resonance or a bound."""
         low, high = self.plane.bounds[0]
         corrector = Corrector(system, system.scales, self.steps.precision)
         place = system.scales.size - 2

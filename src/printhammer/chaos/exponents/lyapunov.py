@@ -276,8 +276,8 @@ def lyapunov(
     Parameters
     ----------
     hammer : Hammer or Regime
-        The hammer, or a regime; a hammer needs the keywords `firing`. Growth is measured from firing to
-        firing, independent of the phase.
+        The hammer, or a regime; a hammer requires the keywords of `printhammer.Regime.of`. Growth is measured
+        from firing to firing, independent of the phase.
     firings : int, optional
         Number of firings over which growth is averaged.
     transient : int, optional

@@ -62,8 +62,8 @@ def index_sums(orbits: Sequence[tuple[int, npt.NDArray[np.complex128]]], longest
 def fewest_missing(sums: Mapping[int, int]) -> int:
     """Compute the least number of missing orbits from the index sums by number of firings.
 
-    An orbit of d firings adds d or -d to the sums over the multiples of d firings, so that a sum over n
-    firings that differs from 1 by k lacks at least k / n orbits.
+    An orbit of d firings adds d or -d to the sums over the multiples of d firings, so that at least
+    k / n orbits are missing if the sum over n firings differs from 1 by k.
     """
     return max((math.ceil(abs(total - 1) / count) for count, total in sums.items()), default=0)
 
@@ -146,7 +146,7 @@ class Orbits(Result):
     def coverage(self) -> float:
         """Estimated probability that a further converging guess reaches a known orbit; NaN without guesses.
 
-        The estimate is not a bound: orbits near no guess are not counted.
+        The estimate is not a bound: orbits that no guess comes near are not counted.
 
         Good-Turing estimate: 1 minus the fraction of guesses that converge to an orbit reached by no other
         guess (I. J. Good, Biometrika 40 (1953) 237).
@@ -166,7 +166,7 @@ class Orbits(Result):
 
     @property
     def indices(self) -> dict[int, int]:
-        """Sums of the indices of the fixed points of the strobe map, by number of firings, 1 first.
+        """Sums of the indices of the fixed points of the strobe map, by number of firings, ascending from 1.
 
         See `index_sums`. Empty if no theorem states the sum.
         """

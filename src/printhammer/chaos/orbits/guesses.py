@@ -29,7 +29,7 @@ PHASES: Final = (0.0, 0.5)
 _ALIKE: Final = 0.02
 """Distance, in half-widths of the strobe window, below which two guesses are duplicates."""
 _EARLY_ALIKE: Final = 0.1
-"""As `_ALIKE`, for guesses from the first firings of motions, which cover the plane more coarsely."""
+"""Distance, in half-widths, below which two guesses from the first firings of motions are duplicates."""
 _LOOKED_AT: Final = 4000
 """Maximum number of close returns, closest first, that are tested for duplicates; arbitrary."""
 _EARLY: Final = 2
@@ -164,11 +164,10 @@ def close_returns(
 ) -> tuple[list[Guess], list[Guess]]:
     """Select the closest returns of motions after `period` firings, without duplicates.
 
-    Only the first `within` firings of the short records are used.
-
-    Two lists are returned: the closest of all returns, and the closest of the returns that begin within the
-    first firings, each of at most half of `most`. Distances are divided by `scales`, the half-widths of the
-    strobe window. A larger `most` extends both lists.
+    Only the first `within` firings of the short records are used. Two lists are returned: the closest of all
+    returns, and the closest of the returns that begin within the first `_EARLY` firings, each of at most half
+    of `most`. Distances are divided by `scales`, the half-widths of the strobe window. A larger `most`
+    extends both lists.
     """
     scaled = records.states / scales
     count = scaled.shape[1] - period

@@ -50,7 +50,8 @@ def orbits(
     Parameters
     ----------
     hammer : Hammer or Regime
-        The hammer, or a regime; a hammer needs the keywords `firing`. The search chooses the phase itself.
+        The hammer, or a regime; a hammer requires the keywords of `printhammer.Regime.of`. The search chooses
+        the phase itself.
     longest : int, optional
         Largest orbit period to search for, in firings, at most 64.
     starts : int, optional

@@ -91,7 +91,7 @@ _ROUNDS: Final = 3  # Largest number of rounds of further guesses; arbitrary
 _SIZES: Final = (-6.0, -1.5)
 """Range of decimal logarithms of the displacements of further guesses, in half-widths of the strobe window.
 
-Near chatter, orbits that differ by one bounce lie close together. From the ball of Tufillaro at 60 Hz."""
+Near chatter, orbits that differ by one bounce lie close together. Tuned on the ball of Tufillaro at 60 Hz."""
 _SAME: Final = 1e-6
 """Distance, in half-widths of the strobe window, below which two orbits share a state."""
 _FAST: Final[dict[str, Any]] = {"goal": 1e-9, "enough": 1e-7, "iterations": 30}
@@ -317,7 +317,7 @@ class Search:
         return refined
 
     def _add(self, different: list[_Known], new: _Known) -> None:
-        """Append a closed orbit unless it shares a state with a known orbit, which gets the hit instead."""
+        """Append a closed orbit unless it shares a state with a known orbit; count a hit of that orbit."""
         if not new.closing.closed:
             self.failures[new.closing.reason] += 1
             return

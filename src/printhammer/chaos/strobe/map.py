@@ -9,7 +9,7 @@ memory of the pack belongs to the state, and the status of the image is "in the 
 phase of the period avoids this. If a voltage drives the coil, no current may flow at the section, else the
 status is "a current flows".
 
-*Quiet section.* The phase of the drive at which an orbit is farthest from all its contacts.
+*Quiet section.* The quiet section of an orbit is at the phase of the drive farthest from all its contacts.
 
 If an impact on a rigid backstop coincides with the section, the state jumps; if the armature is moving out of
 the pack at the section, the state includes a memory. The same orbit can be observed at another phase.

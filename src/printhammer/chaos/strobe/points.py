@@ -154,7 +154,7 @@ def strobe(
     Parameters
     ----------
     hammer : Hammer or Regime
-        The hammer, or a regime; a hammer needs the keywords `firing`.
+        The hammer, or a regime; a hammer requires the keywords of `printhammer.Regime.of`.
     points : int, optional
         Number of points; by default 200, as in Fig. 11.
     transient : int, optional

@@ -12,7 +12,8 @@ periodic as soon as
 A remaining difference d then accumulates to at most d / (1 - 0.99), which is within the tolerance of the
 classification. All other trains are followed to firing 2000. Aperiodic trains are strange if the exponent
 over three hundred firings on the attractor, from the state at firing 1001 onward, is positive by five
-standard errors, more than the classification requires; otherwise it is computed over firings 1001 to 2000.
+standard errors, more than the classification requires; otherwise the exponent is computed over firings 1001
+to 2000.
 """
 
 from __future__ import annotations
@@ -68,8 +69,8 @@ def scan(
     Returns
     -------
     list of Verdict
-        Classification of each train, with the firings that it is based on: fewer than 1001 to 2000 for trains
-        decided early, see the head of this module.
+        Classification of each train, with the firings on which it is based: 1001 to 2000, or earlier firings
+        for trains that settle early.
 
     Raises
     ------

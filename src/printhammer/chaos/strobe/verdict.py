@@ -201,10 +201,11 @@ def verdict(
 ) -> Verdict:
     """Classify a train by the distances from `repeats`, its exponent, and its settled orbit.
 
-    `exponent` is the largest exponent over these firings, None if it was not computed; `stopped` is the
-    status of a run that ended before the last of them. `settled` is the confirmation of the number of firings
-    after which the states agree; without a confirmation, that number is the period. `resting` contains the
-    period of a motion that comes to rest, in firings, 0 if unknown, and the number of rests.
+    `exponent` is the largest exponent over the firings from the first to the last of `firings`, None if it
+    was not computed; `stopped` is the status of a run that ended before the last firing. `settled` is the
+    orbit to which the motion has settled; if None, the period is the smallest number of firings after which
+    states agree. `resting` is the period of a motion that comes to rest, in firings, 0 if unknown, and the
+    number of rests.
     """
     period = None if stopped else period_of(distances)
     closest = period

@@ -48,7 +48,7 @@ class FeedbackStrategy(Declared):
     )
 
     def along(self, places: tuple[Hammer, ...]) -> FeedbackStrategy:
-        """Return a copy that drives a different hammer in each slot; see `places`."""
+        """Return a copy that drives a different hammer in each slot; `places` lists the hammers."""
         return replace(self, places=places)
 
     def __call__(
@@ -173,7 +173,7 @@ class FeedbackStrategy(Declared):
         used: BoolArray,
         x: FloatArray,
     ) -> None:
-        """Advance runs to a stage's end if needed; record displacements at samples up to `until`."""
+        """Advance runs to the end of a stage; record displacements in `x` at sample times up to `until`."""
         hammers, ends = leg
         inside = np.array([loop.state[2] in _BRANCHES for loop in loops])
         moves = np.array([loop.time < end for loop, end in zip(loops, ends, strict=True)])

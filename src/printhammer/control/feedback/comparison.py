@@ -4,7 +4,7 @@ F. Hendriks, *Bounce and Chaotic Motion in Impact Print Hammers* (1983), ends wi
 current waveforms ought to respond to the phase of the hammer motion and the pattern to be printed". This
 module tests the idea: a controller that knows the nominal hammer, and observes the real one with delay and
 noise, prints all patterns of eight slots, as does the open loop; then both fire pairs of pulses at a range of
-distances.
+gaps.
 """
 
 from __future__ import annotations
@@ -176,7 +176,7 @@ def feedback(
     driven : Hammer, optional
         The driven hammer; by default the nominal one.
     sensor : PositionSensor, optional
-        Sensor of the controller; by default with 1 % noise and 20 us delay.
+        Sensor of the controller; by default with noise of 1 % of the stroke and a delay of 20 us.
     current : float or str, optional
         Current limit of the driver, of either sign, A; by default 2 A, or the peak of the hammer's own
         pulse if it is larger.

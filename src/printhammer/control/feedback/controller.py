@@ -1,9 +1,9 @@
 """Feedback controller: model of the nominal hammer, observer of the driven hammer, and control of the coil.
 
-Before each touch the controller chooses the pulses that follow, from the estimated time and speed of the
-touch. It releases the armature before a first impact and adds the missing energy with a push into the pack;
-it catches the returning armature and throws it again if the next dot is due soon; and it brakes the armature
-before the backstop if there is time to come to rest.
+Before the armature touches the pack, the controller chooses the pulses that follow, from the estimated time
+and speed of the touch. The controller releases the armature before a first impact and adds the missing energy
+with a push into the pack; catches the returning armature and throws it again if the next dot is due soon; and
+brakes the armature before the backstop if there is time to come to rest.
 """
 
 from __future__ import annotations
@@ -70,8 +70,9 @@ _POLICIES: Final = 8  # Size of the policy cache; arbitrary
 class Ahead(NamedTuple):
     """Prediction for a control action: the push, the throw that follows, and the next pack contact.
 
-    Times after a touch, s, of the throw, of departure from the pack and of the next touch; width of the push,
-    s; kind and speed, m/s, of the next touch.
+    `fire`, `leaves` and `touch` are the times of the throw, of departure from the pack and of the next touch,
+    s after the present touch. `width` is the width of the push, s; `kind` and `speed`, m/s, are those of the
+    next touch.
     """
 
     fire: float
@@ -86,7 +87,8 @@ class Controller:
     """A controller designed for a nominal hammer and the driver of its coil.
 
     The hammer needs a pack and a backstop. `limits` normalise the deviations of dots; `threads` defaults to
-    one per core; `progress` is called with the number of finished steps of `fronts` and the total number.
+    one per core; `progress` is called with the numbers of finished and of all steps of the computation of
+    `fronts`.
 
     Raises
     ------
@@ -239,9 +241,9 @@ class Controller:
             loop.printed = printed if unsure else None
 
     def decide_again(self, now: Sequence[tuple[Loop, int]], policy: Policy) -> None:
-        """Repeat the choice of the next pulse after a contact, with the updated estimate of the front.
+        """Repeat the choice of the next pulse after a contact, with the updated position of the pack's front.
 
-        `now` holds each loop with the index of the coming dot.
+        `now` pairs each run with the index of the coming dot.
         """
         before = [loop.printed for loop, _dot in now if loop.printed is not None]
         kind, touch, speed, thought, force, slope, back = (

@@ -6,7 +6,7 @@ currents from nominal, e.g. with another supply. With c the twice integrated acc
 c(tau; s). This is linear in X and V and nearly linear in s, so a few Gauss-Newton steps, with the expectation
 as a prior, give the maximum a posteriori estimate.
 
-Contacts serve to estimate two constants of the hammer recursively: front of the pack, current scale.
+Contacts serve to estimate two constants recursively: the position of the pack's front and the current scale.
 The front may be farther away than nominal by a distance f, and all currents may deviate from nominal by a
 relative scale s. Both are constant or drift slowly from dot to dot, whereas the noise is independent. Both
 are estimated as in a Kalman filter (R. E. Kalman, J. Basic Eng. 82 (1960) 35): each dot updates mean and
@@ -80,8 +80,8 @@ class FreeForce:
 class Expected:
     """Prior mean and covariance of time, speed and current scale at M coming pack contacts.
 
-    Time, s, and speed, m/s; `scale`, the relative deviation of all currents from nominal; and the covariance,
-    shape (M, 3, 3), of displacement at that time, m, speed, m/s, and scale.
+    `time`, s, and `speed`, m/s, are those of the contacts; `scale` is the relative deviation of all currents
+    from nominal. `covariance`, shape (M, 3, 3), is that of displacement at `time`, m, speed, m/s, and scale.
     """
 
     time: FloatArray
@@ -244,7 +244,7 @@ _STRANGE: Final = 9.0
 
 
 class Contacts:
-    """Observer of the pack front, which simulates contacts of the nominal hammer at several distances."""
+    """Observer of the pack front; simulates contacts of the nominal hammer at several pack distances."""
 
     def __init__(self, plant: Plant) -> None:
         self._plant = plant

@@ -118,7 +118,8 @@ def driver_of(hammer: Hammer, current: float = LARGEST_CURRENT, edge: float | No
     """Return a driver for a current-driven hammer, with a current limit, A.
 
     The time constant `edge`, s, applies to rise and decay; by default it is the decay time constant of the
-    hammer's own waveform. That waveform rises more slowly; so fast a rise needs a higher supply voltage.
+    hammer's own waveform. The hammer's waveform rises more slowly; the faster rise needs a higher supply
+    voltage.
     """
     pulse = pulse_of(hammer)
     if pulse.quantity != "current":
@@ -209,7 +210,7 @@ class Touched:
 
 @dataclass(frozen=True)
 class Printed:
-    """Predicted pack contact, as of the choice of its pulse, before samples corrected the pack front."""
+    """Pack contact as predicted when its pulse was chosen, before samples corrected the pack front."""
 
     # Time, s, speed, m/s, and kind of the touch
     touch: float

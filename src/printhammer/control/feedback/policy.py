@@ -96,7 +96,7 @@ def fronts(plant: Plant, forces: ForceMap, start: Launch, progress: Progress | N
 def front_force(farther: Plant, table: ImpactMap) -> FloatArray:
     """Compute the derivative of the peak force with respect to the distance of the pack; see `Fronts`.
 
-    `farther` has the farthest front; `table` is the map of the nominal hammer.
+    `farther` is the plant with the farthest pack; `table` is the map of the nominal hammer.
     """
     keys: dict[tuple[int, float, float], int] = {}
     which = np.full(table.release.shape, -1)
@@ -136,7 +136,8 @@ _EFFORT: Final = 0.1  # Cost of the largest return current over a whole period
 class Committed(NamedTuple):
     """Decisions already carried out at M pack contacts in progress; only the next throw is still open.
 
-    Return current, A; printed force relative to the single pulse; time since the touch, s.
+    `back` is the return current, A, `force` the printed force relative to the single pulse, and `time` the
+    time since the touch, s.
     """
 
     back: FloatArray

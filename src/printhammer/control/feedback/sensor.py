@@ -30,8 +30,8 @@ _SLACK: Final = 1e-6
 class Samples(NamedTuple):
     """Sensor readings of several runs: arrays of shape (M, N), one row per run.
 
-    Sample times, s; displacements, m, 0 for unused samples; mask of the used samples; standard deviation of a
-    sample, m.
+    `times` are the sample times, s, `shown` the displacements read, m (0 for unused samples), `used` is the
+    mask of the used samples, and `error` the standard deviation of a sample, m.
     """
 
     times: FloatArray

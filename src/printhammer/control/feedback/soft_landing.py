@@ -25,7 +25,7 @@ from printhammer.support.arrays import FloatArray, IntArray
 _STARTS: Final = np.linspace(0.85, 1.75, 28)
 _WIDTHS: Final = np.linspace(0.1, 0.75, 20)
 # Half-widths of the finer grids around the best pulse, in single-pulse flight times: a grid spans one step of
-# # the preceding grid to either side
+# the preceding grid to either side
 _NEAR: Final = np.linspace(-1.0, 1.0, 7)
 _FINER: Final = (0.034, 0.01, 0.003)
 # Distances from rest are divided by this time, in single-pulse flight times, to give an equivalent speed
@@ -121,8 +121,7 @@ class Launch:
 def launch(plant: Plant, forces: ForceMap) -> Launch:
     """Compute the launch from rest that prints with `_ALMOST` times the single-pulse force.
 
-    A short push into the pack adds the rest of the force; the length of the push is chosen when the impact
-    speed is known.
+    A short push into the pack adds the missing force; its length is chosen once the impact speed is known.
     """
     driver, scale = plant.driver, plant.single.flight_time
     widths = _WIDTHS_LAUNCH * scale

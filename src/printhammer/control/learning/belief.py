@@ -109,7 +109,7 @@ class Belief:
         """Draw samples of the constants from a widened posterior distribution, shape (count, constants).
 
         Standard deviations are multiplied by `_CARE`, and modes are drawn by the square roots of their
-        probabilities: where readings are curved, the Laplace approximation is too narrow.
+        probabilities: where readings are nonlinear in the constants, the Laplace approximation is too narrow.
         """
         normal = _CARE * np.random.default_rng(seed).standard_normal((count, self.modes[0].mean.size))
         shares = np.cumsum(np.sqrt(self.weights))

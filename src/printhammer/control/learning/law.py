@@ -81,9 +81,9 @@ class OpenLoop(NamedTuple):
 class Adjustable:
     """Table entries that are learned: advance and width of print pulses, and width of brake pulses.
 
-    `base`, shape (4, entries), are the settings to which corrections are added, in s relative to the slots,
-    at a slot rate in Hz, for the hammer with its driver. Corrections are arrays of shape (..., inputs), in
-    units of `STEP`.
+    Corrections, arrays of shape (..., inputs) in units of `STEP`, are added to the settings `base`, shape (4,
+    entries): times in s, relative to the slots, for the hammer of `task` with its driver. `rate` is the slot
+    rate, Hz.
     """
 
     task: Task
@@ -246,7 +246,7 @@ class _Unit(NamedTuple):
 
 @dataclass(frozen=True)
 class LearningLaw:
-    """Learning law of a production: prior, test pulses, and update of corrections; holds no readings."""
+    """Learning law common to all units: prior, test pulses and update of corrections, but no readings."""
 
     entries: Adjustable
     production: Production
@@ -267,7 +267,7 @@ class LearningLaw:
         return 1.0 if len(self.entries.loops) == 1 else float("nan")
 
     def update(self, belief: Belief, corrections: FloatArray, unexplained: FloatArray) -> Printing[Update]:
-        """Compute the corrections after a stage; yield the test lines that simulated hammers have to print.
+        """Compute the corrections after a stage; yield the test lines to print with simulated hammers.
 
         `unexplained`, shape (2, dots), is the model error of arrival and force of the dots of the line,
         normalised by the limits.
@@ -306,7 +306,7 @@ class LearningLaw:
         return Update(found, contraction, verdict, left)
 
     def choose_loop(self, belief: Belief, verdict: Verdict) -> Printing[Verdict]:
-        """Choose the open loop of a unit from its posterior given readings of `COMPARED` in all loops."""
+        """Choose a unit's open loop from its posterior, given readings of `COMPARED` in every loop."""
         drawn = self.production.hammers(belief.draw(_ALIKE, self.seed))
         press = self.production.press([each for each in drawn if each is not None])
         others = yield from order_loops(press, self.entries)
@@ -425,7 +425,7 @@ class LearningLaw:
         return Verdict(gains, loops[chosen], most, float(good.mean()), every, self.alone)
 
     def _leads(self, share: FloatArray, others: FloatArray) -> bool:
-        """Whether a drive gains `_GAIN` on average, and loses dots on at most `doubt` of the hammers."""
+        """Whether a drive gains `_GAIN` of the dots on average, and at most `doubt` of hammers lose dots."""
         harmless = np.quantile(share - others.max(axis=0), self.doubt) >= 0.0
         return bool(harmless and share.mean() - others.mean(axis=1).max() >= _GAIN)
 
@@ -433,9 +433,9 @@ class LearningLaw:
 def better_loop(shares: FloatArray, usual: int) -> tuple[int, float]:
     """Choose an open loop from the fraction of good dots in each loop on each sample, (loops, samples).
 
-    The usual open loop, with index `usual`, is left only for a loop with a larger mean fraction, in which at
-    least the fraction `SURE` of the samples print no fewer dots than in any other. The result is the index of
-    the chosen loop, and the fraction of the samples that print no fewer dots with this loop.
+    The usual open loop, with index `usual`, is chosen unless another loop has a larger mean fraction and at
+    least the fraction `SURE` of the samples print no fewer dots in that loop than in any other. Returns the
+    index of the chosen loop, and the fraction of the samples that print no fewer dots in the chosen loop.
     """
     mean, sure = shares.mean(axis=1), (shares >= shares.max(axis=0)).mean(axis=1)
     better = (sure >= SURE) & (mean > mean[usual])

@@ -346,8 +346,8 @@ def learn(
     rate : float or str
         Slots per second, Hz, or text with a unit.
     driver, limits, history, reach, largest_current
-        As for `printhammer.tune`; by default a fast switch. "own" for a hammer whose coil a driver switches:
-        advance and time on the rail are then learned.
+        As for `printhammer.tune`; the default driver is a fast switch. With the driver "own", for a hammer
+        whose coil is switched by a driver, advance and on-time are learned.
     sensor : ImpactSensor, optional
         Impact sensor; by default one that measures times with a standard deviation of 5 us.
     variability : Variability, optional

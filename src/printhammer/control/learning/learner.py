@@ -49,14 +49,13 @@ class Learner:
     An open loop is used during the first stage. Later stages use an open loop in three cases: no hammer of
     the production explains the readings; more posterior samples than the doubt allows would print fewer dots
     within limits with the table than in open loop, or a row in which errors grow; or the mean gain is below
-    2 % of the dots. The open loop is the better one of the production, or another one that readings of the
-    unit in both open loops show to be better.
+    2 % of the dots. The open loop is the one that prints more dots over the production, unless the
+    readings of the unit in both open loops show that the other prints more.
 
     Parameters
     ----------
     law : LearningLaw
-        Learning law of the production; replaced by a law with another starting table if the law does not
-        converge.
+        Learning law, replaced by a law with another starting table if it does not converge.
     """
 
     def __init__(self, law: LearningLaw) -> None:
@@ -167,7 +166,7 @@ class Learner:
     def _believe(
         self, means: Sequence[Mean], drives: Sequence[DrivenLine], before: Belief | None
     ) -> Printing[Belief]:
-        """Estimate the constants from mean readings of the ladder and of lines with drives."""
+        """Estimate the constants from mean readings: first of the ladder, then of one test line per drive."""
         law = self.law
         measured = law.production.measured
         value = np.concatenate([each.value for each in means], axis=1)
@@ -196,7 +195,7 @@ class Learner:
 
 
 def mean(readings: Sequence[FloatArray], noise: FloatArray) -> Mean:
-    """Average readings over runs without NaN and, for `_FEWEST` runs or more, without outliers."""
+    """Average readings over runs; exclude NaN and, if there are at least `_FEWEST` runs, outliers."""
     values = np.stack(readings)
     known = np.isfinite(values)
     if len(values) >= _FEWEST:
@@ -208,13 +207,13 @@ def mean(readings: Sequence[FloatArray], noise: FloatArray) -> Mean:
 
 
 def _unknown(law: LearningLaw) -> Verdict:
-    """Return the decision before the first reading: the better open-loop drive of the production."""
+    """Return the decision before the first reading: the open loop that is better over the production."""
     unknown = float("nan")
     return Verdict(False, law.first, unknown, unknown, unknown, law.alone)
 
 
 def is_explained(belief: Belief) -> bool:
-    """Whether a posterior explains readings within their noise, without a search that stopped on the way.
+    """Whether the search reached the finest noise level and its mode explains the readings within noise.
 
     In a row in which errors hardly decay, readings are strongly nonlinear in the constants, and a search may
     end at a local optimum. The misfit is then above 1 by more than its statistical error, 1 / sqrt(2 N).

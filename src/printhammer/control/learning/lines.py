@@ -58,7 +58,7 @@ class Surrogate:
 
     @classmethod
     def of(cls, rows: FloatArray, values: FloatArray) -> Surrogate:
-        """Fit one reading per member to constants, shape (members, constants), by ridge regression."""
+        """Fit a reading of each member to its constants, shape (members, constants), by ridge regression."""
         known = np.isfinite(values)
         size = rows.shape[1]
         upper = np.triu_indices(size)
@@ -205,7 +205,7 @@ LINE: Final = slots_of(cycle_with_lead_in(5, 0))
 
 
 class DrivenLine(NamedTuple):
-    """Test line of a drive: table settings, shape (4, entries), waveform, and slots with a dot."""
+    """Test line and its drive: table settings, shape (4, entries), waveform, and slots with a dot."""
 
     settings: FloatArray
     pulse: Waveform

@@ -1,4 +1,4 @@
-"""Preparation of learning for a production: robust starting table, test pulses and learning law."""
+"""Preparation for learning: robust starting table, test pulses and learning law, common to all units."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ class Production:
         return self.variability.hammers(self.nominal, rows[:, : self.constants])
 
     def press(self, hammers: Sequence[Hammer]) -> Press:
-        """Return a simulator of test prints for hammers at the slot rate of the production."""
+        """Return a simulator of test pulses and test lines for hammers, at the slot rate `rate`."""
         return Press(self.task, self.rate, hammers)
 
     def readings(

@@ -85,7 +85,7 @@ class NoBurstError(PrinthammerError):
 
 
 class SupplyCheck(Declared):
-    """Dots of a burst when all currents are scaled by a wrong supply: arrays of shape (n,)."""
+    """Dots of a burst for n changes of all currents, as by a wrong supply: arrays of shape (n,)."""
 
     changes: FloatArray = part("relative change of every current: 0.03 for 3 % more")
     adequate: IntArray = part(
@@ -384,7 +384,7 @@ def least_work(
         Objective: "positive work" of the coil, or its "heat".
     shape : str, optional
         "free": any current within the limits; "pulses": the hammer's pulses with optimised times and widths,
-        see `printhammer.control.least_work.pulses`. `slew` and `spacing` are then ignored.
+        see `printhammer.control.least_work.pulses`; "pulses" ignores `slew` and `spacing`.
     spacing : float or str, optional
         Time between nodes of the current, s, or text with a unit, rounded to a whole fraction of the period;
         by default `SPACING` times the time in which a single pulse indents the pack.

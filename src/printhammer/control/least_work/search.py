@@ -2,7 +2,7 @@
 
 The currents at the nodes are optimised by sequential quadratic programming (SLSQP). A search starts from the
 current of the preceding slot, or from the best profiles of a few levels: brake, wait and throw for a dot;
-hold back and let down for the landing.
+brake and lower for the landing.
 
 Profiles are parameterised by a few numbers in [0, 1], called shares. A Sobol sequence of profiles is
 evaluated, and each of the best is refined by a deterministic local search over a shrinking cloud of points.

@@ -205,7 +205,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return mixed(low_row, high_row, share)
 
     def fired_by(self, driver: str, hammer: Hammer) -> CompensationTable:
-        """Relabel a table tuned on `driven_by(hammer, driver, ...)` as a table for `hammer`.
+        """Convert a table tuned on `driven_by(hammer, driver, ...)` to a table for `hammer` and this driver.
 
         All pulses are shifted by the difference of the flight times from rest.
         """

@@ -150,8 +150,8 @@ COLUMNS: Final = Settings._fields  # Names of the times of an entry
 def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
     """Return the pulse of a hammer, and its largest width, s, within a current limit, A.
 
-    The width is at most `WIDEST` times the hammer's own, or `_SATURATED` times if the current has reached the
-    limit at its own width already.
+    The width is at most `WIDEST` times the width of the hammer's pulse, or `_SATURATED` times if the current
+    reaches the limit at the width of the hammer's pulse.
 
     Raises
     ------
@@ -242,8 +242,8 @@ def brake_of(pulse: Waveform, width: float) -> Waveform:
 class Pulses(NamedTuple):
     """Times and widths of the pulses of one pattern, s: arrays of shape (dots,).
 
-    Slot times `due`, `advance`, firing times `fired`, and `width` of the print pulses; of the brake pulses
-    that follow, the width `braked`, 0 for none, and the `offset` from the firing.
+    The print pulses have slot times `due`, advances `advance`, firing times `fired` and widths `width`. The
+    brake pulses that follow begin `offset` after the firing and have the width `braked`, 0 for none.
     """
 
     due: FloatArray

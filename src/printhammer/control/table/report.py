@@ -152,7 +152,7 @@ def judge_table(
     effort: Effort = DISPLAY,
     **_keywords: Unpack[Keywords],
 ) -> TableReport:
-    """Compare a table with open loop on hammers that differ from its design.
+    """Compare a table with open loop on hammers that differ from the hammer of the table.
 
     The patterns are those of the safe rate, long ones included, and random patterns. The dots of every hammer
     are compared with the single-pulse dot of the hammer for which the table was tuned.
@@ -162,12 +162,12 @@ def judge_table(
     hammer : Hammer
         The hammer for which the table was tuned.
     table : CompensationTable
-        The table.
+        Table to compare with open loop.
     rates : sequence of float or str, optional
         Slot rates, Hz, or text with a unit; by default those of the table or, if the table is long, five
         rates halfway between its rates.
     perturbations : sequence of Perturbation, optional
-        Deviations of the driven hammers; by default those of `PERTURBATIONS` that the hammer's laws have.
+        Deviations of the driven hammers; by default the `PERTURBATIONS` that apply to the hammer's laws.
     limits
         As for `printhammer.safe_rate`.
     seed : int, optional
@@ -258,7 +258,7 @@ def _is_applicable(hammer: Hammer, by: Perturbation) -> bool:
 
 
 def _growth(driven: Sequence[Hammer], rate: float, strategy: Strategy, effort: Effort) -> FloatArray:
-    """Compute the multipliers of rows with a dot in every or every second slot; the larger, per hammer."""
+    """Compute each hammer's larger row multiplier, with a dot in every slot or in every second slot."""
     rates = [rate] * len(driven)
     each = np.array([multipliers(driven, rates, strategy, effort, step) for step in (1, 2)])
     largest = np.nan_to_num(np.abs(each), nan=-1.0).argmax(axis=0)
@@ -282,7 +282,7 @@ def _largest(values: FloatArray) -> float:
 
 
 def between(table: CompensationTable) -> list[float]:
-    """Return the rates, Hz, at which to validate a table: its own or, for a long table, five midpoints."""
+    """Return the rates, Hz, at which to validate a table: its rates or, for a long table, five midpoints."""
     rates = table.rates
     if rates.size < _LONG:
         return [float(rate) for rate in rates]

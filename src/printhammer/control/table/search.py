@@ -46,7 +46,7 @@ from printhammer.control.table.ways import (
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 # Spacing of the periods at which a full search is run, s; other periods re-solve the solutions of their
-# # neighbours
+# neighbours
 SPACING: Final = 30e-6
 _ROOM: Final = 100e-6  # Half-width of the range of firing times about the slot, s
 _GRID: Final = (12, 8)  # Numbers of firing times and widths of the starting grid

@@ -69,7 +69,7 @@ def refined(draft: Draft) -> Draft:
 
 
 def _halfway(draft: Draft, lower: IntArray) -> Draft:
-    """Interpolate and evaluate a draft halfway between the rates `lower` and the next higher rates."""
+    """Interpolate and evaluate a draft halfway between the rates with indices `lower` and the next rates."""
     table = draft.table()
     rates = 0.5 * (draft.rates[lower] + draft.rates[lower + 1])
     settings = np.array([table.at(float(rate)) for rate in rates])
@@ -80,7 +80,7 @@ def _halfway(draft: Draft, lower: IntArray) -> Draft:
 
 
 def _tuned_between(draft: Draft, lower: IntArray) -> Draft:
-    """Tune table rows halfway between the rates `lower` and the next higher rates."""
+    """Tune table rows halfway between the rates with indices `lower` and the next rates."""
     task = draft.task
     rates = 0.5 * (draft.rates[lower] + draft.rates[lower + 1])
     halfway = Draft(task, rates, draft.values[:, lower])
@@ -150,10 +150,10 @@ def tune(
     of the next dot is then a function of the time since that dot alone; longer histories correct the
     remaining error. For each history, advance and width are found by a damped Gauss-Newton
     (Levenberg-Marquardt) iteration so that force and arrival of the last dot of patterns with that history
-    are those of the single pulse. Mostly there are several solutions: before or after a rebound, with or
+    are those of the single pulse. There are usually several solutions: before or after a rebound, with or
     without a brake pulse that removes some of the rebound. `printhammer.control.table.search` enumerates them
-    and keeps the solution whose row of dots stays nearest to the single pulse on hammers with 3 % more and
-    less current and 10 um more and less travel; the deviation on this hammer itself has a weight of eight.
+    and keeps the solution whose row of dots stays nearest to the single pulse on hammers with 3 % more or
+    less current, or 10 um more or less travel; the deviation on `hammer` has a weight of eight.
     Solutions are admitted only if a small error decays from dot to dot in a long row. No dot is fired before
     the armature has left the pack of the preceding dot.
 
@@ -165,7 +165,7 @@ def tune(
     rate, rates : float or str, or sequence of them, optional
         Slot rates, Hz, or text with a unit. By default an automatic grid from 100 Hz, where every dot is
         printed from rest, to the highest rate at which the table is within the limits, in steps of `STEP`,
-        refined where the solution branch changes; both are lower for a slow device.
+        refined where the solution branch changes; both ends are lower for a slow device.
     history : int, optional
         Number of gaps in a history, 1 to 4.
     reach : int, optional
@@ -175,18 +175,18 @@ def tune(
     brake : bool, optional
         Whether brake pulses may be used.
     robust : bool, optional
-        Fit width and advance to the perturbed hammers too, in the least-squares sense, instead of to this
-        hammer alone.
+        Whether width and advance are fitted by least squares to the perturbed hammers too, instead of to
+        `hammer` alone.
     driver : str, optional
         Driver of the coil, one of `DRIVERS` in `printhammer.control.table.drive`: "own", the pulse of the
         hammer or the driver of its coil; "switch", a fast unipolar switch; or "bridge", an H-bridge. The
         latter two replace a current; their dot from rest has the same force as with the hammer's own pulse,
         and is fired later so that it arrives at the same time.
     variability : Variability, optional
-        Spread of the constants of a production. The cost of a candidate is then the RMS deviation of a row of
-        dots over this hammer and the sigma points of the variability.
+        Variability of the constants from unit to unit. The cost of a candidate is then the RMS deviation of
+        a row of dots over `hammer` and the sigma points of the variability.
     largest_current : float or str, optional
-        Current limit, A, or text with a unit; by default 2 A or, if that is more, the current that the widest
+        Current limit, A, or text with a unit; by default 2 A or, if larger, the current that the widest
         pulse of the device reaches.
 
     Returns
@@ -324,7 +324,7 @@ def _tune_again(draft: Draft, poor: IntArray) -> None:
 
 
 def _failed_brakes(draft: Draft) -> tuple[tuple[float, float, float], ...]:
-    """Return period, delay and width, s, of the brake pulses of candidates with failed rows."""
+    """Return period, delay and width, s, of the brake pulses of candidates whose rows of dots failed."""
     task, barred = draft.task, []
     for gap in range(1, task.reach + 1):
         columns = [number_of(each, task.reach) for each in histories(task.gaps, task.reach) if each[0] == gap]

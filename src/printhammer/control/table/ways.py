@@ -217,10 +217,11 @@ def costs(task: Task, ways: Ways) -> FloatArray:
     """Compute the costs of candidates: deviations of rows of dots, as fractions of the limits.
 
     The cost is the largest deviation of any dot of a row of `ROW` dots, over the hammers of `task.spread`
-    and, with the weight `NOMINAL`, the design. With a stated variability it is instead the RMS of the largest
-    deviations over its sigma points and the design. Candidates that miss even the second dot cost `_WRONG`
-    more. If the multiplier of a long row exceeds `STABLE`, the cost is at least `UNSTABLE` and increases with
-    the multiplier. The cost is infinite if a dot is lost or the pulses overlap.
+    and, with the weight `NOMINAL`, the design. With a stated variability the cost is the RMS, over the
+    design and the sigma points of the variability, of the largest deviation on each hammer. Candidates that
+    miss even the second dot cost `_WRONG` more. If the multiplier of a long row exceeds `STABLE`, the cost is
+    at least `UNSTABLE` and increases with the multiplier. The cost is infinite if a dot is lost or the pulses
+    overlap.
     """
     cost = np.full(ways.size, np.inf)
     some = np.flatnonzero(fits(task, ways))
@@ -246,9 +247,9 @@ def growths(task: Task, ways: Ways) -> FloatArray:
     """Compute the growth factor of an error from dot to dot, in a long row of each candidate.
 
     An unknown factor is NaN. If the first two dots meet their target, the state after them is the fixed point
-    of the row. If the cost shows that they miss it, and the row looks stable, the fixed point is located by
-    iteration. If `task.located`, the fixed points of all rows are located: near a grazing no fixed point may
-    exist, however good the first dots are.
+    of the row. If the cost shows that the dots miss the target, and the row looks stable, the fixed point is
+    located by iteration. If `task.located`, the fixed points of all rows are located: near a grazing no fixed
+    point may exist, however good the first dots are.
     """
     rows = rows_of(task, ways, _SECOND + MORE)
     hammers = [task.hammers[0]] * ways.size
