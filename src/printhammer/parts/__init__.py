@@ -1,7 +1,7 @@
 """Parts of a hammer, one law per file.
 
 Every module of this package and its folders whose name does not start with an underscore is imported and
-registers its part; a part defined elsewhere is added with `register`. A module holds, for its role, plain
+registers its part; a part defined elsewhere is added with `register`. A module contains, for its role, plain
 scalar functions (floats in, float out, `c` the float64 array of `Part.packed`), written so that numba
 compiles them; they call nothing but `math`:
 

@@ -172,7 +172,7 @@ _P = TypeVar("_P", bound=type[Part])
 def register(part: _P) -> _P:
     """Class decorator that registers a part class under its role and law.
 
-    A class of a notebook cell, from which no hammer can be built, gives way to one of a file.
+    A class of a notebook cell, from which no hammer can be built, is replaced by a class of a file.
 
     Raises
     ------

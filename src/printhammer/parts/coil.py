@@ -9,8 +9,8 @@ a shorted turn, of resistance Re and leakage Ls referred to the coil,
     lambda = lambda_1 + Ls i,    d lambda_1 / dt = -Re ie,    lambda_1 = lambda_m(x, i + ie) + L (i + ie).
 
 Source: H. H. Woodson and J. R. Melcher, *Electromechanical Dynamics* (1968), ch. 3; the temperature
-coefficient of copper, IEC 60028. Validity: currents that do not crowd in the wire. Weakness: one shorted turn
-stands for eddy currents that spread in the iron; the iron has no hysteresis. The circuit is solved only if
+coefficient of copper, IEC 60028. Validity: no skin effect in the wire. Weakness: one shorted turn
+represents eddy currents that spread in the iron; the iron has no hysteresis. The circuit is solved only if
 the drive is a voltage; a current drive is imposed directly.
 
 Packed constants: c = [resistance, inductance, turn_resistance, leakage, back_emf].

@@ -118,7 +118,7 @@ def reopen(path: str | Path) -> Reopened:
     Raises
     ------
     InputError
-        The name ends in none of `ENDINGS`, the file cannot be read, or does not hold a result.
+        The name ends in none of `ENDINGS`, the file cannot be read, or it does not contain a result.
     """
     import pandas as pd
 
@@ -141,14 +141,14 @@ def reopen(path: str | Path) -> Reopened:
 
 
 def need_for(path: str | Path, kind: str = "") -> None:
-    """Check that the package for a file format is installed; `kind` names the format (default: ending)."""
+    """Check that the package for a file format is installed; `kind` is the format (default: ending)."""
     package, what, extra = _NEEDED.get(kind or Path(path).suffix.lower(), ("json", "", ""))
     if find_spec(package) is None:
         raise missing_extra(f"{path}: {what} {package}", extra)
 
 
 def plain(value: Any) -> Any:
-    """Convert a value to Python numbers, texts, lists and dicts, which every file format can hold."""
+    """Convert a value to Python numbers, texts, lists and dicts, which every file format can store."""
     if isinstance(value, dict):
         return {str(key): plain(entry) for key, entry in value.items()}
     if isinstance(value, np.ndarray | list | tuple):

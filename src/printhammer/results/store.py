@@ -72,7 +72,7 @@ class Store:
     Raises
     ------
     InputError
-        The folder holds other data, or results of another identity; another process holds the lock; the
+        The folder contains other data, or results of another identity; another process holds the lock; the
         folder cannot be written; zarr is not installed. Existing data are kept.
     """
 

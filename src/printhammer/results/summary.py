@@ -1,6 +1,6 @@
 """Summaries of results: sentences, facts and small tables, with quantities in SI.
 
-The terminal, ``print(result)`` and the notebook render the same summary. The texts hold marks instead of
+The terminal, ``print(result)`` and the notebook render the same summary. The texts contain marks instead of
 formatted numbers and colours: `quantity` marks a number with its SI unit, to be converted to the unit system
 of the reader when the summary is rendered; `styled` marks words that a terminal shows in colour.
 """

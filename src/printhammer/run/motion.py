@@ -56,8 +56,8 @@ FORCES: Final = ("magnet", "spring", "pack", "backstop", "damping", "drag", "dri
 a force, and the total."""
 
 PATHS: Final = ("supply", "chopped", "blocked", "backward")
-"""Paths of the coil current: through the supply, through the diode of a chopper, none, and decay of a
-negative current."""
+"""Paths of the coil current: through the supply, through the diode of a chopper, no path (no current), and
+decay of a negative current."""
 
 MOST_DOTS: Final = 40
 """Largest number of dots in a summary; a longer list shows its first and last dots. Arbitrary."""
@@ -236,7 +236,7 @@ class Motion(Result, fields=False):
         return table
 
     def at(self, t: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return displacement, m, and velocity, m/s, at times of the run, s; at a velocity jump, after it."""
+        """Return displacement, m, and velocity, m/s, at times of the run, s; at a jump, those after it."""
         table = self._resampled(t)
         return table[:, 0], table[:, 1]
 
@@ -319,7 +319,7 @@ class Motion(Result, fields=False):
     def peak_after(self, firing: int) -> tuple[float, float] | None:
         """Return time, s, and displacement, m, of the largest local maximum from a firing to the next.
 
-        The result is None without a maximum; the position at the firing never counts.
+        The result is None without such a maximum; the displacement at the firing itself does not count.
         """
         fired = self.drive.times
         if not 0 <= firing < len(fired):

@@ -397,7 +397,7 @@ def regimes_of(
     Parameters
     ----------
     hammers : Hammer or Regime, or sequence of them
-        One hammer for all trains, or one for each; only a phase may accompany regimes.
+        One hammer for all trains, or one for each; with regimes, only `phase` may be passed.
     periods : sequence, optional
         Times between firings, s or text with a unit, one for each train, or a single one for all hammers.
     drives : sequence of Drive, optional

@@ -59,9 +59,9 @@ def simulate(
         (`printhammer.run.window`), and required for a drive that does not end.
     state : sequence of float or str, optional
         Displacement, m, and velocity, m/s, or text with units, at time 0; by default the rest state. In the
-        pack with the mode and the memory, as in `printhammer.run.ensemble.Strobes`; under a voltage then with
-        the current in the coil, A, or with the currents in the coil and in its shorted turn, A, and the
-        voltage of the supply's capacitor, V; by default there is no current, and the capacitor is charged.
+        pack, mode and memory follow, as in `printhammer.run.ensemble.Strobes`; under a voltage drive, then
+        the current in the coil, A, or the currents in the coil and in its shorted turn, A, and the voltage of
+        the supply's capacitor, V; by default there is no current, and the capacitor is charged.
         `Motion.state_at` returns all components.
     tolerance : float, optional
         Error tolerance of one step, in units of the distance from backstop to pack and of a typical speed.

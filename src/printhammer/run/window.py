@@ -1,9 +1,9 @@
 """Window of a run: the time from its last firing to its end, from the device and its waveform.
 
-A single pulse from rest shows how slow a device is. The window starts at 4 ms after the supply is off and is
-doubled until it holds `FLIGHTS` flight times of the single pulse and ends with the armature at rest. The last
-dot of a run is then complete, including its extra contacts. The window of the paper's hammer, with a flight
-time of 0.28 ms, is 4 ms. For many devices, see `printhammer.run.waits`.
+A single pulse from rest shows how slow a device is. The window initially ends 4 ms after the supply is
+switched off; it is doubled until it contains `FLIGHTS` flight times of the single pulse and the armature is
+at rest. The last dot of a run is then complete, including its extra contacts. The window of the paper's
+hammer, with a flight time of 0.28 ms, is 4 ms. For many devices, see `printhammer.run.waits`.
 
 The same pulse gives the time scale of a device: default times, stated for the paper's hammer, are multiplied
 by the time scale, and default rates are divided by it.

@@ -75,7 +75,7 @@ def style() -> str:
 
 
 def deltas(content: bytes) -> bytes:
-    """Compress repeated bytes by LZ77 copies at any distance, since gzip looks back by 32 kB only.
+    """Compress repeated bytes by LZ77 copies at any distance; gzip finds repetitions only within 32 kB.
 
     Returns
     -------

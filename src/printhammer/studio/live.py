@@ -54,8 +54,8 @@ def live_page(shelf: Shelf, start: Mapping[str, Any] | str = "") -> str:
     shelf : Shelf
         Hammers of the page.
     start : mapping or str, optional
-        State with which the page opens where its address contains none: entries of a state, or their text as
-        in the address. The page reports entries that it cannot use.
+        State with which the page opens unless its address contains a state: entries of a state, or their text
+        as in the address. The page reports entries that it cannot use.
 
     Raises
     ------

@@ -41,7 +41,7 @@ class _Argument(NamedTuple):
 def check_objects(function: F) -> Callable[[tuple[Any, ...], dict[str, Any]], None]:
     """Build a function that checks the arguments of another function.
 
-    Parameters are checked whose annotation is a union of classes in `_KINDS` and None. Objects are compared
+    A parameter is checked if its annotation is a union of classes in `_KINDS` and None. Objects are compared
     by the names of their classes, so that no class has to be imported.
 
     Returns

@@ -21,10 +21,10 @@ def comment(text: str) -> str:
 
 
 def guarded(guard: str, body: str) -> str:
-    """Return a C header with an include guard that holds a checksum of the body.
+    """Return a C header with an include guard that contains a checksum of the body.
 
     Two headers with one name and different contents stop the compiler; without the checksum, the guard would
-    skip the second one without a message.
+    skip the second header without a message.
     """
     checksum = f"0x{zlib.crc32(body.encode()):08x}u"
     return f"""\

@@ -177,8 +177,8 @@ def dip_of(
     Returns
     -------
     tuple of float
-        Point with the smallest height, and the height, i.e. the value with the sign of the ends; a positive
-        height if the function does not reach zero.
+        Point with the smallest height, and the height, i.e. the value times the sign of the function at the
+        ends; positive if the function does not reach zero.
     """
     sign = sign_of(at_low)
     step = _SLOPE * (high - low)

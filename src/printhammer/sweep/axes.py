@@ -76,7 +76,7 @@ def read_axis(
     Raises
     ------
     InputError
-        The key is unknown, a value is invalid or out of bounds, a range is empty.
+        The key is unknown, a value is invalid or out of bounds, or a range is empty.
     """
     target, field, note = _resolved(table.key, where, hammer, own_waveform, named)
     here = f"{where} ({table.key})"

@@ -3,10 +3,10 @@
     Fb + Fe = k delta^1.5 - l v delta^1.5,     delta = b - x > 0
 
 Source: F. Hendriks, IBM J. Res. Develop. 27 (1983), equations (6) and (7), the latter after Hunt and
-Crossley; (6) is given the unit step that it lacks in print. k may follow from radii and Young's moduli, l
-from a restitution (`printhammer.parts.backstop._hertz`).
+Crossley; the program adds the unit step that (6) lacks in print. k may follow from radii and Young's moduli,
+l from a restitution (`printhammer.parts.backstop._hertz`).
 Validity: quasi-static contact within the elastic limit. Weakness: (7) can pull once v > k/l; a free rebound
-never gets there, and `pull = false` forbids it where other forces drive the armature off.
+never reaches this speed, and `pull = false` excludes the pull where other forces accelerate the armature.
 
 Packed constants: c = [k, l, 1 if it may pull else 0].
 """
@@ -80,8 +80,9 @@ class HertzBackstop(BackstopPart):
     """Constants of equations (6) and (7).
 
     The stiffness k is given by `stiffness`, or by `radius1` and the Young's moduli and Poisson ratios of both
-    bodies (`radius2` left out: a flat). The damping l is given by `damping`, or by the `restitution` of a
-    free rebound at `restitution_speed`. The properties `k` and `l` hold the values that follow.
+    bodies (without `radius2`, the second is flat). The damping l is given by `damping`, or by the
+    `restitution` of a free rebound at `restitution_speed`. The properties `k` and `l` are the resulting
+    values.
     """
 
     law: ClassVar[str] = "hertz"

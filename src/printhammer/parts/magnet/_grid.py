@@ -97,8 +97,8 @@ def read_csv(path: Path, quantity: str) -> Grid:
     Raises
     ------
     InputError
-        The file cannot be read, is empty, lacks a unit, holds anything but finite numbers, or not a complete
-        grid.
+        The file cannot be read, is empty, lacks a unit, contains anything but finite numbers, or does not
+        contain a complete grid.
     """
     columns = {"displacement": "m", "current": "A", quantity: UNITS[quantity]}
     table = read_table(path, columns, what=f"the {quantity} table")

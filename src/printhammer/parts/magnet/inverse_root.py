@@ -7,7 +7,7 @@ currents. The same coenergy, W' = F0 x - 2 (Am - Bm I)^2 sqrt(x), links the flux
 
     lambda = dW'/dI = 4 Bm (Am - Bm I) sqrt(x),
 
-whose slope with the current is negative: a coil on it has a constant inductance above 4 Bm^2 sqrt(x).
+whose slope with the current is negative: the coil needs a constant inductance above 4 Bm^2 sqrt(x).
 Validity: the measured range of x and I, which the paper does not print; state the range of x as `range_min`
 and `range_max`.
 Weakness: singular at x = 0, where the origin is arbitrary (the backstop sits at 0.002 in); the pull grows
@@ -39,7 +39,7 @@ def magnet_force(c: Any, x: float, current: float) -> float:
 def magnet_energy(c: Any, x: float) -> float:
     """Return the potential energy at zero current, 2 Am^2 sqrt(x) - F0 x, J; NaN for x < 0.
 
-    It is zero at x = 0.
+    The energy is zero at x = 0.
     """
     if x < 0.0:
         return math.nan

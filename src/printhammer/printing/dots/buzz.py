@@ -2,8 +2,8 @@
 
 F. Hendriks (1983), Fig. 7: "Instead of allowing the armature to return fully to the backstop, current pulses
 can be issued that are synchronized with the return of the armature from the paper." `find_buzz_train`
-searches for such a train of the hammer's own pulses in two families: even trains, and trains in which each
-pulse follows the armature's departure from the pack by a constant delay.
+searches for such a train of the hammer's own pulses in two families: even trains, at a constant period, and
+delayed trains, in which each pulse follows the armature's departure from the pack by a constant delay.
 A delayed train needs a sensor, and can stabilise a motion that is unstable at a constant period. Each train
 starts from rest; if the first excursions are too large for a steady buzz, the armature may touch the backstop
 once before the dots that count.
@@ -121,12 +121,12 @@ def find_buzz_train(
 
     The search is a grid search over one number, the period or the delay, refined around the three best
     values. Even trains come first, since they need no sensor: periods from half the flight time of a single
-    pulse up to its return to the backstop. If no even train both prints enough dots and stays clear after its
-    first dot, delayed trains follow: delays from 0, at the departure from the pack, up to the return, every 2
-    us or 400 delays, whichever is coarser. A delayed train is built firing by firing; a dot counts as missing
-    after three times the single pulse's time from firing to departure. Trains are ranked by four criteria in
-    order: enough dots, clear of the backstop, number of dots, force of the weakest dot. The search is
-    deterministic.
+    pulse up to the time of the return to the backstop. If no even train both prints enough dots and stays
+    clear after its first dot, delayed trains follow: delays from 0, at the departure from the pack, up to the
+    return, every 2 us or 400 delays, whichever is coarser. A delayed train is built firing by firing; a dot
+    counts as missing after three times the single pulse's time from firing to departure. Trains are ranked by
+    four criteria in order: enough dots, clear of the backstop, number of dots, force of the weakest dot. The
+    search is deterministic.
 
     Parameters
     ----------

@@ -167,8 +167,8 @@ PRESETS: Final = {
     "dot-matrix": Limits(arrival=0.5 * DOT_MATRIX_SPREAD),
     "engraved": Limits(arrival=0.5 * ENGRAVED_SPREAD),
 }
-"""Presets of the limits, by name. The paper's spreads are peak to peak: the limit is half of each, to either
-side. "slots" is the default of all comparisons of drives."""
+"""Presets of the limits, by name. The paper's spreads are peak to peak: the limit is half of each spread, on
+either side. "slots" is the default of all comparisons of drives."""
 
 
 def limits_named(name: str) -> Limits:

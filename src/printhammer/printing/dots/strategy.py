@@ -3,10 +3,10 @@
 The open loop is defined here; compensation tables and feedback are strategies too. A pattern is a row of
 slots, one period apart in time, each with or without a requested dot.
 
-The long test patterns are the de Bruijn cycle, rows of dots, and a line of text. The cycle holds every word
-of eight slots, but at most eight dots in a row. An error that grows from dot to dot may exceed the limits
-only in a longer row, so rows have 200 slots, with a dot in every slot, every second or every third. The text
-holds all letters and digits in the built-in font, one pattern per wire of the head.
+The long test patterns are the de Bruijn cycle, rows of dots, and a line of text. The cycle contains every
+word of eight slots, but at most eight dots in a row. An error that grows from dot to dot may exceed the
+limits only in a longer row, so rows have 200 slots, with a dot in every slot, every second or every third.
+The text contains all letters and digits in the built-in font, one pattern per wire of the head.
 """
 
 from __future__ import annotations

@@ -140,8 +140,8 @@ def attempt_patterns(
 ) -> list[list[tuple[Trial, int]]]:
     """Simulate patterns in all cases and, with `long`, the long patterns in the cases that pass.
 
-    With `stop`, the long patterns are simulated only up to the first case that fails. The result holds for
-    each case its one or two trials, with the index of the case in the trial.
+    With `stop`, the long patterns are simulated only up to the first case that fails. The result lists, for
+    each case, one or two trials with the index of the case in each trial.
     """
     trial = attempt(cases, patterns, strategy, **options)
     runs = [[(trial, k)] for k in range(len(cases))]

@@ -146,7 +146,7 @@ CONSTANTS: Final = {
     "travel": (("pack.front",),),
     "paper": (("pack.stiffness",),),
 }
-"""Constants that each standard deviation varies: the first listed group that the hammer has."""
+"""Constants to which each standard deviation applies: the first listed group that the hammer has."""
 
 _TRIES: Final = 10  # Maximum number of batches drawn, each of the requested size; arbitrary
 WIDEST: Final = 3.0

@@ -40,7 +40,7 @@ class Cells:
 
 @contextmanager
 def paused_collector() -> Iterator[None]:
-    """Pause the collector of cycles, which doubles the time to build a million rows of cells."""
+    """Pause the cyclic garbage collector, which would double the time to build a million rows of cells."""
     running = gc.isenabled()
     gc.disable()
     try:
