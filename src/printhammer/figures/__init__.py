@@ -30,7 +30,7 @@ class PaperFigure:
     number: int
     """Number of the figure in the paper."""
     place: str
-    """Drawing function as "module.function", the module in `printhammer.figures.paper`."""
+    """Drawing function, as "module.function" within `printhammer.figures.paper`."""
     title: str
     """Short title of the figure."""
     caption: str

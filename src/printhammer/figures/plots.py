@@ -48,11 +48,11 @@ PLOTS: Final = {
     "ToleranceYield": "quality.plot_tolerance",
     "ZeroOne": "chaos.exponents.plot_zero_one",
 }
-"""Drawing function of each result class, as module and name; a further figure's key is "Class.figure"."""
+"""Drawing function by result class, as "module.function"; additional figures have keys "Class.figure"."""
 
 
 def plot(result: object, picture: str = "", **options: Any) -> Figure:
-    """Draw a result; `picture` selects a further figure, such as "run" for the entry "Feedback.run".
+    """Draw a result; `picture` selects an additional figure, such as "run" for the key "Feedback.run".
 
     Raises
     ------

@@ -225,7 +225,7 @@ def plot_tolerance(batch: ToleranceYield, *, bars: int = 8) -> Figure:
 
     Left: fraction of hammers that print every pattern within limits, against the rate; or, for a single rate,
     the single-pulse dots of passing and failing hammers. Right: rank correlation of each constant with the
-    safe rate, or with passing; grey: range expected by chance.
+    safe rate, or with passing at the single rate; grey: range expected by chance.
     """
     figure = new_figure(3.6, 7.4)
     left, right = figure.subplots(1, 2, width_ratios=(1.4, 1.0))

@@ -89,16 +89,15 @@ def fit_coil(
 ) -> Fit:
     """Fit constants of the coil circuit to records of the coil current, each of a single shot.
 
-    A probe error is a number or a text with a unit; "1 +- 0.01", a value with its standard deviation, which
-    enters as a prior; or "fit". Errors that are not stated are assumed absent, and the law is tested against
-    them.
+    A probe error is a number or a text with a unit; a value with its standard deviation, such as "1 +- 0.01",
+    which is a prior; or "fit". Errors that are not stated are assumed absent; the fit tests the assumption.
 
     Parameters
     ----------
     paths : sequence of path
-        Tables with the columns ``time``, ``current`` and optionally ``voltage``, which then drives the coil,
-        starting with the first row; the time of each of its edges is uncertain between two rows. Without it
-        the coil is switched on at time 0.
+        Tables with the columns ``time``, ``current`` and optionally ``voltage``. A recorded voltage drives
+        the coil from the first row on; the time of each voltage edge is fitted, between the two rows of the
+        edge. Without a recorded voltage the coil is switched on at time 0.
     hammer : Hammer
         Hammer with the known constants and the initial guesses. A missing resistance or inductance is
         estimated from the first record.
@@ -246,7 +245,7 @@ class CurrentLaw:
         return np.concatenate(shown)
 
     def missing(self, p: FloatArray) -> dict[str, FloatArray]:
-        """Return the derivatives of the currents with respect to undeclared probe errors, keyed by advice."""
+        """Return the derivatives of the currents by each undeclared probe error, keyed by advice on it."""
         short = _SHORT * self.step
         steps = {"offset": 1.0, "gain": 1.0, "delay": short, "time constant": short}
         unstated = [name for name in steps if name not in [error.name for error in self.errors]]
@@ -287,7 +286,7 @@ class CurrentLaw:
         return _kept(self._slopes, p, made)
 
     def variance_columns(self, p: FloatArray) -> FloatArray:  # noqa: ARG002
-        """Return the variance components: one noise variance per record."""
+        """Return the variance coefficients: one noise variance per record."""
         count = len(self.traces)
         return np.repeat(np.eye(count), [len(trace.table) for trace in self.traces], axis=0)
 
@@ -295,8 +294,8 @@ class CurrentLaw:
 class Averaged:
     """Law averaged over quantisation plateaus, for readings whose quantisation step exceeds the noise.
 
-    Rows on the same plateau share their rounding error. Where the law crosses the step the rounding averages
-    out; where the law stays on the step, the error is up to half a step.
+    Rows on one plateau have correlated rounding errors: these average out where the law varies by a whole
+    step across the plateau; where the law is nearly constant, the error of the mean is up to half a step.
     """
 
     def __init__(self, law: CurrentLaw, plateau: IntArray, fitted: FloatArray, step: float) -> None:
@@ -332,12 +331,12 @@ class Averaged:
         return np.column_stack([self.mean(column) for column in slopes.T])
 
     def variance_columns(self, p: FloatArray) -> FloatArray:
-        """Return the variance components: the rounding variance of each record."""
+        """Return the variance coefficients: one rounding variance per record."""
         return np.asarray(self.law.variance_columns(p)[self.begins] * self.share[:, np.newaxis])
 
 
 def _within(p: FloatArray, space: Parameters) -> FloatArray:
-    """Return the initial guess of a second fit: prior means where they exist, else the first estimates."""
+    """Return the initial guess of a second fit: the prior means, or without a prior the first estimates."""
     return np.where(np.isfinite(space.deviation), space.start, np.clip(p, space.low, space.high))
 
 

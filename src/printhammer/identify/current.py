@@ -36,7 +36,7 @@ _FINEST: Final = 0.5e-6
 """Largest time step of the current before low-pass filtering, s."""
 
 _MOST: Final = 2_000_000
-"""Largest number of time steps in a record; limits the memory use."""
+"""Largest number of time steps in a record, to limit the memory use; arbitrary."""
 
 _LOCKED: Final = 1e9
 """Mass that stands for a locked armature, kg; 100 N displace it by only 0.05 um in one second."""
@@ -140,7 +140,7 @@ class Trace(Declared, eq=False):
 def read_trace(
     path: str | Path, hammer: Hammer, locked: float | None, has_offset: bool, columns: str | None = None
 ) -> Trace:
-    """Read a current record; `locked` is the displacement of a locked armature, m (None: from a comment)."""
+    """Read a current record; `locked` is the displacement of a locked armature, m (None: as in a comment)."""
     table = read_table(path, {"time": "s", "current": "A"}, optional={"voltage": "V"}, columns=columns)
     table.check_times()
     t = table.values["time"]
@@ -198,7 +198,7 @@ def _sampled(table: Readings, times: FloatArray, volts: FloatArray) -> Waveform:
 
 
 FIT: Final = "fit"
-"""Value that stands for a probe error to be fitted."""
+"""Value of a probe-error option that requests a fit of the error."""
 
 NOMINAL: Final = {"offset": 0.0, "gain": 1.0, "delay": 0.0, "time constant": 0.0}
 """Errors of an ideal probe, SI."""
@@ -281,7 +281,7 @@ def _read(name: str, written: float | str) -> tuple[float, float]:
 
 
 def bounds_of(error: ProbeError, longest: float) -> tuple[float, float]:
-    """Return the bounds of a probe error, SI, for records of a given duration, s."""
+    """Return the bounds of a fitted probe error, SI; `longest` is the duration of the longest record, s."""
     if error.name == "gain":
         return 0.1 * error.value, 10.0 * error.value
     if error.name == "time constant":
@@ -301,11 +301,11 @@ def resolution_of(values: FloatArray) -> float:
 
 
 _WHOLE: Final = 0.02
-"""Largest deviation from multiples of the resolution, as a fraction of the step; allows for file rounding."""
+"""Largest deviation of readings from whole steps, as a fraction of the step; allows for rounding in files."""
 
 
 def plateaus(fitted: FloatArray, series: IntArray, step: float) -> IntArray:
-    """Return the plateau index of each row: consecutive rows with equal rounded fitted values share one."""
+    """Return the plateau index of each row; a plateau is a run of rows with equal rounded fitted values."""
     code = np.rint(fitted / step)
     begins = (np.diff(code) != 0.0) | (np.diff(series) != 0)
     return np.concatenate([[0], np.cumsum(begins)]).astype(np.int64)

@@ -42,7 +42,7 @@ def fit(
         "magnet": `spring`, a table of the spring alone; `position` of the backstop; `zero`, the reading of
         the displacement sensor at x = 0, or None to fit it. For "solenoid": see
         `printhammer.identify.static.solenoid.fit_solenoid`. For "spring": `position`. For "pack":
-        `thickness`; `exponents`, whether to fit these too. For "backstop": `stiffness`, N/m^1.5 or a
+        `thickness`; `exponents`, whether to fit the exponents. For "backstop": `stiffness`, N/m^1.5 or a
         `printhammer.identify.static.backstop.Stiffness`. For "motion": see
         `printhammer.identify.shots.motion.fit_motion`. For "coil": see `printhammer.identify.coil.fit_coil`.
 

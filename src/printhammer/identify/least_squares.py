@@ -24,7 +24,7 @@ from printhammer.results import Declared, part
 from printhammer.support.arrays import BoolArray, FloatArray
 
 _FALSE_OUTLIERS: Final = 0.01
-"""Expected number of good rows excluded per fit, for normal noise."""
+"""Expected number of rows without gross error that a fit excludes, for normal noise."""
 
 _EXACT: Final = 1e-11
 """RMS residual, as a fraction of the largest datum, below which the data count as exact."""
@@ -35,7 +35,7 @@ _ALONE: Final = 0.9
 """Leverage above which a row alone determines a parameter."""
 
 _HOLDING: Final = 4.0
-"""Ratio of variances, without to with a set of rows, above which the rows are essential; arbitrary."""
+"""Factor on a parameter's variance if rows are omitted, above which the rows are essential; arbitrary."""
 
 _AT_BOUND: Final = 1e-6
 """Distance from a bound, as a fraction of the parameter, below which the parameter counts as at the bound."""
@@ -143,7 +143,7 @@ class Solution(Declared, eq=False):
 
 
 class NoSolutionError(ArithmeticError):
-    """Raised if no parameters fit the data; `row` deviates most from the initial prediction."""
+    """Raised if no parameters fit the data; `row` is the datum farthest from the initial prediction."""
 
     def __init__(self, row: int) -> None:
         super().__init__(f"the law does not fit the data: row {row} deviates most")
@@ -304,11 +304,11 @@ def _solve(
 
 
 def _with_determining_rows(rows: FloatArray, inside: BoolArray) -> BoolArray:
-    """Return a mask of used rows that leaves no parameter undetermined.
+    """Add to the mask `inside` the outliers without which a parameter would be undetermined.
 
-    Rows determine a parameter if its variance without them is more than `_HOLDING` times as large; such rows
-    are included even if they are outliers. `rows` is the weighted Jacobian, shape (m and more, n); masks have
-    shape (m,).
+    A parameter counts as undetermined if the exclusion of the outliers increases its variance by more than
+    the factor `_HOLDING`. `rows` is the weighted Jacobian of the m rows, followed by one row per prior; masks
+    have the shape (m,).
     """
     if inside.all():
         return inside
@@ -442,7 +442,7 @@ def descend(
     free: BoolArray,
     loss: Any = "linear",
 ) -> FloatArray:
-    """Minimise the weighted sum of squares from `start` (trust-region reflective) over free parameters."""
+    """Minimise the weighted sum of squares over the free parameters; return all parameters."""
     from scipy.optimize import least_squares
 
     if not free.any():

@@ -42,10 +42,11 @@ def bandwidth_of(table: Readings) -> float | None:
 
 
 def lowpass_motion(times: FloatArray, x: FloatArray, v: FloatArray, tau: float) -> FloatArray:
-    """Low-pass filter motions that are at rest until the first time, shape (n, columns).
+    """Low-pass filter the displacements of motions that are at rest before the first time.
 
-    Displacements, m, and velocities, m/s, of several motions, or their derivatives, are columns at ascending
-    times, s. Between the times the displacement is the cubic Hermite interpolant.
+    `x` and `v` contain the displacements, m, and velocities, m/s, of several motions, or their derivatives,
+    at ascending times, s; shape (times, motions), as the result. Between the times the displacement is the
+    cubic Hermite interpolant.
     """
     if tau == 0.0 or len(times) < 2:
         return x.copy()

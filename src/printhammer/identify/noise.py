@@ -95,7 +95,7 @@ def variance_of(
     The iteration multiplies each component by the square root of the ratio of its observed to its expected
     score; superfluous components tend to zero. `spread`, shape (m, q), contains the coefficients of the
     components; only the used rows count, with a correction for the fitted `parameters`. With `clipped`, large
-    residuals are clipped, as long as the outliers are unknown.
+    residuals are clipped, for use while the outliers are unknown.
     """
     from scipy.stats import chi2
 

@@ -43,7 +43,7 @@ REPLACED: Final = {
     "backstop.stiffness": [f"backstop.{name}" for name in _BODIES],
     "backstop.damping": ["backstop.restitution", "backstop.restitution_speed"],
 }
-"""Constants to remove from a hammer when the constant used as key is set, since both state one value."""
+"""Constants to remove from a hammer when the key is set, since they determine the same property."""
 
 
 HELD: Final = "held, the data do not determine it"
@@ -135,7 +135,7 @@ class Fit(Result):
     constants: Mapping[str, FittedConstant] = part("constants by key")
     keys: tuple[str, ...] = coordinate(
         "",
-        "constants of the covariance",
+        "keys of the constants in the covariance",
         "key",
         name="key",
         more="may lack a constant from which another one was computed",
@@ -246,7 +246,7 @@ class Fit(Result):
             ("low", "SI", "lower end of the 95 % interval", [each.interval[0] for each in constants]),
             ("high", "SI", "upper end of the 95 % interval", [each.interval[1] for each in constants]),
             ("unit", "", "SI unit", [each.unit for each in constants]),
-            ("how", "", "how it was found if not by the fit", [each.how for each in constants]),
+            ("how", "", "origin of the value if not the fit", [each.how for each in constants]),
         ):
             entries[name] = Column(unit, meaning, ("constant",)), values
         key = Column("", "dotted key of the hammer file, or another name", ("constant",), "coordinate")

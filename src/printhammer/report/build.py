@@ -1,6 +1,6 @@
 """Write a report: evaluate the claims, draw the figures, and publish page and files.
 
-A report is written to a hidden folder, whose contents are moved to their place at the end.
+A report is written to a hidden folder first, and moved to its place when it is complete.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def check_place(out: str | Path) -> None:
 
 
 def _is_report(folder: Path) -> bool:
-    """Whether a folder holds a report, complete or not."""
+    """Whether a folder contains a report, complete or incomplete."""
     try:
         claims = json.loads((folder / CLAIMS).read_bytes())
     except (OSError, ValueError):
@@ -66,7 +66,7 @@ def _is_picture(path: Path) -> bool:
 
 @contextmanager
 def staged(out: str | Path) -> Iterator[Path]:
-    """Provide a folder to write a report into; its contents are moved to `out` at the end.
+    """Yield a temporary folder for a report; its contents are moved to `out` at the end.
 
     If the context ends with an exception, an earlier report stays intact. The page is moved last, so that a
     page implies a complete report. The folder `out` is created if missing.

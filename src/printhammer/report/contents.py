@@ -163,7 +163,7 @@ class Report(Declared):
 
     @property
     def statements(self) -> tuple[int, int]:
-        """Number of the paper's statements that hold, and number of all; Fig. 11 has one per panel."""
+        """Number of the paper's statements that hold, and total number; each panel of Fig. 11 is one."""
         pairs = [result.statements for result in self.results]
         return sum(held for held, _ in pairs), sum(made for _, made in pairs)
 

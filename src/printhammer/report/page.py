@@ -52,7 +52,7 @@ def share_view(share: Share, floor: float | None = None) -> dict[str, Any]:
 
 
 def rates_view(report: Report) -> dict[str, Any] | None:
-    """Return the base rates of the claims, rarest first, on a logarithmic axis; None without any."""
+    """Return the fraction of random hammers for which each claim holds, ascending; None without data."""
     rates = report.reconstruction.base_rates
     if rates is None:
         return None
@@ -138,7 +138,7 @@ def schemes_view(report: Report) -> dict[str, Any] | None:
 
 
 def predictions_view(report: Report) -> dict[str, Any] | None:
-    """Return the predictions of hammers fitted to the stated claims alone; None without data."""
+    """Return, for hammers fitted to the stated claims, the fraction that satisfies each other claim."""
     predictions = report.reconstruction.predictions
     if predictions is None or not report.reconstructed:
         return None

@@ -2,7 +2,8 @@
 
 `plot_manifolds` draws stable and unstable manifolds of saddles.
 
-`plot_quench` draws the quench map: the second peak of lost dots, the print force of printed dots.
+`plot_quench` draws the quench map of two pulses: the force of the second dot, or the peak displacement of the
+second response where the dot is lost.
 """
 
 from __future__ import annotations
@@ -172,7 +173,7 @@ def plot(basins: Basins, *, attractors: bool = True, manifolds: Sequence[Manifol
 
 PRINTED: Final = "viridis"
 LOST: Final = "bone"
-"""Colour maps of a quench map: force of printed dots, and second peak of lost dots; both monotonic."""
+"""Colour maps of a quench map: force of a printed second dot (`PRINTED`), peak of a lost one (`LOST`)."""
 
 _FAILED: Final = "#d55e00"
 _FEW_QUENCH: Final = 0.01  # Fraction of forces beyond either end of the colour scale; arbitrary

@@ -32,7 +32,7 @@ SHADES: Final = {
 """Colour of the bands, by the classification of the motion."""
 
 WAYS: Final = {"from rest": style.INK, "up": style.ORANGE, "down": "#7b3fa0"}
-"""Colours of points that occur in one direction of the parameter only; distinct from the band colours."""
+"""Colour of the points reached in only one direction of the sweep; distinct from the band colours."""
 
 _POINT: Final = 0.7  # Size of a point, points; arbitrary
 _MOST: Final = 3_000_000
@@ -52,8 +52,8 @@ def plot(
 ) -> Figure:
     """Draw a bifurcation diagram with bands that classify the motion.
 
-    Black points are reached in all directions, orange points only with rising values, violet points only with
-    falling values. The bands below show the classification of the motion.
+    Black points are reached in all directions of the sweep, orange points only with rising values, violet
+    points only with falling values.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ def _orbit(ax: Axes, diagram: Bifurcation, orbit: Any, show: str, across: Scale,
 def _insert_crossings(
     values: FloatArray, states: FloatArray, size: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Insert points on a branch where the interpolated multiplier crosses the unit circle."""
+    """Insert points where the interpolated `size` of the multiplier is 1; return values, states and sizes."""
     at = np.flatnonzero((size[1:] < 1.0) != (size[:-1] < 1.0))
     share = (1.0 - size[at]) / (size[at + 1] - size[at])
     middle = values[at] + share * (values[at + 1] - values[at])
@@ -227,7 +227,7 @@ def _kind(verdict: str, stopped: bool) -> str:
 
 
 def _key(strip: Axes, diagram: Bifurcation) -> None:
-    """Draw the legend of the bands, and of the points that occur in one direction of the parameter only."""
+    """Draw the legend of the bands, and of the points reached in only one direction of the sweep."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 

@@ -114,7 +114,7 @@ def draw(ax: Axes, branch: Branch, show: str, factors: tuple[float, float]) -> N
 
 
 def _with_points(branch: Branch, show: str) -> tuple[FloatArray, FloatArray, list[bool]]:
-    """Return parameter and quantity with branch points inserted, and the stability of each segment."""
+    """Return parameter and quantity along a branch, bifurcations included, and each segment's stability."""
     table = getattr(branch, show)
     values, rows, stable = [branch.values[0]], [table[0]], []
     inside: dict[int, list[Any]] = {}

@@ -44,9 +44,10 @@ _LINES: Final = ("-", "--", "-.", ":")
 
 @styled
 def plot(orbits: Orbits, *, points: int = POINTS, longest: int | None = None) -> Figure:
-    """Draw orbits at their firings, over strobe points of the train from rest, and a few against time.
+    """Draw the states of orbits at the firings, over strobe points of the train from rest.
 
-    Stable orbits are filled marks, all other orbits open marks; the first four are drawn against time below.
+    Stable orbits are filled marks, all other orbits open marks; the panel below shows the first four against
+    time.
     Orbits with a period above `longest` firings are omitted.
     """
     shown = [orbit for orbit in orbits if longest is None or orbit.firings <= longest]

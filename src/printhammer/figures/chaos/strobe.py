@@ -201,7 +201,7 @@ def plot_train(train: ImpactTrain) -> Figure:
     """Draw the statistics of the intervals between the impacts of a train.
 
     The panels show the histogram of the intervals, each interval against the preceding interval, and the
-    autocorrelation; the dashed lines enclose 19 of 20 lags of independent intervals.
+    autocorrelation, which for independent intervals lies between the dashed lines at 19 of 20 lags.
     """
     figure = new_figure(2.9)
     bars, returns, lags = figure.subplots(1, 3)

@@ -74,7 +74,7 @@ def plot_duty(duty: ThermalDuty) -> Figure:
 
 @styled
 def plot_limit(limit: ThermalLimit) -> Figure:
-    """Draw stated rates against the ambient temperature, and the fitted limit as a line per rail voltage."""
+    """Draw the manufacturer's rates and the fitted limit against ambient temperature, by rail voltage."""
     figure, ax = new_panel(3.4)
     for number, rail in enumerate(np.unique(limit.voltage).tolist()):
         rows = limit.voltage == rail
@@ -106,7 +106,7 @@ _MICRO: Final = 1e6  # Microseconds in a second
 def plot_impact_time(study: ImpactTime) -> Figure:
     """Draw standard deviation and bias magnitude of estimated impact times against the sensor noise.
 
-    Orange: nominal hammer. Blue: individual units, whose differences do not average out.
+    Orange: nominal hammer. Blue: individual units, whose constants deviate from the nominal ones.
     """
     figure = new_figure(5.2)
     grid = figure.add_gridspec(2, 1)

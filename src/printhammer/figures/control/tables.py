@@ -133,7 +133,7 @@ def plot_report(report: TableReport) -> Figure:
 
 
 def _histogram(ax: Axes, values: FloatArray, limit: float, name: str) -> None:
-    """Draw histograms of deviations in open loop and with the table; end bins include all beyond 3 limits."""
+    """Draw histograms of deviations in open loop and with the table, clipped to three times the limit."""
     edges = np.linspace(-3.0 * limit, 3.0 * limit, _BINS + 1)
     ax.axvspan(-limit, limit, color=style.FAINT, lw=0.0, zorder=0)
     for row, colour, look in zip(values, (style.ORANGE, style.BLUE), ("--", "-"), strict=True):

@@ -88,7 +88,7 @@ def orbit(motion: Motion, times: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def settled_at(motion: Motion) -> float:
-    """Return the time, s, from which on the armature stays within `SETTLED` of its final position."""
+    """Return the time, s, after which the armature stays within `SETTLED` of its final position."""
     times = times_of(motion)
     x, _v = motion.at(times)
     room = SETTLED * float(np.ptp(x))
@@ -108,7 +108,7 @@ def reach(hammer: Hammer) -> tuple[float, float]:
     Raises
     ------
     InputError
-        The hammer has no platen, no pack and no range of the magnet's law that sets the scale, or no stroke.
+        The hammer has no platen, pack or upper limit of the magnet's law to set the scale, or no stroke.
     """
     from printhammer.hammer.static_force import StaticForce
 

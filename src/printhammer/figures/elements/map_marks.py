@@ -169,7 +169,7 @@ def _strokes(
     borders: FloatArray,
     rows: npt.NDArray[np.intp] | slice = slice(None),
 ) -> tuple[FloatArray, FloatArray]:
-    """Build line segments through the cells of rows, from lower to upper border, separated by NaN."""
+    """Return x and y of one line segment per row, from its lower to its upper border, separated by NaN."""
     centre, place, slope = rates[rows], at[rows], slopes[rows]
     ends = np.column_stack([borders[:-1][rows], borders[1:][rows], np.full_like(centre, np.nan)])
     across = place[:, np.newaxis] + slope[:, np.newaxis] * (ends - centre[:, np.newaxis])

@@ -61,10 +61,10 @@ def occupied(ax: Axes) -> FloatArray:
 def freest(
     points: FloatArray, size: tuple[float, float], corners: Iterable[tuple[float, float]]
 ) -> tuple[tuple[float, float], int]:
-    """Find the first box that covers no points, or else the box that covers the fewest points.
+    """Find the candidate box that covers the fewest points; return its corner and the number of points.
 
-    `points`, shape (n, 2), `size` (width and height of the box) and `corners` (lower left, best first) are
-    fractions of the axes. The corner and the number of covered points are returned.
+    `points`, shape (n, 2), `size` (width and height of the box) and `corners` (lower left corners of the
+    candidates, in order of preference) are fractions of the axes.
     """
     width, height = size
     best: tuple[float, float] = (0.0, 0.0)
@@ -293,7 +293,8 @@ def drive_strip(
 ) -> None:
     """Draw the drive currents, or forces, of motions in the slim strip below a panel.
 
-    `times`, s, and `colours` are given per motion; drives of another quantity than the first are skipped.
+    `times`, s, and `colours` have one entry per motion. A motion driven by a force is skipped if the first is
+    driven by a current, and vice versa.
     """
     quantity = motions[0].driven
     time, value = scale("time", until), scale(quantity)

@@ -96,7 +96,7 @@ def in_style() -> AbstractContextManager[None]:
 
 
 def styled(function: Callable[_P, Figure]) -> Callable[_P, Figure]:
-    """Decorate a drawing function: build its figure in the style, with the hammer's noun for a dot.
+    """Decorate a drawing function: apply the style `RC` and the hammer's noun for a dot to its figure.
 
     The noun is the attribute `strike` of an argument: a hammer, a result or a frequency-time map.
     """

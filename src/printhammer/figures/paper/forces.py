@@ -235,7 +235,7 @@ CURRENTS: Final = (0.0, 0.5, 1.0, 1.5, 2.0)
 
 _POINTS: Final = 400  # Points of a static curve: more than a picture resolves
 _HALF_WIDTH, _ENOUGH, _PREFERRED = 0.04, 0.055, 0.3
-"""Label placement, as fractions of the axes: half-width, sufficient clearance, preferred position."""
+"""Half-width, sufficient clearance and preferred position of a label, in fractions of the axes; arbitrary."""
 
 
 @styled
@@ -329,7 +329,7 @@ def _colours(count: int) -> list[str]:
 def _label_curves(
     ax: Axes, x: FloatArray, lines: FloatArray, curves: dict[str, FloatArray], further: list[FloatArray]
 ) -> None:
-    """Label each curve at a point far from other curves and from position lines."""
+    """Label each of `curves` far from the other curves, from those in `further`, and from position lines."""
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
     across = (x - left) / (right - left)
     up = {name: (values - bottom) / (top - bottom) for name, values in curves.items()}

@@ -70,9 +70,9 @@ def _text(delay: float) -> str:
 
 
 def buzz(hammer: Hammer, *, search: BuzzSearch | None = None, duration: float | str | None = None) -> Figure:
-    """Draw Fig. 7: the buzz-printing train found by `find_buzz_train`, or its best attempt with a remark.
+    """Draw Fig. 7: the train of `find_buzz_train`, or if none prints by buzzing, the best attempt.
 
-    Numbers at the dots that count are peak forces relative to the single-pulse force.
+    Numbers at the dots are peak forces relative to the single-pulse force.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def _heading(train: BuzzTrain) -> str:
 
 
 def _number(figure: Figure, motion: Motion, train: BuzzTrain, until: float) -> None:
-    """Label each counted dot with its peak force, relative to the single pulse."""
+    """Label each dot of a buzz-printing train with its peak force, relative to the single-pulse force."""
     panel = figure.axes[0]
     time, way = scale("time", until), scale("displacement", float(max(motion.maxima[1], default=0.0)))
     forces = dict(enumerate(train.forces, train.first))

@@ -66,7 +66,7 @@ _FINEST: Final = 0.5e-6
 """Largest time step of the displacement before low-pass filtering, s: about 1/100 of a contact's duration."""
 
 _MOST: Final = 2_000_000
-"""Largest number of time steps in a record; limits the memory use."""
+"""Largest number of time steps in a record, to limit the memory use; arbitrary."""
 
 _RUN_UP: Final = 10e-6
 """Initial distance of the armature from the backstop, m; arbitrary, as no force acts before the impact."""
@@ -75,7 +75,7 @@ _LONGEST: Final = 30
 """Maximum number of doublings of the simulation time for a rebound; arbitrary."""
 
 _LEAST: Final = 1e-6
-"""Smallest coefficient of restitution considered in the search for a rebound."""
+"""Lower bound of the coefficient of restitution in the search for the rebound speed."""
 
 
 class Bench(Declared, eq=False):

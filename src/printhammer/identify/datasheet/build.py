@@ -1,8 +1,9 @@
 """Build a hammer from a data sheet; each constant is marked as printed, derived or assumed.
 
 The armature rests at the backstop at 0 and is pulled through the stroke to its end, where the gap is
-`end_gap`. The struck object, there or at `target`, is a spring with a dashpot that has the restitution of the
-sheet; it is so stiff that the work of the magnet indents it by a quarter of the remaining gap.
+`end_gap`. The struck object, at the end of the stroke or at `target`, is a spring with a dashpot that has the
+restitution of the sheet and is so stiff that the work of the magnet indents it by a quarter of the remaining
+gap.
 
 The magnet follows the reluctance law. A sheet has a few forces at one current, whereas the law has seven
 constants, so the fit is a maximum a posteriori estimate: every constant but the pole area has a log-normal
@@ -63,7 +64,8 @@ GUESSES: Final = {
         0.3, 1.0, "a third of the stated inductance bypasses the armature, within a factor of e"
     ),
 }
-"""Log-normal priors of the magnet's constants, SI; core: equivalent air gap; fringe, leakage: fractions."""
+"""Log-normal priors of the magnet's constants, SI: `core` is the air gap equivalent to the iron, `fringe` a
+fraction of the pole radius, `leakage` a fraction of the stated inductance."""
 
 
 @dataclass(frozen=True)

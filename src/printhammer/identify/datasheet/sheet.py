@@ -39,7 +39,7 @@ from printhammer.support.files import read_text
 from printhammer.units import describe, split, to_si
 
 TEXTS: Final = {"name": True, "source": True, "title": False, "note": False, "strike": False}
-"""Text keys of a data sheet, each with whether it is required."""
+"""Text keys of a data sheet, and whether each key is required."""
 
 QUANTITIES: Final = {
     "rail": ("V", True),
@@ -54,7 +54,7 @@ QUANTITIES: Final = {
     "target": ("m", False),
     "on_time": ("s", False),
 }
-"""Quantities of a data sheet, each with its SI unit and whether it is required."""
+"""Quantities of a data sheet: the SI unit of each, and whether the quantity is required."""
 
 TABLES: Final = {
     "spring": {"preload": "N", "stiffness": "N/m"},

@@ -17,7 +17,7 @@ from printhammer.results import Declared, part
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 _WIDE: Final = 10.0
-"""Initial width of the gap penalty, in largest gaps; a gap of that width costs as much as all data."""
+"""Initial width of the gap penalty, relative to the largest gap; a gap so wide costs as much as all data."""
 _NARROW: Final = 0.001
 """Width of the gap penalty, normalised by stroke and typical speed, at which the approach ends."""
 _RISE: Final = 0.3  # Factor on the width of the gap penalty after a successful step
@@ -25,7 +25,7 @@ _LONGEST: Final = 0.3
 """Largest change per step: relative for a constant, normalised by stroke and typical speed for a state."""
 _HALVINGS: Final = 6  # Maximum number of step halvings; arbitrary
 _TRIES: Final = 2
-"""Number of Gauss-Newton steps at each width of the gap penalty."""
+"""Maximum number of Gauss-Newton steps at each width of the gap penalty."""
 
 
 class Prior(Declared, eq=False):
@@ -61,7 +61,7 @@ class Priors:
         ]
 
     def rows(self, columns: int) -> list[FloatArray]:
-        """Return the whitened rows of each prior; the parameters occupy the first `columns` columns."""
+        """Return the whitened Jacobian of each prior, with `columns` columns, one per parameter."""
         blocks = []
         for prior, white in self._white:
             row = np.zeros((len(prior.which), columns))
@@ -92,7 +92,7 @@ class Approach:
         self.keep = [(~rows).astype(np.float64) for rows in spikes]
 
     def run(self, values: FloatArray, states: Sequence[FloatArray]) -> tuple[FloatArray, list[FloatArray]]:
-        """Iterate to parameters, SI, and joint states from which a fit with closed gaps can start."""
+        """Return parameters, SI, and joint states from which the fit with closed gaps can start."""
         values, states = values.copy(), list(states)
         chains = self.shooting.chains(values, states, derivatives=True)
         width = 0.0 if chains is None else _WIDE * largest_gap(chains, self.shooting.units)

@@ -104,11 +104,11 @@ def weak(values: FloatArray, covariance: FloatArray) -> list[int]:
 def changes_if_fitted(
     design: FloatArray, columns: FloatArray, names: Sequence[str], residuals: FloatArray
 ) -> list[tuple[str, float, float]]:
-    """Estimate the change of each held constant if that constant alone were fitted in addition.
+    """Estimate, for each held constant, its change if that constant alone were fitted in addition.
 
-    `design`, shape (m, p), `residuals`, and `columns`, shape (m, q), the derivatives per relative change of
-    the further constants, are whitened by the standard errors of the data. Returned are, for each constant,
-    name, relative standard error, and best relative change.
+    `design`, shape (m, p), `residuals`, shape (m,), and `columns`, shape (m, q), the derivatives per relative
+    change of each held constant, are whitened by the standard errors of the data. The result lists the name,
+    relative standard error and best relative change of each constant.
     """
     basis, _r = np.linalg.qr(design)
     further = []
@@ -133,7 +133,7 @@ _NARROW, _CLOSED = 1e-2, 1e-8
 _FLOOR: Final = 1e-7
 """Noise floor, as a fraction of the stroke; smaller residuals are never outliers."""
 _LEAST: Final = 1e-16
-"""Standard deviation assumed for the noise of exact data, m; sets their weight."""
+"""Standard deviation, m, that is assumed for the noise of exact data, so that their weight is finite."""
 _REACH: Final = 3.0
 """Half-width of a profile likelihood, in standard errors."""
 _POINTS: Final = 7
@@ -151,12 +151,12 @@ class Solution(Declared, eq=False):
     states: list[FloatArray] = part("states at the joints of each shot")
     shown: list[FloatArray] = part("modelled readings of each record, m, shape (n,)")
     by_parameter: list[FloatArray] = part(
-        "derivatives of the readings with respect to the parameters in their scales, shape (n, p)"
+        "derivatives of the readings per unit of each parameter's scale, shape (n, p)"
     )
     outliers: list[BoolArray] = part("masks of the excluded samples")
     scales: FloatArray = part("standard deviation of the residuals, m, shape (shots,)")
     memories: FloatArray = part("variance factors due to autocorrelated residuals, shape (shots,)")
-    design: FloatArray = part("whitened rows of data and prior, with columns in the scales of the parameters")
+    design: FloatArray = part("whitened Jacobian of data and priors, per unit of each parameter's scale")
     cost: float = part("weighted sum of squares, prior included")
 
 
@@ -280,7 +280,7 @@ class GaussNewton:
         )
 
     def _cost(self, values: FloatArray, chains: Sequence[Chain], here: _Weighted) -> float:
-        """Compute the cost of data and priors at parameter values, with the current residual scales."""
+        """Compute the weighted sum of squares of data and priors, with the residual scales of `here`."""
         total = 0.0
         for shot, chain in enumerate(chains):
             left = self.data[shot] - self.shooting.shown(shot, chain.motion)
@@ -317,7 +317,7 @@ class GaussNewton:
         )
 
     def profile(self, solution: Solution, which: int, degrees_of_freedom: float) -> Profile:
-        """Compute the profile of one parameter and its 95 % interval.
+        """Compute the profile likelihood of the parameter `which`, and its 95 % interval.
 
         The noise scales are those of the solution, with the given degrees of freedom. The profile ends where
         no fit converges, or where the parameter would change its sign.

@@ -81,7 +81,7 @@ def tested(shots: Sequence[Shot], solution: Solution, count: int) -> tuple[float
 
 
 def rests(shots: Sequence[Shot], solution: Solution) -> list[str]:
-    """Return remarks on records whose rest position deviates from the hammer's."""
+    """Return remarks on records whose rest position deviates from that of the hammer."""
     sentences = []
     for shot, shown, scale in zip(shots, solution.shown, solution.scales, strict=True):
         before = shot.t < 0.0

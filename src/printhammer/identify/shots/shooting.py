@@ -38,7 +38,7 @@ class Parameters:
     keys: tuple[str, ...]
     """Dotted keys of the fitted hammer constants."""
     owners: tuple[int, ...]
-    """Shot index of each pulse parameter; the parameters of a shot are the constants of its current pulse."""
+    """Index of the shot to whose current pulse each pulse parameter belongs."""
     scales: FloatArray
     """Scales of all parameters, SI; derivatives are per unit of scale."""
 
@@ -61,11 +61,11 @@ class Chain:
     gaps: FloatArray
     """Gaps: final state of each segment minus the initial state of the next, shape (j, 2)."""
     by_parameter: FloatArray
-    """Derivatives of the motion per scale of each parameter, shape (g, 2, p); p = 0 if not requested."""
+    """Derivatives of the motion per unit of each parameter's scale, shape (g, 2, p); p = 0 if omitted."""
     by_state: FloatArray
     """Derivatives of the motion with respect to the initial state of the segment, shape (g, 2, 2)."""
     end_by_parameter: FloatArray
-    """Derivatives of each segment's final state per scale of each parameter, shape (j, 2, p)."""
+    """Derivatives of each segment's final state per unit of each parameter's scale, shape (j, 2, p)."""
     end_by_state: FloatArray
     """Derivatives of each segment's final state with respect to its initial state, shape (j, 2, 2)."""
 
@@ -251,8 +251,8 @@ class Shooting:
     def opened(self, shot: int, chain: Chain) -> tuple[FloatArray, FloatArray]:
         """Compute the readings of a shot with independent segments, and their derivatives.
 
-        The readings have the shape (n,), the derivatives with respect to the parameters, in their scales, and
-        to the states at the joints, in `units`, the shape (n, p + 2 j).
+        The readings have the shape (n,). The derivatives, shape (n, p + 2 j), are per unit of each
+        parameter's scale and, for the joint states, per unit of `units`.
         """
         plan = self.plans[shot]
         count = chain.by_parameter.shape[2]
@@ -271,9 +271,9 @@ class Shooting:
     def condensed(self, shot: int, chain: Chain) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Eliminate the joint states by condensing; return the linear model of a shot with closed gaps.
 
-        Returned are the readings with closed gaps at unchanged parameters, shape (n,); their derivatives with
-        respect to the parameters in their scales, shape (n, p); the change of the joint states that closes
-        the gaps, shape (j, 2), and its derivatives with respect to the parameters, shape (j, 2, p).
+        Returned are the readings with closed gaps at unchanged parameters, shape (n,); their derivatives per
+        unit of each parameter's scale, shape (n, p); the change of the joint states that closes the gaps,
+        shape (j, 2), and its derivatives per unit of each parameter's scale, shape (j, 2, p).
         """
         plan = self.plans[shot]
         count = chain.by_parameter.shape[2]

@@ -127,10 +127,10 @@ def find_touches(
 ) -> tuple[list[Touch], FloatArray, float]:
     """Detect the contacts in a record; return contacts, smoothed record and detection threshold, m.
 
-    A contact begins where the smoothed record crosses the surface, and counts if it then goes clearly beyond;
-    it ends where the record crosses back, if it then goes clearly away. A hard pack may yield by less than
-    `_CLEAR` of the stroke: if no contact with the pack is clear, those count that exceed the noise and half
-    of the largest depth (arbitrary).
+    A contact lasts from the crossing of the surface by the smoothed record to the crossing back; excursions
+    within the threshold, to either side, are ignored. A hard pack may yield by less than `_CLEAR` of the
+    stroke: if no contact with the pack exceeds the threshold, contacts count that are deeper than the noise
+    and than half of the largest depth (arbitrary).
     """
     stroke = stroke_of(hammer, x)
     wanted = (noise / (0.25 * _CLEAR * stroke)) ** 2
@@ -354,7 +354,7 @@ def _fit_waveform(
 
 
 def _starts(t: FloatArray, current: FloatArray, values: dict[str, float], top: float) -> list[FloatArray]:
-    """Build two initial guesses: `values`, and `values` with the amplitude and width of the record."""
+    """Return the logarithms of two guesses: `values`, and `values` with the record's amplitude and width."""
     high = t[np.abs(current) > 0.5 * top]
     recorded = dict(values)
     recorded["amplitude"] = top

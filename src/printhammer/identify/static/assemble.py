@@ -128,11 +128,11 @@ def ratio_p_value(values: FloatArray) -> float:
 
 
 def stretch_p_value(signs: FloatArray) -> float:
-    """Bound the p-value of the longest run of excluded rows, for gross errors at random rows.
+    """Return an upper bound of the p-value of the longest run of excluded rows of one sign.
 
-    `signs` are those of the residuals, 0 for used rows. A run of k excluded rows of one sign begins at any of
-    the n rows with probability (1/2)^(k - 1) q^k, with q the fraction of excluded rows. NaN without two
-    consecutive rows.
+    The null hypothesis is gross errors at random rows: a run of k rows begins at any of the n rows with
+    probability (1/2)^(k - 1) q^k, with q the fraction of excluded rows. `signs` are those of the residuals, 0
+    for used rows. NaN without two consecutive excluded rows.
     """
     longest = length = 0
     for before, here in zip([0.0, *signs.tolist()], signs.tolist(), strict=False):
@@ -223,9 +223,9 @@ def assemble(
 ) -> Fit:
     """Build the result of a fit, with 95 % intervals and with profiles of weakly determined constants.
 
-    `parameters` gives for each parameter its key, its SI unit, and whether a hammer file has it; an empty key
-    marks a nuisance parameter. `remedies` states, by key, what to measure to determine a constant that must
-    be positive. `given`, `indistinct`, `rejected`, `p_value` and `notes` are as in `Fit`.
+    `parameters` lists key, SI unit, and whether the key exists in hammer files, for each parameter; an empty
+    key marks a nuisance parameter. `remedies` states, by key, what to measure to determine a constant that
+    must be positive. `given`, `indistinct`, `rejected`, `p_value` and `notes` are as in `Fit`.
 
     Raises
     ------

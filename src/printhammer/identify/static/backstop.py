@@ -76,7 +76,7 @@ class RestitutionLaw:
         return (self.speed**2 * rebound(self._z(p))[1])[:, None]
 
     def variance_columns(self, p: FloatArray) -> FloatArray:
-        """Return the variance components: absolute and proportional errors of both speeds.
+        """Return the variance coefficients: absolute error of each speed, proportional error of both.
 
         An error of the impact speed acts through the slope d(v_out)/d(v_in) = e + z de/dz.
         """
@@ -171,8 +171,8 @@ def fit_backstop(
 ) -> Fit:
     """Fit the damping ratio l/k to rebounds, and compute stiffness k and damping l of the backstop.
 
-    The table has the columns ``impact speed`` and ``rebound speed``. The stiffness k is computed from radii
-    and moduli of the two bodies in contact; a float, N/m^1.5, is taken as known. See
+    The table has the columns ``impact speed`` and ``rebound speed``. `stiffness` is computed from the radii
+    and moduli of the two bodies in contact, or is a known value, N/m^1.5. See
     `printhammer.identify.fitting.fit`.
 
     Raises
@@ -228,7 +228,7 @@ def fit_backstop(
         [(RATIO, "s/m", False)],
         given={},
         remedies={RATIO: "more rebounds at higher impact speeds"},
-        indistinct=[] if k else [f"speeds give {RATIO} alone, neither of both: the stiffness is missing"],
+        indistinct=[] if k else [f"speeds determine only {RATIO}: the stiffness is missing"],
         rejected=_why(solution, speed, back) if why else "",
         p_value=p_value,
     )

@@ -26,7 +26,7 @@ class TotalLaw:
     """Force of magnet and spring at measured displacements, m, and currents, A, shape (m,).
 
     With the position b of the backstop, m, p = [F0, Am, Bm, Bs, As]; without it p = [C, Am, Bm, K] and the
-    force is C - K x - (Am - Bm I)^2 / sqrt(x). A NaN current marks a row without the magnet. `zero` is the
+    force is C - K x - (Am - Bm I)^2 / sqrt(x). A NaN current marks a row of the spring alone. `zero` is the
     sensor reading at x = 0, m; with None it is fitted, as the last element of p.
     """
 
@@ -64,7 +64,7 @@ class TotalLaw:
         return np.column_stack(columns)
 
     def variance_columns(self, p: FloatArray) -> FloatArray:
-        """Return the variance components: force with and without magnet, displacement, current."""
+        """Return the variance coefficients: force with and without magnet, displacement, current."""
         magnet = self.magnet.astype(np.float64)
         by_current = 2.0 * p[2] * (p[1] - p[2] * self.current) / np.sqrt(self._place(p)) * magnet
         return np.column_stack([magnet, 1.0 - magnet, (self._slope(p) * magnet) ** 2, by_current**2])

@@ -181,7 +181,7 @@ class PackLaw:
         return [np.where(out, depth, self.log_r) * force, np.where(out, (self.log_r - depth) * force, 0.0)]
 
     def variance_columns(self, p: FloatArray) -> FloatArray:
-        """Return the variance components: absolute force, proportional force, indentation."""
+        """Return the variance coefficients: absolute force, proportional force, indentation."""
         force, (low, high) = self.value(p), self.exponents(p)
         steep = np.where(self.cycles.unloading, high, low) / (np.exp(self.log_r) * self.thickness)
         return np.column_stack([np.ones_like(force), force**2, (steep * force) ** 2])
@@ -201,8 +201,9 @@ def fit_pack(
 ) -> Fit:
     """Fit "pack.stiffness" to a table with the columns ``indentation``, ``force`` and optionally ``branch``.
 
-    `thickness` is the thickness d of the pack, platen minus front, m. With `exponents`, those of loading and
-    unloading are fitted too, instead of 2.7 and 11. See `printhammer.identify.fitting.fit`.
+    `thickness` is the thickness d of the pack, platen minus front, m. With `exponents`, the exponents of
+    loading and unloading are fitted too, instead of assuming 2.7 and 11. See
+    `printhammer.identify.fitting.fit`.
 
     Raises
     ------

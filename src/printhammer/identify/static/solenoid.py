@@ -195,7 +195,7 @@ class CircuitLaw:
         return np.column_stack(columns)
 
     def variance_columns(self, p: FloatArray) -> FloatArray:  # noqa: ARG002
-        """Return the variance components: the relative errors of force and of linkage."""
+        """Return the variance coefficients: relative error of the force, relative error of the linkage."""
         return np.repeat(np.eye(2), len(self.rows), axis=0)
 
 

@@ -34,7 +34,7 @@ class Share(Declared):
     """Fraction of hammers for which a statement holds: `holds` of `measured`."""
 
     measured: int = part("number of hammers, at least one")
-    holds: int = part("number of those for which it holds")
+    holds: int = part("number of hammers for which the statement holds")
 
     @property
     def rate(self) -> float:
@@ -83,7 +83,7 @@ class _Table(BaseModel):
 
 class _Counted(_Table):
     measured: _Count = Field(description="the number of hammers")
-    holds: _Count = Field(description="the number of those for which the claim holds")
+    holds: _Count = Field(description="the number of hammers for which the claim holds")
 
     @model_validator(mode="after")
     def _possible(self) -> _Counted:
@@ -97,7 +97,9 @@ class _Predicted(_Counted):
 
 
 class _Panel(_Counted):
-    holds: _Count = Field(alias="as_printed", description="the number of those with the verdict of the paper")
+    holds: _Count = Field(
+        alias="as_printed", description="the number of hammers with the verdict of the paper"
+    )
 
 
 class BaseRates(_Table):
@@ -107,12 +109,10 @@ class BaseRates(_Table):
     hammers: _Some = Field(description="the number of random hammers")
     seed: int = Field(description="the seed of the random hammers")
     space: dict[str, Annotated[list[Any], Field(min_length=3, max_length=3)]] = Field(
-        description="for each constant its lowest and highest value and their unit"
+        description="the lowest and highest value of each constant, and their unit"
     )
-    claims: dict[_ClaimName, _Counted] = Field(description="for each claim how often it holds")
-    poincare_panels: dict[str, _Panel] = Field(
-        {}, description="for each panel of Fig. 11 how often it has the verdict of the paper"
-    )
+    claims: dict[_ClaimName, _Counted] = Field(description="the counts of each claim")
+    poincare_panels: dict[str, _Panel] = Field({}, description="the counts of each panel of Fig. 11")
 
     def share(self, name: str) -> Share | None:
         """Return the fraction of random hammers for which a claim holds; None if it was not measured."""
@@ -126,14 +126,14 @@ class BaseRates(_Table):
 
 
 class Predictions(_Table):
-    """Predictions: the other claims that hold for hammers fitted to the stated claims alone."""
+    """Counts of the other claims that hold for hammers fitted to the stated claims alone."""
 
     format: Literal[1] = Field(description="1, the version of the format")
     seed: int = Field(description="the seed of the search")
     candidates: _Some = Field(description="the number of hammers tried")
-    hammers: _Count = Field(description="the number of hammers kept")
-    stated_held: list[_ClaimName] = Field(description="the stated claims that all of them satisfy")
-    claims: dict[_ClaimName, _Predicted] = Field(description="for each claim how often it holds")
+    hammers: _Count = Field(description="the number of hammers selected")
+    stated_held: list[_ClaimName] = Field(description="the stated claims that all selected hammers satisfy")
+    claims: dict[_ClaimName, _Predicted] = Field(description="the counts of each claim")
 
     def share(self, name: str) -> Share | None:
         """Return the fraction of the hammers for which a claim holds; None if it was not measured."""
@@ -156,7 +156,7 @@ class BestFor(_Table):
     value: dict[str, Any] = Field(description="the values measured with the hammer")
     holds: bool = Field(description="whether the claim holds for the hammer")
     constants: dict[str, _Number] = Field(description="its constants by file key, SI")
-    costs: list[_ClaimName] = Field(description="the claims that it loses")
+    costs: list[_ClaimName] = Field(description="the claims that fail for it instead")
 
 
 class Failing(_Table):
@@ -173,10 +173,10 @@ class Search(_Table):
     format: Literal[1] = Field(description="1, the version of the format")
     shipped: str = Field(description="the fingerprint of the shipped hammer")
     searches: list[Searched] = Field(min_length=1, description="each search, in the order of their logs")
-    core_hours: Annotated[_Number, Field(ge=0.0)] = Field(description="the hours of one core that they took")
-    tolerance: Annotated[_Number, Field(gt=0.0)] = Field(description="the tolerance of their runs")
-    waveform: str = Field(description="the shape of their waveforms")
-    gauge: str = Field(description="how the common scale of masses and forces was fixed")
+    core_hours: Annotated[_Number, Field(ge=0.0)] = Field(description="the computation time, in core hours")
+    tolerance: Annotated[_Number, Field(gt=0.0)] = Field(description="the tolerance of the simulations")
+    waveform: str = Field(description="the shape of the waveforms")
+    gauge: str = Field(description="the rule that fixed the common scale of masses and forces")
     failing: dict[_ClaimName, Failing] = Field(description="the claims that fail for the shipped hammer")
 
 
@@ -245,16 +245,14 @@ class Schemes(_Table):
 
     format: Literal[1] = Field(description="1, the version of the format")
     shipped: str = Field(description="the fingerprint of the hammer of panels and claims")
-    panels: dict[str, list[str]] = Field(description="for each way of computing the verdicts on Fig. 11")
+    panels: dict[str, list[str]] = Field(description="the verdicts on the panels of Fig. 11, by integrator")
     claims: dict[_ClaimName, Literal["holds", "fails"]] = Field(
-        description="for each claim that a scheme can compute its verdict from the Runge-Kutta method of 1983"
+        description="the verdicts on claims, where the Runge-Kutta method of 1983 can compute them"
     )
     family: dict[str, FamilyPanels] = Field(description="panels of Fig. 11 of each hammer of the family")
     hammers: _Some = Field(description="the number of random hammers")
     seed: int = Field(description="the seed of the random hammers")
-    changes: list[Change] = Field(
-        description="how often verdicts change over the panels of the random hammers"
-    )
+    changes: list[Change] = Field(description="the changes of the verdicts on the panels of random hammers")
 
 
 FILES: Final[dict[str, type[_Table]]] = {
@@ -287,7 +285,9 @@ class Results:
     )
     predictions = _file("predictions", Predictions, "Predictions of the search on the stated claims alone.")
     search = _file("search", Search, "Record of the searches that found the shipped hammer.")
-    family = _file("family", Family, "Family of distinct hammers that satisfy the claims about as well.")
+    family = _file(
+        "family", Family, "Distinct hammers that satisfy the claims about as well as the shipped hammer."
+    )
     schemes = _file("schemes", Schemes, "Effect of the integrators of 1983 on verdicts.")
 
     def check(self) -> None:
