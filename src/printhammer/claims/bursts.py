@@ -1,4 +1,4 @@
-"""Claims about bursts of nine pulses against the rate, Figs. 8 and 9, including the map's sensitivity."""
+"""Claims about bursts of nine pulses at increasing rates, and about the frequency-time map (Figs. 8, 9)."""
 
 from __future__ import annotations
 
@@ -335,7 +335,7 @@ def map_sensitivity(context: Context, claim: Claim) -> Measured:
 def erratic_pairs(
     struck: BoolArray, flight_time: FloatArray, settings: Mapping[str, Any]
 ) -> tuple[BoolArray, BoolArray]:
-    """Mask the pairs of neighbouring rates between which a later dot changes, and rates with unequal dots.
+    """Return masks of neighbouring rates between which a late dot changes, and of rates with unequal dots.
 
     A dot changes if it is printed at only one of the two rates, or if its flight times, s, differ by more
     than `flight_time_change_s`; dots before `first_dot` do not count. Dots vary if one is lost, or if their
@@ -352,10 +352,10 @@ def erratic_pairs(
 def erratic_share(
     rates: FloatArray, erratic: BoolArray, varies: BoolArray, hang_up: float | None
 ) -> tuple[float | None, float | None]:
-    """Compute the fraction of erratic pairs from the first rate with unequal dots, Hz, up to hang-up.
+    """Compute the fraction of erratic pairs of rates, from the first rate with unequal dots up to hang-up.
 
-    The fraction and that first rate are returned; None if dots vary at no rate, or only after hang-up.
-    `erratic` and `varies` are from `erratic_pairs`.
+    Returns the fraction and that first rate, Hz; None if dots vary at no rate, or only above the hang-up rate
+    `hang_up`, Hz. The masks `erratic` and `varies` are from `erratic_pairs`.
     """
     if not varies.any():
         return None, None

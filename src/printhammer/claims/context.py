@@ -98,7 +98,7 @@ class Context:
         state: tuple[float, float] | None = None,
         **options: Any,
     ) -> Motion:
-        """Simulate the hammer, or a given hammer, under a drive, and cache the motion."""
+        """Simulate the hammer of the context, or another hammer, under a drive; cache the motion."""
         which = self.hammer if hammer is None else hammer
         options = {"tolerance": self.tolerance, "scheme": self.scheme, **options}
         key = (which.fingerprint, drive.fingerprint, duration, state, *sorted(options.items()))
@@ -108,7 +108,7 @@ class Context:
         return self._motions[key]
 
     def run(self, drive: Drive, duration: float, **options: Any) -> Motion:
-        """Simulate a drive as `attempt` does; raise an error if the run ends early.
+        """Simulate the hammer of the context under a drive; raise an error if the run ends early.
 
         Raises
         ------

@@ -105,7 +105,7 @@ class Measured:
 
 
 class JudgedClaim(Declared):
-    """Claim with its measured values and the verdict: holds, fails or not yet."""
+    """Claim with its measured values and the verdict: "holds", "fails" or "not yet"."""
 
     claim: Claim = part("claim that was evaluated")
     value: Mapping[str, Any] | None = part("measured values by name, SI; None if no value could be measured")

@@ -204,7 +204,7 @@ def two_pulses_660us(context: Context, claim: Claim) -> Measured:
 
 @measures("two_pulses_700us", *WHOLE)
 def two_pulses_700us(context: Context, claim: Claim) -> Measured:
-    """Measure force and flight time of the second of two pulses fired 700 us apart, and its phase."""
+    """Measure dot, coil work and armature velocity for the second of two pulses fired 700 us apart."""
     interval = claim.settings["interval_s"]
     motion = context.pulses([0.0, interval], interval + TAIL)
     first, second = context.dot, motion.dots[1]

@@ -1,8 +1,8 @@
 """Derivatives of the dots with respect to constants, from the tangent columns at contacts and peaks.
 
 The time of a touch changes by dt = -(dx - dg) / v, with dx the change of the displacement at a fixed time and
-dg the change of the surface position; the touch speed changes by dv + a dt. Losses are integrals of power,
-whose derivatives are in the columns.
+dg the change of the surface position; the touch speed changes by dv + a dt. Losses are integrals of power;
+the tangent columns contain the derivatives of these integrals.
 """
 
 from __future__ import annotations
@@ -167,7 +167,7 @@ def _stationary_time(problem: Problem, record: Record, t: float, step: float) ->
 
 
 def _acceleration(problem: Problem, row: FloatArray, *without: int) -> float:
-    """Compute the acceleration, m/s^2, from a row of `Problem.resample`, excluding the forces `without`."""
+    """Compute the acceleration, m/s^2, from a row of `Problem.resample`; omit forces in columns `without`."""
     forces = {k: float(row[k]) for k in range(3, 9) if k not in without}
     drive = float(row[2]) if problem.drive.quantity == "force" else 0.0
     return (math.fsum(forces.values()) + drive) / problem.hammer.mass
@@ -187,7 +187,10 @@ class Changes(Declared):
 def changes_of(
     motion: Motion, problem: Problem, record: Record, wanted: Sequence[Parameter], initial: FloatArray
 ) -> Changes:
-    """Compute the derivatives of all quantities of a run from the derivatives of its initial state."""
+    """Compute the derivatives of dots and energies of a run with respect to the constants in `wanted`.
+
+    `initial` contains the derivatives of the initial state.
+    """
     struck = struck_dots(motion, problem, record)
     times = record.nodes[:, 0]
     end = float(times[-1])
@@ -229,11 +232,11 @@ class _Look:
         return self.flow.states[row], self.flow.changes[row]
 
     def later(self, columns: FloatArray, surface: str, v: float) -> FloatArray:
-        """Return the derivatives, by constant, of the time, s, at which a surface is passed at speed `v`."""
+        """Return the derivatives, by constant, of the time, s, at which a surface is passed at `v`, m/s."""
         return np.asarray(-(columns[0] - surface_moves(self.wanted)[surface]) / v)
 
     def dot(self, dot: Struck, contacts: Sequence[Contact]) -> dict[str, FloatArray]:
-        """Compute the derivatives of the quantities of a dot, by name, shape (n,) each."""
+        """Compute the derivatives, shape (n,), of each quantity of a dot with respect to n constants."""
         contact = contacts[dot.touch]
         fired = np.array([parameter.firings[dot.index] for parameter in self.wanted])
         touch = self.flow.passed[self.rows[int(self.record.contacts[dot.touch, 5])], 0]

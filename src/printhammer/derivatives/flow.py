@@ -93,10 +93,10 @@ def carry_columns(
     marks : array, shape (m,)
         Ascending times at which the columns are returned, s.
     initial : array, shape (3, n), with a circuit (3, n) or (6, n)
-        Changes of displacement, m, velocity, m/s, and latest local maximum, m, at the first mark; of flux
-        linkage of the coil and of its shorted turn, Wb, and voltage of the reservoir, V, by default zero. If
-        no current flows, the displacement determines the linkage, and the given change of the linkage is
-        ignored.
+        Changes of displacement, m, velocity, m/s, and latest local maximum, m, at the first mark; rows 3 to
+        5, zero by default, are changes of the flux linkages of the coil and of its shorted turn, Wb, and of
+        the reservoir voltage, V. If no current flows, the displacement determines the linkage, and the given
+        change of the linkage is ignored.
     forcing : tuple, optional
         Derivatives of the equations with respect to constants (see `forcing_of`); by default none, and only
         the initial state changes.
@@ -144,7 +144,7 @@ def carry_columns(
 
 
 def forcing_of(problem: Problem, changes: dict[str, FloatArray]) -> tuple[Any, ...]:
-    """Pack the derivatives by "hammer", "firings" and "pieces" for n constants into kernel arguments."""
+    """Pack derivatives with respect to n constants, from `parameters.as_arrays`, into kernel arguments."""
     moves = changes["hammer"]
     count = len(moves)
     away = V.SPACING * (np.arange(V.VARIED) - V.MIDDLE)
@@ -186,7 +186,9 @@ def flow(
 
 
 def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
-    """Return the derivatives of displacement, velocity and latest maximum at rest at time 0, shape (3, n).
+    """Return the derivatives of the rest state at time 0 with respect to n constants, shape (3, n).
+
+    The rows are displacement, m, velocity, m/s, and latest local maximum, m.
 
     If a pulse with a sharp edge is fired at time 0, a shift of its firing changes the initial velocity. With
     a coil circuit, the shape is (6, n), for a start without current.
@@ -208,7 +210,9 @@ def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
 
 
 def without_current(problem: Problem, wanted: Sequence[Parameter], columns: FloatArray) -> FloatArray:
-    """Return the derivatives of an initial state without current, shape (6, n): rows 3 to 5 are electric.
+    """Return the derivatives of a currentless initial state with respect to n constants, shape (6, n).
+
+    Rows 3 to 5 are the electric part of the state.
 
     The flux linkage at zero current depends on the initial displacement. If a voltage is switched on at time
     0, a shift of its firing changes the initial flux linkage.
@@ -245,7 +249,7 @@ def without_current(problem: Problem, wanted: Sequence[Parameter], columns: Floa
 
 
 def surface_moves(wanted: Sequence[Parameter]) -> dict[str, FloatArray]:
-    """Return the derivatives of the positions of pack front and backstop, m, by surface, shape (n,) each."""
+    """Return the derivatives of the positions of pack front and backstop with respect to n constants."""
     moves = as_arrays(wanted)["hammer"]
     return {"pack": moves[:, FRONT], "backstop": moves[:, POSITION]}
 
@@ -253,7 +257,7 @@ def surface_moves(wanted: Sequence[Parameter]) -> dict[str, FloatArray]:
 def pack_push_changes(
     problem: Problem, wanted: Sequence[Parameter], state: FloatArray, changes: FloatArray
 ) -> FloatArray:
-    """Return the derivatives of the pack force on the armature, N, shape (n,).
+    """Return the derivatives of the pack force on the armature, N, with respect to n constants, shape (n,).
 
     `state` is a row of `Flow.states` inside the pack; `changes`, shape (3 or more, n), are the derivatives of
     displacement, velocity and latest local maximum in this state.

@@ -37,7 +37,7 @@ _STENCILS: Final = (
     ((0, 1, 2, 3, 4), (-25.0, 48.0, -36.0, 16.0, -3.0)),
     ((0, -1, -2, -3, -4), (25.0, -48.0, 36.0, -16.0, 3.0)),
 )
-"""Offsets and weights, times 12: central, forward, backward; Abramowitz and Stegun (1964), table 25.2."""
+"""Central, forward, backward stencils: offsets, and weights times 12 (Abramowitz and Stegun 1964, 25.2)."""
 _MOST_SINGLE: Final = 20
 """Largest number of firings of an uneven train whose times are listed as constants; arbitrary."""
 
@@ -80,7 +80,7 @@ def parameter_names(hammer: Hammer, drive: Drive) -> list[str]:
 
 
 def parameters(hammer: Hammer, drive: Drive, names: Sequence[str]) -> list[Parameter]:
-    """Build the named constants, with the derivatives of the kernel's arrays.
+    """Build the named constants, with the derivatives of the kernel's arrays with respect to each.
 
     The names are those listed by `parameter_names`, or "rate".
 
@@ -189,7 +189,7 @@ def _changed(waveform: Waveform, name: str, value: float) -> Waveform:
 
 
 def _table_change(made: Callable[[float], Waveform], value: float, scale: float, name: str) -> FloatArray:
-    """Compute the derivative of a waveform's segment table, whose segment kinds must not change."""
+    """Compute the derivative of a waveform's segment table by a constant; segment kinds must not change."""
     kinds = made(value).segments()[:, 1]
 
     def table(moved: float) -> FloatArray:
@@ -255,7 +255,7 @@ def _natural(unit: str, hammer: Hammer, drive: Drive) -> float:
 
 
 def as_arrays(wanted: Sequence[Parameter]) -> dict[str, Any]:
-    """Stack the arrays `hammer`, `firings` and `pieces` of several constants, by name."""
+    """Stack the derivative arrays of several constants, by name: `hammer`, `firings` and `pieces`."""
     return {
         name: np.ascontiguousarray([getattr(parameter, name) for parameter in wanted], dtype=np.float64)
         for name in ("hammer", "firings", "pieces")

@@ -240,13 +240,13 @@ class Spread(Result):
     @property
     @derived("J", _INDEPENDENT, "energy")
     def run_deviation(self) -> FloatArray:
-        """Standard deviation of each energy of the run, for independent constants, J, shape (4,)."""
+        """Standard deviation of each energy of the run, for independent constants, J, shape (energies,)."""
         return np.asarray(np.sqrt((self.run**2).sum(axis=-1)))
 
     @property
     @derived("J", _WORST, "energy")
     def run_worst(self) -> FloatArray:
-        """Worst-case deviation of each energy of the run, J, shape (4,): all constants at their limits."""
+        """Worst-case deviation of each energy of the run, J, shape (energies,): constants at their limits."""
         return np.asarray(self.run.sum(axis=-1))
 
     @property

@@ -97,9 +97,9 @@ class Drive:
     def kernel_arrays(self) -> tuple[FloatArray, IntArray, FloatArray, bool, bool]:
         """Return the arrays of the drive for the kernel, as a tuple.
 
-        Firing times, s; first row of each firing's segment table; all segment tables stacked
-        (`printhammer.drive.segments.stacked`); whether pulses replace each other; whether the drive is a
-        force.
+        The arrays are the firing times, s, the first row of each firing's segment table, and all segment
+        tables, stacked by `printhammer.drive.segments.stacked`. Two flags follow: whether pulses replace each
+        other, and whether the drive is a force.
         """
         return self._times, self._begins(), self._pieces, self._overlap == "replace", self.quantity == "force"
 
@@ -169,7 +169,7 @@ class Drive:
         return ends
 
     def _reach(self) -> int:
-        """Return how many of the latest firings may have active pulses at the same time."""
+        """Return the largest number of firings whose pulses may be active at the same time."""
         return self.overlapping
 
     def _values(self, time: FloatArray, pulse: IntArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Drive with a separate waveform for each firing: harder, softer, longer, with a brake pulse."""
+"""Drive with a separate waveform for each firing, for instance wider pulses or pulses with a brake pulse."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ class PulseSequence(Drive):
         return result
 
     def with_times(self, times: Iterable[float | str]) -> PulseSequence:
-        """Return a drive with the same waveforms at new firing times, s, as many as before.
+        """Return a drive with the same waveforms at new firing times, s, one for each waveform.
 
         Raises
         ------

@@ -23,7 +23,7 @@ ROWS: Final = 4
 """Largest number of rows of the table of a shape, including the end."""
 
 DECAY_TIMES: Final = 27.6310211159
-"""Decay time constants after which a decaying current, then 1e-12 of its initial value, is cut off."""
+"""Number of time constants after which a decaying current is cut off, at 1e-12 of its initial value."""
 
 DIODE: Final = 0.7
 """Forward voltage of a silicon diode, V; the usual textbook value."""
@@ -33,7 +33,7 @@ RAIL: Final = 2.0
 
 _VOLTAGE, _WIDTH, _DECAY_VOLTAGE, _DECAY_RESISTANCE, _SOURCE_RESISTANCE, _COILS, _DIODE_VOLTAGE = range(7)
 _OWN: Final = 7
-"""Indices of the fields common to all drivers; the shape's own fields follow, and last the decay path."""
+"""Indices of the fields common to all drivers; fields of the shape and the decay path follow."""
 
 
 def put(table: Any, row: int, start: float, kind: float, p0: float, p1: float, p2: float, p3: float) -> int:
@@ -124,8 +124,8 @@ def inner_slope(h0: float, h1: float, m0: float, m1: float) -> float:
 def sampled(fields: Any, table: Any) -> int:
     """Write the table of a sampled record, interpolated by shape-preserving cubics; return the row count.
 
-    `fields` contains the n times and then the n values; the table has room for n + 1 rows. Slopes as in
-    `scipy.interpolate.PchipInterpolator`.
+    `fields` contains the n times and then the n values; the table has room for n + 1 rows. The slopes are
+    those of `scipy.interpolate.PchipInterpolator`.
     """
     n = len(fields) // 2
     rows = put(table, 0, 0.0, POLYNOMIAL, 0.0, 0.0, 0.0, 0.0) if fields[0] > 0.0 else 0
@@ -310,7 +310,7 @@ SHOWN: Final = 13
     BRIDGE,
     SINE_SHAPE,
 ) = range(10)
-"""Codes of the shapes: their order in `printhammer.drive.waveforms.shapes.SHAPES`, and the endless sine."""
+"""Codes of the shapes in `printhammer.drive.waveforms.shapes.SHAPES`, in order, and of the endless sine."""
 
 
 def fill_table(shape: int, fields: Any, table: Any) -> int:

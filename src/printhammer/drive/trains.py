@@ -1,8 +1,8 @@
 """Drives: a waveform fired as a train, in bursts or at given times; or a sinusoidal force.
 
 A drive is a current through the coil or, for textbook hammers, a force on the armature. Pulses may overlap:
-with ``overlap="add"`` their values add up, with ``overlap="replace"`` only the latest pulse counts after its
-firing. Numbers are SI; strings with a unit ("1.2 kHz") are accepted as well.
+with ``overlap="add"`` their values add up, with ``overlap="replace"`` each firing ends the preceding pulse.
+Numbers are SI; strings with a unit ("1.2 kHz") are accepted as well.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class PulseTrain(_Pulsed):
     Parameters
     ----------
     waveform
-        Waveform of every firing; None, for instance from a hammer without a waveform, raises the error.
+        Waveform of every firing; None, for instance from a hammer without a waveform, is an error.
     rate, period
         Firings per second, Hz, or the time between them, s; one of the two.
     at

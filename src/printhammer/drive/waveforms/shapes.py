@@ -37,8 +37,8 @@ class Chain(Waveform):
     """Several consecutive waveforms in one firing, each at an offset; the drive is zero between them.
 
     `parts` are pairs of the offset, s or a string with a unit, and the waveform, in ascending order; all
-    are currents or all are forces. A part may begin once the part before has ended or decayed to `TAIL` of
-    its peak; the remainder is cut off. The edges of a part lie at the rounded sums of offset and edge.
+    are currents or all are forces. A waveform may begin once the preceding one has ended or decayed to `TAIL`
+    of its peak; the remainder is cut off. The edges of a waveform lie at the rounded sums of offset and edge.
     """
 
     shape: ClassVar[str] = "chain"
@@ -202,7 +202,7 @@ class Rectangle(_Pulse):
 
 
 class Trapezoid(_Pulse):
-    """Trapezoid: straight rise, flat top of the given width, straight fall; 0 is a sharp edge."""
+    """Trapezoid: straight rise, flat top, straight fall; a rise or fall time of 0 is a sharp edge."""
 
     shape: ClassVar[str] = "trapezoid"
     code: ClassVar[int] = tables.TRAPEZOID
