@@ -1,8 +1,8 @@
 """Impact maps, Poincaré sections at the impacts on backstop or pack, and statistics of impact trains.
 
-At a touch the displacement is that of the surface. The remaining state is the velocity and the time since the
-last firing; from touch to touch these two are an iterated map, like the strobe map from firing to firing,
-with a section that the armature itself defines.
+At a touch the displacement is that of the surface, so that the remaining state variables are the velocity and
+the time since the last firing. From touch to touch, these two variables follow an iterated map, like the
+strobe map from firing to firing, with a section that the armature itself defines.
 
 *Statistics of an impact train.*
 

@@ -1,10 +1,11 @@
 """Dead time: the time from switching on to impact, as a function of rail voltage and coil temperature.
 
 A warm coil draws less current, and on a low rail the current rises more slowly, so the dot comes later and
-softer. Firmware that knows both can fire earlier and longer. For each rail and temperature of a grid, the
-hammer's own pulse is simulated from rest; then the pulse width that gives a constant impact speed ("blow") is
-computed. By default, the blow is the impact speed of the hammer's own pulse at nominal rail and temperature.
-The results can be exported as a C header with tables and an interpolating function.
+softer. Firmware that knows rail voltage and coil temperature can fire earlier, with a wider pulse. For each
+rail and temperature of a grid, the hammer's own pulse is simulated from rest; then the pulse width that gives
+a constant impact speed ("blow") is computed. By default, the blow is the impact speed of the hammer's own
+pulse at nominal rail and temperature. The results can be exported as a C header with tables and an
+interpolating function.
 """
 
 from __future__ import annotations
@@ -237,7 +238,7 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
 
 @dataclass(frozen=True)
 class _Fired:
-    """Firing from rest: time, s, and speed, m/s, of the impact, peak current, A, and coil heat, J; or NaN."""
+    """Outcome of a firing from rest, SI: impact time and speed, peak current, coil heat; NaN if no impact."""
 
     time: float = np.nan
     speed: float = np.nan

@@ -13,10 +13,10 @@ R')): for a given limit it decreases linearly with the ambient temperature, what
 Source: the lumped thermal network of any text on heat transfer. Validity: pulses that are short compared with
 the warming of the winding, so that their heat is averaged over time. Weakness: the winding has one
 temperature, whereas a real winding is hotter inside. The heat of a dot is that of a dot fired from rest; dots
-whose currents overlap heat the coil more, and the summary states the lowest such rate.
+whose currents overlap heat the coil more, and the summary states the lowest rate at which currents overlap.
 
-Coil heat per dot: the resistance of copper rises by 0.393 % per kelvin of its value at 20 degC. A pulse on a
-rail that is long compared with L / R draws less current through a warm winding and heats it less; a driver
+Coil heat per dot: the resistance of copper rises by 0.393 % per kelvin of its value at 20 degC. A rail
+pulse that is long compared with L / R draws less current through a warm winding and heats it less; a driver
 that regulates the current heats it more; a driver that regulates the energy of a dot heats a warm and a cold
 winding alike.
 """
@@ -246,12 +246,12 @@ def thermal_duty(
     ambient : sequence of float or str, optional
         Ambient temperatures, degC.
     burst : sequence of float or str, optional
-        Burst rates, Hz, for which to compute temperature, time and duty cycle; by default the largest
-        continuous rate at any of the ambient temperatures.
+        Burst rates, Hz, for which to compute steady temperature, time to the limit and largest duty cycle; by
+        default the largest continuous rate at any of the ambient temperatures.
     feed : str, optional
         Quantity that the driver keeps constant as the coil warms: "voltage", "current" or "energy".
     thermal_capacity : float or str, optional
-        Heat capacity of the winding, J/K; without it no time is computed.
+        Heat capacity of the winding, J/K; without a capacity, no time is computed.
     body_resistance, body_capacity : float or str, optional
         Thermal resistance from the body around the winding to ambient, K/W, and heat capacity of the body,
         J/K; both or neither.

@@ -107,7 +107,7 @@ class ImpactTime(Result, rows=_CELLS):
         return {**entries, "noise": (replace(note, unit=self.unit), values)}
 
     def sensor(self, seed: int = 0) -> ImpactSensor:
-        """Return an impact sensor for `printhammer.learn` with the errors found, for a study of one setting.
+        """Build an impact sensor for `printhammer.learn` with the errors of a study of one setting.
 
         The noise of the sensor is the standard deviation on the nominal hammer. The additional spread over
         units, which is constant for all dots of a unit, is the offset.

@@ -66,7 +66,7 @@ class Cloud(NamedTuple):
 
     @classmethod
     def of(cls, points: FloatArray) -> Cloud:
-        """Build a cloud from successive points, shape (n, 2); its halves determine the reach."""
+        """Build a cloud from successive points, shape (n, 2); distances between its halves give the reach."""
         half = len(points) // 2
         apart, _ = cKDTree(points[:half]).query(points[half:])
         return cls(cKDTree(points), float(np.quantile(apart, REACH)))

@@ -124,11 +124,11 @@ def basin_entropy(labels: npt.ArrayLike, *, box: SupportsIndex = BOX) -> BasinEn
 def uncertainty_exponent(labels: npt.ArrayLike) -> float:
     """Estimate the uncertainty exponent a: the fraction of uncertain cells at distance e grows as e^a.
 
-    The exponent is the slope of log f against log e for distances of 1, 2, 4, ... cells along either side, up
-    to an eighth of the plane. The dimension of the boundary is 2 - a, so that a is 1 for a smooth boundary
-    and less for a fractal boundary (S. W. McDonald, C. Grebogi, E. Ott and J. A. Yorke, Physica D 17 (1985)
-    125). Cells without an attractor do not count. NaN if the fraction is nonzero for fewer than three
-    distances.
+    The exponent is the slope of the logarithm of this fraction against log e, for distances e of 1, 2, 4, ...
+    cells along either side, up to an eighth of the plane. The dimension of the boundary is 2 - a, so that a
+    is 1 for a smooth boundary and less for a fractal boundary (S. W. McDonald, C. Grebogi, E. Ott and J. A.
+    Yorke, Physica D 17 (1985) 125). Cells without an attractor do not count. NaN if the fraction is nonzero
+    for fewer than three distances.
     """
     plane = np.asarray(labels)
     distances = [2**k for k in range(16) if 2**k <= min(plane.shape) // 8]
@@ -353,7 +353,7 @@ def basins(
         at a firing, independent of the phase of the regime.
     x, v : tuple, optional
         Least and largest displacement, m, and velocity, m/s, or text with a unit, and number of values, both
-        ends included; by default the window of `printhammer.run.regime` and 128.
+        ends included; by default the window of `printhammer.run.regime` and 128 values.
     firings : int, optional
         Number of firings per round, at least 4; the last half of them, at most 128, is classified.
     rounds : int, optional

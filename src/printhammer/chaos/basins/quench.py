@@ -186,7 +186,7 @@ class TwoPulseDrive(Drive):
         return float(self._times[_FIRST])
 
     def with_firings(self, times: FloatArray) -> Self:
-        """Return a copy with the given firing times, s, from `firings`."""
+        """Return a copy with new firing times, s, as computed by `firings`."""
         result = copy(self)
         result._times = times
         return result
@@ -217,7 +217,7 @@ def quench_map(
         As `gaps`, for the width of the second pulse; by default 128 from 0.5 to 1.5 times the width of the
         first pulse.
     waveform : Waveform, optional
-        The first pulse; by default the waveform of the hammer. It needs a width.
+        The first pulse, which needs a width; by default the waveform of the hammer.
     tail : float or str, optional
         Time after the second firing within which a pack contact counts as the second dot, s, or text with a
         unit; by default 1 ms, scaled like `gaps`.

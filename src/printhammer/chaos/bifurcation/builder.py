@@ -1,4 +1,4 @@
-"""Construction of a bifurcation diagram: trains at a parameter grid, refinement, Lyapunov exponents.
+"""Construction of a bifurcation diagram: trains on a parameter grid, refinement, Lyapunov exponents.
 
 The final state at one value of the parameter is the initial state at the next value.
 
@@ -246,7 +246,7 @@ class DiagramBuilder:
         self.run(rows, np.array(states))
 
     def is_different(self, place: int, neighbour: int) -> bool:
-        """Whether trains at two parameter values differ in status, period, or by more than `JUMP`."""
+        """Whether trains at two parameter values differ in status or period, or in orbit by over `JUMP`."""
         table = self.table
         for way in range(len(self.ways)):
             a, b = self.rows([place, neighbour], way)

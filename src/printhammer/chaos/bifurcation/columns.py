@@ -173,7 +173,7 @@ def _run(
 def run_in_stretches(
     regimes: Sequence[Regime], states: FloatArray, firings: int, transient: int, effort: Effort
 ) -> Columns:
-    """Run memoryless trains one period at a time; otherwise as `run_columns`.
+    """Simulate memoryless trains one period at a time; arguments and result as for `run_columns`.
 
     The computation is slower than one long run, but the rounding error does not grow with time; see
     `printhammer.chaos.strobe.train.STRETCH`.

@@ -362,7 +362,7 @@ class Bifurcation(Result, rows="direction column"):
         return self.directions.index(direction)
 
     def _group(self, row: int, order: Sequence[int]) -> list[Window]:
-        """Group neighbouring columns with the same classification into windows; `order` is up or down."""
+        """Group neighbouring columns with the same classification into windows, in the given column order."""
         names, cycles = self.verdicts[row].tolist(), self.cycles[row].tolist()
         widths = cells(self.values)
         windows = []
@@ -390,9 +390,9 @@ class Bifurcation(Result, rows="direction column"):
 def hysteresis(diagram: Bifurcation) -> BoolArray:
     """Mask of the parameter values at which rising and falling parameters lead to different attractors.
 
-    Periodic trains differ if their periods differ or their orbits are further apart than `SAME` of the
-    builder; an aperiodic train differs from every periodic train and from no aperiodic train. The shape is
-    (C,); all False for a single direction.
+    Periodic trains differ if their periods differ or their orbits are further apart than
+    `printhammer.chaos.bifurcation.builder.SAME`; an aperiodic train differs from every periodic train and
+    from no aperiodic train. The shape is (C,); all False for a single direction.
     """
     different = np.zeros(len(diagram.values), np.bool_)
     if len(diagram.directions) < 2:

@@ -58,7 +58,7 @@ class Touch(Declared):
 
 
 class Passage(Declared):
-    """Contacts of a motion between two sections, period of the drive and number of firings."""
+    """Contacts of a motion between two sections, with the drive period and the number of firings."""
 
     touches: tuple[Touch, ...] = part("in order")
     period: float = scalar("s", "time between firings")
@@ -72,7 +72,8 @@ class Passage(Declared):
     def sequence(self) -> str:
         """Sequence of contacts as text, P (pack) or B (backstop), rotated to the alphabetically first form.
 
-        A touch that moves through the section changes nothing, since the beginning of an orbit is arbitrary.
+        The form is the same after a touch has moved through the section: the beginning of an orbit is
+        arbitrary.
         """
         return cyclic(touch.surface for touch in self.touches)
 
@@ -180,7 +181,7 @@ class RegimeFamily:
         return None if beside[0] is None else np.asarray((image - beside[0]) / step)
 
     def end_of(self, state: FloatArray, parameter: float) -> FloatArray | None:
-        """Compute the state, (m, m/s), at the last section, no derivatives; None if the run ends early."""
+        """Compute the image of a state, (m, m/s), without derivatives; None if the run ends early."""
         try:
             problem, end = self._problem(self.regime.with_(self.name, parameter), state)
         except InputError:
@@ -222,7 +223,7 @@ def has_rigid_backstop(regime: Regime) -> bool:
 
 
 def _touches(hammer: Hammer, record: Record, zero: float, length: float) -> tuple[Touch, ...]:
-    """List the touches of an orbit that begin in a run; an open contact ends in the next period."""
+    """List the touches of an orbit that begin in a run; contacts open at its end close one period later."""
     position, front = hammer.position, hammer.front
     touches = []
     open_at_start = {int(row[0]): float(row[3]) for row in record.contacts if row[6]}

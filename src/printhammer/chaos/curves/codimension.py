@@ -1,15 +1,15 @@
 """Points of codimension two on a bifurcation curve, at which two degeneracies coincide.
 
-| kind | on | what vanishes |
+| kind | on | degeneracy |
 |---|---|---|
-| cusp | fold | both components of the tangent of the curve in the plane: two folds meet and end |
+| cusp | fold | both components of the tangent of the curve in the plane are 0: two folds meet and end |
 | fold-flip | fold, doubling | the other multiplier is -1, or 1 |
 | 1:1 resonance | fold, Neimark-Sacker | both multipliers are 1 |
 | 1:2 resonance | doubling, Neimark-Sacker | both multipliers are -1 |
-| degenerate doubling | doubling | c, where super- and subcritical doublings meet |
-| fold meets grazing, doubling meets grazing | all three | a contact appears while a multiplier is 1 or -1 |
-| resonant grazing | grazing, fold, doubling | the element (1, 2) of A^n |
-| degenerate grazing | grazing | the acceleration at the touch |
+| degenerate doubling | doubling | the coefficient c (`normal_forms`) is 0: super- and subcritical doublings
+meet | | fold or doubling meets grazing | fold, doubling, grazing | a contact appears while a multiplier is 1
+or -1 | | resonant grazing | grazing, fold, doubling | the element (1, 2) of A^n is 0 | | degenerate grazing |
+grazing | the acceleration at the touch is 0 |
 
 A is the derivative of the strobe map without the touch. At a resonant grazing of a rigid backstop, the
 square-root term of the map over n periods of the orbit has no effect on the trace (A. P. Ivanov, J. Sound

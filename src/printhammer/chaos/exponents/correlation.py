@@ -115,7 +115,8 @@ def correlation_dimension(
     Raises
     ------
     InputError
-        There are too many or too few states, they are not finite or all equal, or the scales do not fit.
+        There are too many or too few states, a state is not finite, all states are equal, or the scales do
+        not match the components.
     """
     rows, units = rows_of(points_of(states, {}), scales, MOST)
     apart, tolerance = read_count(theiler, "theiler"), read_positive(flat, "1", "flat")

@@ -1,10 +1,10 @@
 """Lyapunov exponents of the stroboscopic map: the mean growth rates of small perturbations.
 
 From firing to firing the tangent flow (docs/tangent.md) stretches one direction of the plane of displacement
-and velocity and contracts the other. The mean logarithms are the exponents lambda_1 >= lambda_2; their sum is
-the mean logarithm of the determinant. A third exponent, that of the memory of the pack, is minus infinity.
-The exponents of the flow in time are those of the map divided by the period, and a zero for the direction of
-the flow.
+and velocity and contracts the other. The means of the logarithms of both factors are the exponents
+lambda_1 >= lambda_2; their sum is the mean logarithm of the determinant. A third exponent, that of the memory
+of the pack, is minus infinity. The flow in time has these exponents divided by the period, and a zero
+exponent in the direction of the flow.
 """
 
 from __future__ import annotations
@@ -269,9 +269,9 @@ def lyapunov(
 
     Two tangent vectors are integrated along the motion and orthonormalised at every step (G. Benettin, L.
     Galgani, A. Giorgilli and J.-M. Strelcyn, Meccanica 15 (1980) 9 and 21); they start up to a hundred
-    firings earlier, to align with the directions of growth. Standard errors are estimated for autocorrelated
-    series, by overlapping batch means (`printhammer.derivatives.states.standard_error`); for a periodic
-    train, from whole cycles.
+    firings before the first firing of the average, to align with the directions of growth. Standard errors
+    are estimated for autocorrelated series, by overlapping batch means
+    (`printhammer.derivatives.states.standard_error`); for a periodic train, from whole cycles.
 
     Parameters
     ----------

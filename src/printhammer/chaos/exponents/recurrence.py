@@ -1,9 +1,9 @@
 """Recurrence plots and recurrence quantification analysis of a series of states.
 
 The recurrence matrix has a point at (i, j) where the states i and j lie within a threshold of each other. Its
-diagonal lines are stretches during which the motion repeats an earlier stretch; its vertical lines, stretches
-during which the motion stays in place. The quantities are those of N. Marwan, M. C. Romano, M. Thiel and J.
-Kurths, Phys. Rep. 438 (2007) 237, section 3.5.
+diagonal lines are stretches during which the motion repeats an earlier stretch; its vertical lines are
+stretches during which the motion stays in place. The quantities are those of N. Marwan, M. C. Romano, M.
+Thiel and J. Kurths, Phys. Rep. 438 (2007) 237, section 3.5.
 """
 
 from __future__ import annotations

@@ -7,9 +7,9 @@ The numbers phi(1), phi(2), ... drive a point in a plane, each in a direction th
 For a regular series the point stays bounded; for a chaotic series it performs a random walk, and its mean
 square displacement M_c(n) grows in proportion to n. The growth is measured by the correlation K_c of M_c(n)
 with n (G. A. Gottwald and I. Melbourne, Proc. R. Soc. Lond. A 460 (2004) 603; SIAM J. Appl. Dyn. Syst. 8
-(2009) 129; the correlation method and its limits: same authors, Springer Lect. Notes Phys. 915 (2016) 221). K
-is the median over many angles, since at the few angles that resonate with a regular series its path grows,
-too.
+(2009) 129; the correlation method and its limits: the same authors, Springer Lect. Notes Phys. 915 (2016)
+221). K is the median over many angles, since at the few angles that resonate with a regular series its path
+grows, too.
 """
 
 from __future__ import annotations
@@ -154,11 +154,11 @@ def zero_one(
     ----------
     series : array, Strobe, Regime or Hammer
         At least 100 numbers; or strobe points, whose displacements are used; or a regime, or a hammer with
-        the keywords `firing`, whose thousand strobe points after a thousand firings are computed.
+        the keywords `firing`, of which a thousand strobe points are computed after a thousand firings.
     resolution : float, optional
         Amplitude below which changes are ignored, in the unit of the series. By default 1e-12 of the largest
-        absolute value; for strobe points the agreement of a classification, 1e-6 of the half-width of the
-        window.
+        absolute value; for strobe points, by default 1e-6 of the half-width of the window, the agreement that
+        a classification requires.
     angles : int, optional
         Number of random angles.
     seed : int, optional

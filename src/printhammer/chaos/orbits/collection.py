@@ -69,7 +69,7 @@ def fewest_missing(sums: Mapping[int, int]) -> int:
 
 
 def indices_add_up(regime: Regime) -> bool:
-    """Whether theory makes the fixed-point indices sum to 1: no pack, and damping or a backstop."""
+    """Whether the fixed-point indices sum to 1 by theory: without a pack, and with damping or a backstop."""
     hammer = regime.hammer
     return hammer.pack is None and (hammer.damping is not None or hammer.backstop is not None)
 

@@ -96,7 +96,7 @@ def record(
 
 
 def spread(regime: Regime, count: int, visited: FloatArray) -> FloatArray:
-    """Distribute initial states evenly: half over the strobe window, half over the region of `visited`.
+    """Distribute initial states evenly: half over the strobe window, half over the states `visited`.
 
     If backstop and pack do not both bound the displacement, the region extends over at least six half-widths
     of the window on either side: a ball that bounces once per period rises to five half-widths. A row is
@@ -141,7 +141,7 @@ def first_state(regime: Regime) -> tuple[float, float]:
 
 
 def touches(regime: Regime, count: int) -> FloatArray:
-    """Compute states at a firing of motions that have just left a rigid backstop, shape (count, 2).
+    """Compute the states, at a firing, of motions that have just left a rigid backstop, shape (count, 2).
 
     Phases of the departure are spread evenly, speeds more densely at low values: near chatter, an
     accumulation of ever lower bounces, orbits are so dense that no even spread over the plane resolves them.

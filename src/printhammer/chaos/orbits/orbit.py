@@ -244,8 +244,8 @@ class Orbit(Result):
     def motion(self) -> Motion:
         """Integrate one period of the orbit again, from its section, as a `Motion`.
 
-        The motion begins `phase` periods after a firing, within a train that has been fired before; its start
-        time is therefore not 0.
+        The motion begins `phase` periods after a firing of an ongoing train; its start time is therefore not
+        0.
 
         Raises
         ------

@@ -1,6 +1,6 @@
 """Pulse trains from an initial state to their last strobe point, run in parallel, and their classification.
 
-The module also provides the state from which one train continues another, and runs of one period each for
+The module also provides the state in which one train continues another, and runs of one period each for
 trains without memory.
 
 A motion that comes to rest on a rigid backstop forgets its past and repeats exactly. A ball on a shaken table

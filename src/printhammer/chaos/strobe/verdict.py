@@ -1,11 +1,12 @@
 """Classification of the motion of a train: periodic, strange, superstable or undecided, with evidence.
 
 A train of period T has the period q if its states q firings apart agree, and q is the smallest such number;
-if they agree but still move, Newton's method has to confirm the period, see
+if the states agree but still move, Newton's method has to confirm the period, see
 `printhammer.chaos.orbits.settled`. The train is strange if there is no such q and neighbouring motions
-separate: the largest exponent of the strobe map is positive by three standard errors. It is superstable if
-there is no such q and the armature comes to rest on its backstop repeatedly: each rest erases the past, and
-the motion repeats a cycle longer than 64 firings. All other trains are undecided, with the reason.
+separate: the largest exponent of the strobe map is positive by three standard errors. The train is
+superstable if there is no such q and the armature comes to rest on its backstop repeatedly: each rest erases
+the past, and the motion repeats a cycle longer than 64 firings. All other trains are undecided, with the
+reason.
 """
 
 from __future__ import annotations

@@ -36,8 +36,8 @@ from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.threads import Progress
 
 LEADS: Final = {PUSHED: 30e-6, FREE: 10e-6}
-"""Lead time of a decision before the pack contact, s, by kind of contact; a push may have to end at the
-touch, and never begins before the touch."""
+"""Lead time of a decision before the pack contact, s, by kind of contact: a push in progress may have to end
+at the touch, whereas a new push never begins before the touch."""
 
 WINDOW: Final = 120e-6  # Length of the time window of samples, s
 # Expected standard deviations at a touch: displacement, as a fraction of the stroke, and speed, m/s
@@ -140,7 +140,7 @@ class Controller:
         loop.since = fired + _CLEAR * start.flight
 
     def _fire(self, loop: Loop, time: float, width: float) -> None:
-        """Add a firing at `time`, s: full current for a width, s."""
+        """Add a firing of full current at `time`, s, for `width`, s."""
         pulse = Pulse(time)
         pulse.switch(time, self.driver.current)
         pulse.switch(time + width, 0.0)

@@ -184,12 +184,12 @@ class Learned:
         self.scale_error = float(min(np.hypot(self.scale_error, _SCALE_DRIFT), SCALE_ERROR))
 
     def take_scale(self, scale: float, variance: float) -> None:
-        """Store an estimate of the current scale that is within `_FARTHEST` prior deviations of nominal."""
+        """Store an estimate of the current scale if within `_FARTHEST` prior deviations of nominal."""
         if abs(scale) <= _FARTHEST * SCALE_ERROR and variance > 0.0:
             self.scale, self.scale_error = scale, float(np.sqrt(variance))
 
     def take_front(self, front: float, variance: float) -> None:
-        """Store an estimate of the pack front that is within `_FARTHEST` prior deviations of nominal."""
+        """Store an estimate of the pack front if within `_FARTHEST` prior deviations of nominal."""
         if abs(front) <= _FARTHEST * FRONT_ERROR and variance > 0.0:
             self.front, self.front_error = front, float(np.sqrt(variance))
 

@@ -2,10 +2,10 @@
 
 The cost of a dot is a² (1 + k a⁴) + b² (1 + k b⁴), with a and b its deviations of force and arrival as
 fractions of the limits, so that deviations near a limit cost much more than small ones. The return current
-has a small cost. So has an action whose next touch depends strongly on the speed of the present touch, which
-is uncertain. The discounted cost-to-go is a function of the touch (kind, lateness, speed) and of the number
-of dots before the next rest, and satisfies Bellman's equation (R. Bellman, *Dynamic Programming*, 1957). It
-is computed by backward induction from the last dot before a rest.
+has a small cost, as has an action whose next touch depends strongly on the uncertain speed of the present
+touch. The discounted cost-to-go is a function of the touch (kind, lateness, speed) and of the number
+of dots before the next rest, and satisfies Bellman's equation (R. Bellman, *Dynamic Programming*, 1957). The
+cost-to-go is computed by backward induction from the last dot before a rest.
 
 The maps are computed for packs at several distances and interpolated to the estimated distance, which is gain
 scheduling with the distance as scheduling variable. The contact itself depends only on the distance from the
@@ -328,13 +328,13 @@ class Choice:
             setattr(self, name, settled.reshape(self.force.shape))
 
     def by_speed(self, values: FloatArray, way: IntArray | None = None) -> FloatArray:
-        """Interpolate an array (T, A) of the nominal map in speed; shape (M, A), or (M,) per action."""
+        """Interpolate an array (T, A) of the nominal map in speed; shape (M, A), or (M,) with `way`."""
         every: Any = slice(None) if way is None else way
         share = self.share[:, np.newaxis] if way is None else self.share
         return blend(values[self.below, every], values[self.below + 1, every], share)
 
     def of(self, name: str, way: IntArray | None = None) -> FloatArray:
-        """Interpolate arrays (T, A) of all maps in speed and distance; shape (M, A), or (M,) per action."""
+        """Interpolate arrays (T, A) of all maps in speed and distance; shape (M, A), or (M,) with `way`."""
         tables = [getattr(table, name) for table in self._fronts.maps]
         shape = (len(self.below), tables[MIDDLE].shape[1]) if way is None else (len(self.below),)
         values = np.empty(shape)

@@ -177,7 +177,7 @@ SURE: Final = 0.9
 """Smallest fraction of posterior samples that agree on the better open loop, to choose it; arbitrary."""
 
 TRIED: Final = slots_of(cycle_with_lead_in(6, 0))
-"""Slots of the line that evaluates corrections by simulation: the de Bruijn cycle of order 6."""
+"""Slots of the line on which simulated corrections are evaluated: the de Bruijn cycle of order 6."""
 
 
 def _judged_slots() -> tuple[int, ...]:
@@ -263,7 +263,7 @@ class LearningLaw:
 
     @property
     def alone(self) -> float:
-        """Certainty of the choice of an open loop without a comparison: 1 for a single open loop, or NaN."""
+        """Certainty of the open loop before a comparison: 1 if there is only one open loop, else NaN."""
         return 1.0 if len(self.entries.loops) == 1 else float("nan")
 
     def update(self, belief: Belief, corrections: FloatArray, unexplained: FloatArray) -> Printing[Update]:
@@ -425,7 +425,7 @@ class LearningLaw:
         return Verdict(gains, loops[chosen], most, float(good.mean()), every, self.alone)
 
     def _leads(self, share: FloatArray, others: FloatArray) -> bool:
-        """Whether a drive gains `_GAIN` of the dots on average, and at most `doubt` of hammers lose dots."""
+        """Whether the mean gain of a drive is at least `_GAIN`, with losses on at most a fraction `doubt`."""
         harmless = np.quantile(share - others.max(axis=0), self.doubt) >= 0.0
         return bool(harmless and share.mean() - others.mean(axis=1).max() >= _GAIN)
 

@@ -27,7 +27,7 @@ _FEWEST: Final = 3  # Smallest number of readings whose median can expose an out
 MISFIT: Final = 2.0
 """Largest misfit with which a table is used: RMS of the residuals, in standard deviations of the noise.
 
-Arbitrary; units of the production leave 0.7 to 1.6, whatever the offset of the sensor."""
+Arbitrary; units of the production have misfits of 0.7 to 1.6, whatever the offset of the sensor."""
 
 _ERRORS: Final = 3.0  # Largest excess of the misfit over 1 of a comparison, in standard errors; arbitrary
 _STARTED: Final = 3  # Maximum number of tables tuned for the most probable hammer

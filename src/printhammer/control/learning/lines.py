@@ -58,7 +58,7 @@ class Surrogate:
 
     @classmethod
     def of(cls, rows: FloatArray, values: FloatArray) -> Surrogate:
-        """Fit a reading of each member to its constants, shape (members, constants), by ridge regression."""
+        """Fit the readings of hammers to their constants, shape (hammers, constants), by ridge regression."""
         known = np.isfinite(values)
         size = rows.shape[1]
         upper = np.triu_indices(size)
@@ -158,7 +158,7 @@ def choose(
     force
         Surrogate of the force of the single pulse.
     rows
-        Constants of the members, in prior standard deviations, shape (members, constants).
+        Constants of simulated hammers (members), in prior standard deviations, shape (members, constants).
     noise, offset
         Standard deviations of a single time reading and of the sensor's offset, normalised by the limit.
     """
@@ -255,11 +255,9 @@ class Press:
     def multipliers(self, settings: FloatArray) -> FloatArray:
         """Compute the multipliers of rows of dots printed with table settings, shape (hammers,).
 
-        `settings` has the shape (4, entries).
-
-        A multiplier is the largest absolute Floquet multiplier of two rows, with a dot in every slot and in
-        every second slot; see `printhammer.derivatives.rows.row_multipliers`. The result is NaN if neither
-        row is periodic.
+        `settings` has the shape (4, entries). A multiplier is the largest absolute Floquet multiplier of two
+        rows, with a dot in every slot and in every second slot; see
+        `printhammer.derivatives.rows.row_multipliers`. The result is NaN if neither row is periodic.
         """
         task, count, drives = self.task, len(self.hammers), []
         for step in _STEPS:

@@ -85,7 +85,7 @@ class NoBurstError(PrinthammerError):
 
 
 class SupplyCheck(Declared):
-    """Dots of a burst for n changes of all currents, as by a wrong supply: arrays of shape (n,)."""
+    """Dots of a burst at n relative changes of all currents, e.g. of the supply: arrays of shape (n,)."""
 
     changes: FloatArray = part("relative change of every current: 0.03 for 3 % more")
     adequate: IntArray = part(

@@ -156,8 +156,8 @@ def printing_profile(
 def landing_profile(shares: FloatArray, largest: float, duration: float, nodes: int) -> FloatArray:
     """Return currents, A, shape (n, nodes - 1), that brake the armature and lower it onto the backstop.
 
-    Like `printing_profile`, for shares (n, `LANDING_SHARES`), without the last node, where the current is
-    zero.
+    The arguments are those of `printing_profile`, for shares of shape (n, `LANDING_SHARES`); the last node,
+    where the current is zero, is omitted.
     """
     caught = 0.7 * duration * shares[:, 2]
     landed = caught + shares[:, 3] * (duration - caught)
@@ -190,7 +190,7 @@ def refined(
 
 
 def _in_steps(levels: FloatArray, edges: FloatArray, duration: float, nodes: int) -> FloatArray:
-    """Average piecewise constant currents over the steps between nodes; switching times `edges`, s."""
+    """Average piecewise constant currents, with switching times `edges`, s, over the steps between nodes."""
     ends = np.pad(edges, ((0, 0), (1, 1)), constant_values=((0.0, 0.0), (0.0, duration)))
     times = node_times(duration, nodes)
     past = np.clip(times, ends[:, :-1, np.newaxis], ends[:, 1:, np.newaxis]) - ends[:, :-1, np.newaxis]
@@ -275,8 +275,8 @@ def printing_current(
     """Optimise the current of a slot: print the dot of the slot at least cost.
 
     The slot lasts `duration`, and the dot is due at `arrival`, s after its beginning. The current has `nodes`
-    nodes after the first; `before` is the current of the preceding slot, the first start. Returns the
-    currents at the nodes, A; None if no start leads to an acceptable dot.
+    nodes after the first. The first search starts from `before`, the current of the preceding slot. Returns
+    the currents at the nodes, A; None if no start leads to an acceptable dot.
     """
 
     def asked(outcomes: Outcomes) -> tuple[FloatArray, FloatArray]:

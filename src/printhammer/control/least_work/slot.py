@@ -88,7 +88,7 @@ class _NodeDrive(Drive):
 
     @property
     def largest_pulse(self) -> float:
-        """Current limit, A, common to all currents of a search, so that all simulations scale alike."""
+        """Current limit, A, common to all currents of a search, so that all simulations are scaled alike."""
         assert isinstance(self.waveform, NodeCurrent)
         return self.waveform.largest
 
@@ -129,7 +129,7 @@ class Task:
     tolerance: float  # As for `printhammer.simulate`
 
     def run(self, begin: SlotState, currents: FloatArray, duration: float, tolerance: float) -> Outcomes:
-        """Simulate M slots of `duration`, s, with nodal currents, A, shape (M, nodes) without the first."""
+        """Simulate M slots of `duration`, s, with nodal currents, A, shape (M, nodes), first node omitted."""
         front = self.hammer.front
         assert front is not None
         grid = np.linspace(0.0, duration, _SAMPLES)

@@ -388,7 +388,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
     def save(self, path: str | Path) -> None:
         """Write the table in the format of the file suffix, a C header (.h) among others, atomically.
 
-        `load_table` reads CSV and JSON back.
+        `load_table` reads CSV and JSON files.
 
         Raises
         ------

@@ -236,9 +236,9 @@ def polish(draft: Draft) -> None:
 def _polish_level(draft: Draft, level: Sequence[History]) -> None:
     """Improve the entries of several histories at all rates, by two least-squares fits.
 
-    The first fit is to the shortest pattern that ends with the history of the entry; if all earlier dots are
-    right, the entry then fits every pattern. Entries with a large remaining deviation are fitted to all their
-    patterns, and the new fit is kept only where it is better.
+    The first fit is to the shortest pattern that ends with the history of the entry; if all earlier dots meet
+    their targets, the entry then fits every pattern. Entries with a large remaining deviation are fitted to
+    all their patterns, and the new fit is kept only where it is better.
     """
     settled = draft.task.single.settled
     cells = [

@@ -78,7 +78,7 @@ def numbers_before(history: Sequence[int], reach: int) -> list[int]:
 
 
 def shared_numbers(gaps: int, reach: int) -> IntArray:
-    """Map every history number, aliases included, to the number of the plain history, shape (entries,)."""
+    """Map every history number, aliases included, to the number of its `plain` history, shape (entries,)."""
     every = itertools.product(range(reach + 1), repeat=gaps)
     return np.array([number_of(row, reach) for row in every], np.int64)
 
@@ -232,7 +232,7 @@ def clearance(hammer: Hammer, pulse: Waveform, width: float, largest: float) -> 
 
 
 def brake_of(pulse: Waveform, width: float) -> Waveform:
-    """Return the brake pulse of a width, s; within the peak phase of a driver, on full supply."""
+    """Return the brake pulse of a width, s; with full supply if it fits into the peak phase of a driver."""
     if isinstance(pulse, PeakAndHold) and width <= pulse.peak_time:
         shared = {name: value for name, value in dict(pulse).items() if name in Rail.model_fields}
         return Rail(**{**shared, "width": width})

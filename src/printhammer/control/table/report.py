@@ -95,7 +95,7 @@ class TableReport(Result, rows=_AXES):
 
     @property
     def passed(self) -> Any:
-        """Whether all dots are within limits, boolean array of shape (strategies, hammers, rates).
+        """Whether all dots are within limits: boolean array of shape (strategies, hammers, rates).
 
         A table with a row in which errors grow from dot to dot does not pass, even if the row is within
         limits: the number of dots after which it exceeds the limits depends on rounding errors.

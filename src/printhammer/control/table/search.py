@@ -6,9 +6,9 @@ the same, so the candidates are a function of the period alone. At most periods 
 second dot right: fired before, on or after a rebound, and with different brake pulses while the armature
 returns. The bucking current that releases the armature slows it down on its return; Fig. 6 of F. Hendriks,
 *Bounce and Chaotic Motion in Impact Print Hammers* (1983), calls that a quenched response. The candidates
-differ in stability: in a long row on a slightly different hammer, some drift away from the single pulse dot
-by dot, and others return to the single pulse. The cost of a candidate is therefore the deviation of such a
-row.
+differ in stability: in a long row on a slightly different hammer, with some the dots
+drift away from the single-pulse dot, with others they return to it. The cost of a candidate is therefore the
+deviation of such a row.
 
 Method: (1) at periods `SPACING` apart, start Newton iterations from the best cells of a grid over firing
 time, width and brake pulse, and keep the best few solutions; (2) at every period, re-solve the solutions of
@@ -17,7 +17,8 @@ choose one candidate per period by dynamic programming (a Viterbi recursion; R. 
 (1957)) with a penalty for changing the branch between neighbouring periods, where the table cannot be
 interpolated. A solution that is far from all grid cells is missed.
 
-The times below are those of the paper's hammer; they are multiplied by the time scale of the device.
+The times in this module are those of the paper's hammer; the times are multiplied by the time scale of the
+device.
 """
 
 from __future__ import annotations

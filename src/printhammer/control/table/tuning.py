@@ -155,7 +155,7 @@ def tune(
     and keeps the solution whose row of dots stays nearest to the single pulse on hammers with 3 % more or
     less current, or 10 um more or less travel; the deviation on `hammer` has a weight of eight.
     Solutions are admitted only if a small error decays from dot to dot in a long row. No dot is fired before
-    the armature has left the pack of the preceding dot.
+    the armature has left the pack after the preceding dot.
 
     Parameters
     ----------
