@@ -53,7 +53,7 @@ def rates_of(settings: Mapping[str, Any]) -> list[float]:
 
 
 def onsets(context: Context) -> dict[str, float]:
-    """Find the lowest rates, Hz, at which flight times vary, forces vary, and a dot is lost.
+    """Find the lowest rate, Hz, of each of three events: flight times vary, forces vary, a dot is lost.
 
     The keys are "flight_time", "force" and "lost"; the key of an event that does not occur up to the first
     lost dot is absent.
@@ -80,7 +80,7 @@ def onsets(context: Context) -> dict[str, float]:
 
 @measures("order_of_onset", *WHOLE)
 def order_of_onset(context: Context, _claim: Claim) -> Measured:
-    """Report the lowest rates at which flight times vary, forces vary, and a dot is lost."""
+    """Report the lowest rate of each of three events: flight times vary, forces vary, a dot is lost."""
     first = context.once("onsets", lambda: onsets(context))
     lost = first.get("lost")
     value: dict[str, Any] = {"first_lost_dot_at_Hz": lost}
@@ -159,7 +159,7 @@ def hang_up_range(context: Context) -> tuple[float | None, list[Motion], float]:
     """Find the hang-up range: lowest rate, Hz; motions from that rate on; highest rate simulated, Hz.
 
     The highest rate is the last rate of the claim, or the highest that the current limit permits. The lowest
-    is None if the armature does not hang up at the highest rate.
+    rate is None if the armature does not hang up at the highest rate.
     """
     settings = claims()["hang_up_at_high_rate"].settings
     step, pulses, limit = (settings[name] for name in ("rate_step_Hz", "pulses", "current_limit_A"))

@@ -2,9 +2,9 @@
 
 The integration is a second pass over the record of a run, so that ordinary runs bear no extra cost.
 
-The tangent flow of constants, the derivatives of a motion with respect to constants of hammer and drive,
-integrates the columns of `printhammer.kernel.variational`, as does the tangent flow of the state
-(`printhammer.derivatives.states`). The derivation is in docs/tangent.md.
+The tangent flow of constants consists of the derivatives of a motion with respect to constants of hammer and
+drive. Its columns are integrated by `printhammer.kernel.variational`, as are those of the tangent flow of the
+state (`printhammer.derivatives.states`). The derivation is in docs/tangent.md.
 """
 
 from __future__ import annotations
@@ -188,10 +188,9 @@ def flow(
 def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
     """Return the derivatives of the rest state at time 0 with respect to n constants, shape (3, n).
 
-    The rows are displacement, m, velocity, m/s, and latest local maximum, m.
-
-    If a pulse with a sharp edge is fired at time 0, a shift of its firing changes the initial velocity. With
-    a coil circuit, the shape is (6, n), for a start without current.
+    The rows are displacement, m, velocity, m/s, and latest local maximum, m. If a pulse with a sharp edge is
+    fired at time 0, a shift of its firing changes the initial velocity. With a coil circuit, the shape is (6,
+    n), for a start without current.
     """
     columns = np.zeros((3, len(wanted)))
     columns[0] = rest_changes(problem.hammer, wanted)
@@ -212,10 +211,9 @@ def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
 def without_current(problem: Problem, wanted: Sequence[Parameter], columns: FloatArray) -> FloatArray:
     """Return the derivatives of a currentless initial state with respect to n constants, shape (6, n).
 
-    Rows 3 to 5 are the electric part of the state.
-
-    The flux linkage at zero current depends on the initial displacement. If a voltage is switched on at time
-    0, a shift of its firing changes the initial flux linkage.
+    Rows 3 to 5 are the electric part of the state. The flux linkage at zero current depends on the initial
+    displacement. If a voltage is switched on at time 0, a shift of its firing changes the initial flux
+    linkage.
     """
     magnet: Any = import_module(problem.laws.magnet or problem.laws.absent)
     linkage = getattr(magnet, "magnet_linkage", None) if problem.constants[COUPLED] else None
@@ -249,7 +247,7 @@ def without_current(problem: Problem, wanted: Sequence[Parameter], columns: Floa
 
 
 def surface_moves(wanted: Sequence[Parameter]) -> dict[str, FloatArray]:
-    """Return the derivatives of the positions of pack front and backstop with respect to n constants."""
+    """Return the derivatives of the positions, m, of pack front and backstop with respect to n constants."""
     moves = as_arrays(wanted)["hammer"]
     return {"pack": moves[:, FRONT], "backstop": moves[:, POSITION]}
 

@@ -1,8 +1,8 @@
 """Sensitivities of flight time, force and energy to each constant of hammer and pulse.
 
 The derivatives come from the tangent flow of the constants along one run
-(`printhammer.derivatives.flow`), not from differences of runs. `Spread` derives from them the effect of
-tolerances on the dots.
+(`printhammer.derivatives.flow`), not from differences of runs. `Spread` derives the effect of
+tolerances on the dots from these derivatives.
 """
 
 from __future__ import annotations

@@ -96,7 +96,7 @@ def even_times(
 
     Returns
     -------
-    Firing times, s; "rate" or "period" with the value passed; time between firings, s.
+    The firing times, s; the pair of "rate" or "period" and the value passed; the time between firings, s.
     """
     steps = np.arange(count, dtype=np.float64)
     if rate is not None:

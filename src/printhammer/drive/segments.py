@@ -68,7 +68,7 @@ def stacked(tables: Sequence[FloatArray]) -> tuple[list[int], FloatArray]:
 
     Returns
     -------
-    First row of each table; all rows, shape (all rows, 6), read-only.
+    The index of the first row of each table; the stacked rows, shape (all rows, 6), read-only.
     """
     order = sorted(range(len(tables)), key=lambda number: float(tables[number][-1, 0]))
     begins, row = [0] * len(tables), 0

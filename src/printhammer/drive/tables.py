@@ -156,12 +156,12 @@ def series_of(fields: Any) -> float:
 
 
 def put_on(fields: Any, table: Any, row: int, at: float, upper: float, lower: float) -> int:
-    """Write the segment of a driver with the supply on, from time `at`, s; return the next row."""
+    """Write the on segment of a driver, from time `at`, s; return the index of the next row."""
     return put(table, row, at, SWITCHED, fields[_VOLTAGE], series_of(fields), upper, lower)
 
 
 def put_off(fields: Any, table: Any, row: int, at: float) -> int:
-    """Write the segment of a driver with the supply off, from time `at`, s, and the end; return row count."""
+    """Write the off segment of a driver, from time `at`, s, and the end row; return the number of rows."""
     decay = fields[len(fields) - 1]
     against = fields[_DECAY_VOLTAGE]
     if math.isnan(against):
@@ -351,9 +351,10 @@ def pulse(shape: int, fields: Any, table: Any, about: Any) -> int:
     table : float64 array, shape (rows, 6), at least 4 rows, for a record one more than samples
         Segment table, in the form for the kernel: the last row has the kind `END`.
     about : float64 array, shape (14,)
-        Support, s; end of the table, s; largest value; 1 if the latest firing replaces earlier ones, else 0;
-        resistance of the supply in series with one coil, ohm; upper current of the hold phase and of the
-        chopper, A, NaN if missing; the six numbers of the supply; end of the time axis of a plot, s.
+        In order: support, s; end of the table, s; largest value; 1 if the latest firing replaces earlier
+        ones, else 0; resistance of the supply in series with one coil, ohm; upper current of the hold phase
+        and of the chopper, A, NaN if missing; the six numbers of the supply; end of the time axis of a plot,
+        s.
 
     Returns
     -------

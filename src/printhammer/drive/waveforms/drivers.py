@@ -8,8 +8,8 @@ voltage to zero, and stays zero until the coil drives it again.
 `Switched` is a current switched between levels by a driver of finite speed.
 
 After each switching the current approaches its new level exponentially with one time constant, as in a coil
-behind a driver that holds a voltage. It never exceeds the largest level, since every value is a weighted mean
-of the old and the new level.
+behind a driver that holds a voltage. The current never exceeds the largest level, since every value is a
+weighted mean of the old and the new level.
 """
 
 from __future__ import annotations
