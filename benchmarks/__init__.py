@@ -1,1 +1,1 @@
-"""Benchmarks; they stay in the repository and are no part of the wheel."""
+"""Benchmarks; they are in the repository, not in the wheel."""

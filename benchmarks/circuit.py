@@ -1,14 +1,15 @@
-"""What the circuit of the coil costs: a run by voltage beside one by current, SciPy and heyoka.
+"""Cost of the coil circuit: runs with a voltage drive and a current drive, compared with SciPy and heyoka.
 
     python benchmarks/circuit.py [--rounds N]
 
-The first two are the paper's hammer under its current and behind a rail of 100 V that makes the same
-current, fired nine times at 800 Hz, at equal tolerances; the error is that of the displacement up to 3 ms
-against a run at 1e-13. The third is one pulse of that hammer without its pack, integrated by the kernel and
-by SciPy's DOP853 with events, as the tests have it, and by heyoka, where that is installed (see
-`benchmarks/peers`); the error is the largest relative one of displacement and velocity at the end
-against a run at 1e-13. Each has its turn in each round, five calls in a row, since what ran before empties
-the caches; printed are medians of the shortest.
+The first comparison is between the paper's hammer with its current and the same hammer with a rail of 100 V
+that produces about the same current, fired nine times at 800 Hz, at equal tolerances; the error is that of
+the displacement up to 3 ms, relative to a run at the tolerance 1e-13. The second comparison is one pulse of
+the hammer without its pack, integrated by the kernel, by SciPy's DOP853 with events (as in the tests), and by
+heyoka, if installed (see `benchmarks/peers`); the error is the largest relative error of displacement and
+velocity at the end, relative to a run at 1e-13. In each round, every program is called five times in a row,
+since the other programs displace its data from the caches. The shortest of five times is used; medians over
+the rounds are printed.
 """
 
 from __future__ import annotations
@@ -97,7 +98,7 @@ def final_of(hammer: Hammer, tolerance: float, end: float) -> tuple[float, float
 
 
 def run_of(hammer: Hammer, tolerance: float, pulses: int = 9, end: float = END) -> Callable[[], object]:
-    """Return a run of a hammer, made ready."""
+    """Prepare a run of a hammer, and run it once; return a function that repeats the run."""
     drive = ph.PulseTrain(hammer.waveform, rate=800.0, pulses=pulses)
     problem = Problem(hammer, drive, initial_state(hammer, None), 0.0, tolerance)
     problem.run(end)
@@ -114,7 +115,7 @@ def medians(runs: dict[str, Callable[[], object]], rounds: int) -> dict[str, flo
 
 
 def error_of(hammer: Hammer, tolerance: float) -> float:
-    """Return the error of a run up to `SHOWN`, in strokes."""
+    """Return the largest displacement error of a run up to `SHOWN`, as a fraction of the stroke."""
     drive = ph.PulseTrain(hammer.waveform, rate=800.0, pulses=9)
     grid = np.linspace(0.0, SHOWN, 301)
     exact, x = (

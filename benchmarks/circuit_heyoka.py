@@ -1,4 +1,4 @@
-"""One pulse of a hammer behind a rail by heyoka: Taylor series, its own events, one system for all modes.
+"""One pulse of a rail-driven hammer with heyoka: Taylor series, heyoka's events, one system for all modes.
 
     x = c0 + c1 q + c2 q^2,    dq/ds = k v,    dt/ds = k dx/dq
 
@@ -76,7 +76,7 @@ class Pulse:
         return float(c0 + c1 * q + c2 * q * q) * _LENGTH, float(v) * _LENGTH / _TIME, float(i)
 
     def switch(self, which: int) -> bool:
-        """Answer an event: contact, end of a phase, end of the current; tell whether the run goes on."""
+        """Process an event (contact, end of phase, end of current); return whether the run continues."""
         if which == 0:
             self.inside = not self.inside
             self.state[0] = 0.0 if self.inside else self.place
@@ -118,7 +118,7 @@ class Pulse:
 
 
 class _Switch:
-    """A callback; heyoka copies those, but all copies must know the same run."""
+    """Event callback; heyoka copies callbacks, but all copies must refer to the same run."""
 
     def __init__(self, owner: Pulse, which: int) -> None:
         self.owner, self.which = owner, which

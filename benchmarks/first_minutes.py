@@ -1,11 +1,11 @@
-"""How long a new user waits: nothing compiled yet, median of some rounds, each with its own cache folder.
+"""Waiting times of a new user: nothing is compiled; medians over rounds, each with its own cache folder.
 
     python benchmarks/first_minutes.py [HAMMER] [--rounds N] [--only run|studio]
 
-`run` is the verb `run` to its end. `studio` is the program from its start to the first curve and the full map
-of its page, in a headless Chromium; modules that the wheel holds are linked in a checkout. Beside each
-stand the same with everything compiled, in the same round, and the processor time of the program's children,
-compilers included.
+`run` is the duration of the verb `run`. `studio` is the time from the start of the program to the first curve
+and to the full map of its page, in a headless Chromium; in a checkout, it includes linking the modules that
+the wheel contains. The table also shows the times of the same round with everything compiled, and the
+processor time of all child processes, including compilers.
 """
 
 from __future__ import annotations
@@ -29,20 +29,20 @@ MAP = "window.studio.studio.frames.map?.detail === 'full'"
 
 
 def cpu() -> float:
-    """Return the processor time of the children that have ended, s."""
+    """Return the processor time of the child processes that have ended, s."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 
 
 def run(hammer: str) -> dict[str, float]:
-    """Time the verb `run`."""
+    """Measure the duration of the verb `run`, s."""
     begun = time.perf_counter()
     subprocess.run([sys.executable, "-m", "printhammer", "run", hammer], check=True, capture_output=True)
     return {"run: first number": time.perf_counter() - begun}
 
 
 def studio(hammer: str) -> dict[str, float]:
-    """Time the studio to its first curve and its first map."""
+    """Measure the time until the studio shows its first curve and its full map, s."""
     sys.path.insert(0, str(Path(__file__).parents[1]))
     from tests.studio.browser import browser
 

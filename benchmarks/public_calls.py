@@ -1,11 +1,11 @@
-"""What a public call costs above its engine: the frequency-time map, the safe rate, a sweep.
+"""Overhead of public calls over their engines: frequency-time map, safe rate, sweep.
 
     python benchmarks/public_calls.py [HAMMER] [--rates N] [--times N] [--rounds N]
 
-The engine of the map is the run of an ensemble that was made before, with the same dots and times; both
-have their turn in each round. That of the others are the runs of the ensembles inside the call; the sweep is
-the printed example at 512 rates, in one block, without its store. Times are of the processor, on one thread;
-printed are medians and the median of the ratios.
+The engine of the map is the run of an existing ensemble with the same dots and times; call and engine are
+measured alternately. The engine of safe rate and sweep is the sum of all ensemble runs inside the call; the
+sweep is the printed example with 512 rates, in one block, without its store. The table shows medians of
+processor times on one thread, and the median of the ratios.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def main() -> None:
 
 
 def chart(hammer: ph.Hammer, rates: int, times: int, rounds: int) -> list[tuple[float, float]]:
-    """Return times of the public call and of its engine, s, for each round."""
+    """Return the times of `frequency_map` and of its engine, s, for each round."""
     grid = np.linspace(LOWEST, HIGHEST, rates)
     waveform: Any = hammer.waveform
     moments = np.linspace(0.0, (PULSES - 1) / LOWEST + TAIL, times)
@@ -73,7 +73,7 @@ def chart(hammer: ph.Hammer, rates: int, times: int, rounds: int) -> list[tuple[
 
 
 def with_runs_inside(call: Callable[[], object], rounds: int) -> list[tuple[float, float]]:
-    """Return times of a call and of all runs of ensembles in it, s, for each round."""
+    """Return the times of a call and of all ensemble runs inside the call, s, for each round."""
     inside: list[float] = []
     run = ph.Ensemble.run
 
@@ -97,7 +97,7 @@ def with_runs_inside(call: Callable[[], object], rounds: int) -> list[tuple[floa
 
 
 def block() -> Callable[[], object]:
-    """Return the work of all members of the example of a sweep as one block, the store apart."""
+    """Return a function that computes all members of the example sweep as one block, without a store."""
     content = tomllib.loads((files("printhammer") / "sweep" / "example.toml").read_text())
     content["axis"][0]["count"] = 512
     plan = make_plan(read_spec(content))

@@ -1,11 +1,11 @@
-"""Random actions on every control of the studio: what froze, what was stale without a mark, what complained.
+"""Random actions on all controls of the studio: pauses, unmarked outdated views, and errors.
 
     python benchmarks/soak.py [HAMMER] [--minutes N] [--ratio 2] [--seed N]
 
-A quarter of the sliders go to an end of their range; boxes get numbers, units, sums and nonsense. Printed are
-the longest time in which the page did nothing, the longest time until a state was seen, pictures that were
-older than what was set for more than a second without a mark, errors, and the memory of the page in each
-fifth of the time.
+A quarter of the slider movements go to an end of the range; input boxes receive numbers, units, sums and
+invalid text. The script prints the longest pause of the page, the longest time until a state was displayed,
+the views that were outdated for more than a second without a mark, errors, and the memory of the page after
+each fifth of the time.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ window.act = (where, value, end) => {
 
 
 def main() -> None:
-    """Act, watch, and print what was seen."""
+    """Operate the controls at random, monitor the page, and print the results."""
     sys.path.insert(0, str(Path(__file__).parents[1]))
     from tests.studio.browser import browser
 
@@ -112,7 +112,7 @@ def main() -> None:
 
 
 def told(page: Any, count: int) -> None:
-    """Print the memory of the page."""
+    """Print the number of actions and the memory of the page after a garbage collection."""
     page.call("HeapProfiler.collectGarbage")
     heap = page.run("performance.memory.usedJSHeapSize") / 1e6
     print(f"{count} actions: page {heap:.0f} MB", flush=True)

@@ -1,9 +1,9 @@
-"""How long the studio takes from a key press on a slider to what is seen, in a headless Chromium.
+"""Response time of the studio, from a key press on a slider to the updated plot, in a headless Chromium.
 
     python benchmarks/studio.py [HAMMER] [--openings N] [--times N] [--ratio 2] [--rail]
 
-The keys are pressed four times a second. Times are taken in the browser, from the time stamp of the key to
-the first task after the picture was handed over.
+A key is pressed four times a second. The browser measures the time from the time stamp of the key event to
+the first task after the plot has been drawn.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ GROUPS: dict[str, tuple[str, list[tuple[str, str | None]]]] = {
 WHAT = {"motion": "the first curve", "preview": "the first map", "full": "the full map"}
 CONTROLS = ("waveform.width", "forms thickness")
 RAIL_CONTROLS = ("waveform.width", "waveform.voltage", "coil.temperature")
-"""Controls of the same hammer behind a rail, measured by turns with those of its current."""
+"""Controls of the hammer with a rail driver, measured alternately with those of its current pulse."""
 LISTEN = """
 window.seen = [];
 const note = ({ detail }) => { window.seen.push({ ...detail, at: performance.now() }); };
 addEventListener("painted", note, true);
 """
-"""Notes what is painted; `at` counts from the begin of the opening of the page."""
+"""Script that records each painted plot; `at` is the time since the page began to open, ms."""
 
 
 def main() -> None:
@@ -98,7 +98,7 @@ def main() -> None:
 
 
 def show(told: str, took: list[float]) -> None:
-    """Print one row."""
+    """Print one row of the table: median, 90th percentile and number of times, ms."""
     if not took:
         print(f"{told:70s} none before the next key")
         return

@@ -1,12 +1,12 @@
-"""How often a verdict of a period is right: random trains of random hammers, judged and then followed on.
+"""Reliability of periodic verdicts: random trains of random hammers, classified and then continued.
 
     python benchmarks/verdicts.py [--trains N] [--further N] [--seed N]
 
 Every constant of `hendriks-1983` is log-uniform within 20 %, the period uniform from 0.7 to 1.6 ms. A train
-is judged as `printhammer.bifurcation` judges it, at its first 300 firings: the hastiest of the verdicts. A
-period q is right if Newton's method closes a stable orbit of q firings and no fewer beside the last state,
-and if after so many further firings the states still repeat after q firings and no fewer. Where the section
-falls into the pack the state has a memory, and Newton's method is left out.
+is classified as by `printhammer.bifurcation`, from its first 300 firings, fewer than for any other verdict. A
+period q is correct if Newton's method finds a stable orbit of q firings, and no fewer, near the last state,
+and if the states still repeat after q firings, and no fewer, after `--further` more firings. If the armature
+is in the pack at the section, the state has a memory, and Newton's method is not applied.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ from printhammer.run.regime import Regime
 FIRINGS, TRANSIENT, TOLERANCE, TIGHT = 300, 100, 1e-9, 1e-11
 POINTS = 256
 PIECE = 256
-"""Trains that are followed together."""
+"""Number of trains that are simulated together; arbitrary."""
 
 
 def main() -> None:
-    """Judge, check and print what came of it."""
+    """Classify random trains, check the periodic verdicts, and print the counts."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--trains", type=int, default=200)
     parser.add_argument("--further", type=int, default=20_000)
@@ -56,7 +56,7 @@ def main() -> None:
 
 
 def drawn(rng: np.random.Generator) -> Regime:
-    """Return a random train of a random hammer that can be fired."""
+    """Draw a random train of a random hammer; draws without a rest state are repeated."""
     shipped = ph.load("hendriks-1983")
     while True:
         try:
@@ -73,7 +73,7 @@ def drawn(rng: np.random.Generator) -> Regime:
 
 
 def judged(regimes: list[Regime], further: int, counts: Counter[str]) -> list[str]:
-    """Judge some trains and check the verdicts; return a line for each that is wrong."""
+    """Classify trains and check the verdicts; return a line of text for each wrong verdict."""
     begun = np.tile(np.array(FROM_REST), (len(regimes), 1))
     columns = run_columns(regimes, begun, FIRINGS, TRANSIENT, Effort(TOLERANCE))
     plain, cycles = cycles_of_all(columns, regimes)
@@ -105,7 +105,7 @@ def judged(regimes: list[Regime], further: int, counts: Counter[str]) -> list[st
 
 
 def cycles_of_all(columns: Columns, regimes: list[Regime]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the periods by agreement of the states alone, and those that are confirmed."""
+    """Return the periods found from agreement of states alone, and the confirmed periods; 0 for none."""
     fronts = np.array([math.inf if r.hammer.front is None else r.hammer.front for r in regimes])
     scales = scales_of_columns(regimes)
     plain, distances = cycles_of(columns, fronts, scales)

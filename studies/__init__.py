@@ -1,1 +1,1 @@
-"""Studies made with the package; they stay in the repository and are no part of the wheel."""
+"""Studies that use the package; they are in the repository, not in the wheel."""

@@ -1,8 +1,8 @@
-"""The complete chain: from a hammer to measurements, from these to constants, and back to a hammer.
+"""The complete chain from a hammer to measurements, to fitted constants, and back to a hammer.
 
 A hammer is measured on every bench of the synthetic laboratory, its constants are fitted to the tables, and a
-hammer is built from them. As the true constants are known, the study shows how good the fits and their
-confidence intervals are, and so what a real bench would give before it is built.
+hammer is built from them. As the true constants are known, the study shows the accuracy of the fits and the
+coverage of their confidence intervals, which predicts the accuracy of a real bench before it is built.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ RADIUS_ERROR: Final = 0.01
 """Relative standard error of the measured radius."""
 
 _TABLES: Final = ("magnet", "spring", "pack", "backstop", "motion")
-"""Tables that are measured."""
+"""Tables measured in one laboratory."""
 
 _START: Final = 0.2
-"""Largest relative error of the constants with which the fit of the motion starts."""
+"""Largest relative error of the guessed mass with which the fit of the motion starts; arbitrary."""
 
 
 class Recovery(Declared, eq=False):
@@ -64,14 +64,14 @@ def recover(
     Parameters
     ----------
     hammer : Hammer
-        Must have a magnet after equation (3), a linear spring, a pack after equation (5), a Hertz backstop
+        Hammer with the magnet of equation (3), a linear spring, the pack of equation (5), a Hertz backstop
         and a waveform.
     seed : int
         Seed of the laboratory.
     sensor : mapping, optional
-        Settings of the sensors, as for `measure`, used wherever they apply.
+        Settings of the sensors, as for `measure`, applied to every table to which they apply.
     folder : path, optional
-        Where the tables are kept; by default they are not.
+        Folder in which the tables are saved; by default, the tables are not saved.
 
     Raises
     ------
@@ -104,10 +104,10 @@ def recover(
 
 
 def measured_stiffness(hammer: Hammer, rng: np.random.Generator) -> Stiffness:
-    """Return the stiffness of the backstop computed from bodies that are measured with errors.
+    """Return the stiffness of the backstop computed from measurements of its bodies with random errors.
 
-    The bodies are a steel ball and a steel flat; the radius is the one that gives the stiffness of the
-    hammer.
+    The bodies are a steel ball and a steel flat; the radius is chosen such that the true stiffness is that of
+    the hammer.
     """
     (modulus, modulus_error), (ratio, ratio_error) = STEEL
     k = true_value(hammer, "backstop.stiffness")
@@ -125,7 +125,7 @@ def measured_stiffness(hammer: Hammer, rng: np.random.Generator) -> Stiffness:
 
 
 def true_value(hammer: Hammer, key: str) -> float:
-    """Return a constant of a hammer, SI, also one derived from others, such as l from a rebound."""
+    """Return a constant of a hammer, SI, including derived constants, such as l from a rebound."""
     section, _, name = key.rpartition(".")
     if not section:
         return hammer.mass

@@ -1,16 +1,16 @@
-"""General-purpose solvers on the benchmark's problem, for `benchmarks.solvers --peers benchmarks/peers`.
+"""General-purpose solvers applied to the benchmark, for `benchmarks.solvers --peers benchmarks/peers`.
 
-Peers that are not installed are left out and named. To have them without touching the locked environment of
-the repository, give them one of their own:
+Solvers that are not installed are listed but not measured. To install them without changing the locked
+environment of the repository, create a separate environment:
 
     python3 -m venv build/peers-venv
     build/peers-venv/bin/python -m pip install --requirement benchmarks/peers/requirements.txt --editable .
     build/peers-venv/bin/python -m benchmarks.solvers --peers benchmarks/peers
     make bench PEERS=build/peers-venv/bin     (the same, into docs/benchmarks.md)
 
-Boost.Odeint and SUNDIALS are compiled on the spot from `cpp` where a C++ compiler finds their headers
-(Debian: libboost-dev, libsundials-dev). A peer is told the problem by `benchmarks.solvers.problem` and
-answers with `benchmarks.solvers.entry.Entry`, or raises `Absent`.
+Boost.Odeint and SUNDIALS are compiled from the folder `cpp` if a C++ compiler finds their headers (Debian:
+libboost-dev, libsundials-dev). A solver receives the problem from `benchmarks.solvers.problem` and returns
+`benchmarks.solvers.entry.Entry` objects, or raises `Absent`.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ SINGLE: Final[dict[str, SingleMaker]] = {
     "SUNDIALS": cplusplus.sundials,
     "scikit-sundae": sundae.entries,
 }
-"""Peers that integrate one run at a time, by name."""
+"""Other solvers that integrate one run at a time, by name."""
 
 ENSEMBLES: Final[dict[str, EnsembleMaker]] = {"heyoka": heyoka.ensembles, "diffrax": diffrax.entries}
-"""Peers with ensembles of their own, by name."""
+"""Other solvers that integrate ensembles, by name."""
 
 USED: Final = """\
 Use of the other solvers (`benchmarks/peers`): every solver has a compiled right-hand side for each mode,

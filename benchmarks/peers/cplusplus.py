@@ -1,4 +1,4 @@
-"""Boost.Odeint and SUNDIALS in C++, compiled on the spot where a compiler and their headers are found."""
+"""Boost.Odeint and SUNDIALS in C++, compiled if a compiler and the headers of the libraries are found."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _NONE = np.zeros(0)
 
 
 def odeint(task: Task, quick: bool) -> list[Entry]:
-    """Return Boost.Odeint's entries.
+    """Return the benchmark entries of Boost.Odeint, one for each method and tolerance.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def odeint(task: Task, quick: bool) -> list[Entry]:
 
 
 def sundials(task: Task, quick: bool) -> list[Entry]:
-    """Return SUNDIALS' entries.
+    """Return the benchmark entries of SUNDIALS, one for each tolerance.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""diffrax: an ensemble under `jax.vmap` with its events, started anew at switches in the compiled loop."""
+"""diffrax: an ensemble under `jax.vmap`, with diffrax's events, restarted at switches in a compiled loop."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ _FIRST_STEP = 0.01
 
 
 def entries(task: Task, quick: bool, members: int) -> list[Entry]:
-    """Return diffrax's entries, ensembles of so many members.
+    """Return the benchmark entries of diffrax: ensembles of `members` members.
 
     Raises
     ------
     Absent
-        It is not installed.
+        diffrax is not installed.
     """
     try:
         diffrax = importlib.import_module("diffrax")

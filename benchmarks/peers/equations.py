@@ -1,7 +1,7 @@
-"""The benchmark's problem in a form for everybody.
+"""The problem of the benchmark in a form that is independent of printhammer.
 
-The constants are in one array, the drive is a table of smooth pieces of current, and the four modes have
-numbers, so that no peer needs to know how printhammer works.
+The constants form one array, the drive is a table of smooth pieces of current, and the four modes are
+numbered, so that the other solvers do not depend on the data structures of printhammer.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ FREE, LOADING, UNLOADING, BACKSTOP = range(4)
 LENGTH: Final = 1e-4
 """Unit of displacement, m, for solvers with a single tolerance for displacement and velocity."""
 TIME: Final = 1e-4
-"""Unit of time, s, that goes with it; both are of order one then."""
+"""Unit of time, s; with `LENGTH` and `TIME`, displacement and velocity are of order one."""
 
 NAMES: Final = (
     *("mass", "F0", "Am", "Bm", "Bs", "As"),
@@ -79,10 +79,11 @@ def scaled_pieces(task: Task, end: float) -> FloatArray:
 
 @lru_cache(maxsize=1)
 def compiled_acceleration() -> Any:
-    """Return the acceleration, m/s^2, in one mode as a function that Numba has compiled.
+    """Return a function, compiled by Numba, that computes the acceleration in one mode, m/s^2.
 
-    Its arguments are time, displacement, velocity, mode, rmax of the unloading branch, constants, and a row
-    of `current_pieces`. Every mode's law goes on smoothly beyond its switch, as event location needs it.
+    The arguments are time, displacement, velocity, mode, rmax of the unloading branch, constants, and a row
+    of `current_pieces`. The law of each mode continues smoothly beyond its switch, as required to locate
+    events.
     """
     import numba
 

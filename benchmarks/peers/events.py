@@ -1,6 +1,6 @@
-"""Solvers that are driven from Python and know events: SciPy, and CVODE through scikit-sundae.
+"""Solvers with event detection that are called from Python: SciPy, and CVODE through scikit-sundae.
 
-One smooth right-hand side for each mode, the solver started anew at every event and every edge of the drive.
+Each mode has one smooth right-hand side; the solver is restarted at every event and every edge of the drive.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ if TYPE_CHECKING:
 
 
 class Stretch(NamedTuple):
-    """What a solver did between two switches.
+    """Result of a solver between two switches.
 
     Attributes
     ----------
     t : float
-        Where it ended, s.
+        End time, s.
     state : array, shape (2,)
-        Displacement, m, and velocity, m/s, there.
+        Displacement, m, and velocity, m/s, at the end time.
     event : int
-        Number of the guard that ended it, or -1.
+        Index of the guard function that ended the stretch; -1 at the requested end.
     at : array
-        Displacements at the times asked for, m, as far as they were reached.
+        Displacements, m, at the requested times up to the end time.
     """
 
     t: float
@@ -48,7 +48,7 @@ class Stretch(NamedTuple):
 
 
 class Solver(Protocol):
-    """Integrates one mode: rates, guards that end it by falling through zero, start, end, state, times."""
+    """Interface of a solver that integrates one mode until a guard function falls through zero."""
 
     def __call__(
         self,
@@ -59,7 +59,7 @@ class Solver(Protocol):
         state: FloatArray,
         times: FloatArray,
     ) -> Stretch:
-        """Integrate to the end or to the first event."""
+        """Integrate from time `begin`, s, to `end`, s, or to the first event."""
 
 
 def event_split(task: Task, end: float, grid: FloatArray, solver: Solver) -> FloatArray:

@@ -1,14 +1,15 @@
-"""heyoka: Taylor series with its own event detection, one run at a time and in batches of SIMD lanes.
+"""heyoka: Taylor series with event detection, one run at a time and in batches of SIMD lanes.
 
-A Taylor method needs analytic right-hand sides, and the powers 1.5 and 2.7 are not analytic where a contact
-begins. So one system serves all modes, in a variable q in which every force is an entire function:
+A Taylor method requires analytic right-hand sides, and the powers 1.5 and 2.7 are not analytic where a
+contact begins. One system of equations therefore describes all modes, in a variable q of which every force is
+an entire function:
 
     x = c0 + c1 q + c2 q^2 + c3 exp(q),    dq/ds = k v,    dt/ds = k dx/dq
 
 with q = x in free flight and on the unloading branch, q = ln r on the loading branch, entered at r = 1e-5,
 and q = sqrt(b - x) in the backstop. Terminal events change mode, variable and parameters in a callback, so
-that a run is a single `propagate_until`. In a batch a callback also gives a lane that is done its next
-member.
+that a run is a single `propagate_until`. In a batch, a callback also
+assigns the next member to a lane that has finished.
 """
 
 from __future__ import annotations
@@ -29,9 +30,9 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
 
 _ENTRY: Final = 1e-5
-"""Indentation r at which the loading branch begins; the work up to there is some 1e-19 of its full size."""
+"""Indentation r at which the loading branch begins; the work up to this r is about 1e-19 of the full work."""
 _LONGEST: Final = 5.0
-"""Longest step, in units of `TIME`; without one, a hammer at rest has a step without end."""
+"""Largest step, in units of `TIME`; otherwise the step of a hammer at rest would be unlimited."""
 
 _PARAMETERS = ("c0", "c1", "c2", "c3", "k", "elastic", "viscous", "load", "unload", "r0", "r1")
 _EVENTS = ("e10", "e1q", "e1v", "e20", "e2q", "e2v", "edge")
@@ -42,7 +43,7 @@ _MODAL = len(_PARAMETERS) + len(_EVENTS) - 1
 
 
 class Lane:
-    """The switches of one run: what a callback does to the state and the parameters of the integrator."""
+    """Switches of one run: changes of the integrator's state and parameters in a callback."""
 
     def __init__(self, task: Task, end: float) -> None:
         c = hammer_constants(task)
@@ -73,7 +74,7 @@ class Lane:
         self.mode, self.piece = BACKSTOP, 0
 
     def begin(self) -> tuple[FloatArray, FloatArray]:
-        """Return state and parameters at time 0."""
+        """Return the state and the parameters of the integrator at time 0."""
         self.mode, self.piece = BACKSTOP, 0
         parameters = np.zeros(len(_NAMES))
         parameters[:_MODAL] = self.modes[BACKSTOP]
@@ -87,7 +88,7 @@ class Lane:
         parameters[_MODAL:] = (end, a, rate)
 
     def switch(self, which: int, state: FloatArray, parameters: FloatArray) -> bool:
-        """Change mode (events 0 and 1) or piece of the drive (event 2); tell whether the run goes on."""
+        """Change mode (events 0, 1) or drive piece (event 2); return whether the run continues."""
         if which == 2:
             self.piece += 1
             if self.piece == len(self.pieces):
@@ -121,7 +122,7 @@ def _modal(**values: float) -> FloatArray:
 
 
 class _Switch:
-    """A callback; heyoka copies those, but all copies must know the same run."""
+    """Event callback; heyoka copies callbacks, but all copies must refer to the same run."""
 
     def __init__(self, owner: Any, which: int) -> None:
         self.owner, self.which = owner, which
@@ -165,7 +166,7 @@ def _system(hy: Any, task: Task) -> tuple[list[Any], list[Any]]:
 
 
 class Single:
-    """One run at a time."""
+    """Integrator for one run at a time."""
 
     def __init__(self, hy: Any, task: Task, tolerance: float) -> None:
         rates, events = _system(hy, task)
@@ -193,7 +194,7 @@ class Single:
         self.integrator.reset_cooldowns()
 
     def run(self, end: float) -> None:
-        """Integrate to `end`, s."""
+        """Integrate from rest to time `end`, s."""
         self._begin(end)
         self.integrator.propagate_until(1e9, max_delta_t=_LONGEST)
 
@@ -227,7 +228,7 @@ class Single:
 
 
 class Batch:
-    """Many runs in the lanes of a batch integrator; a lane that is done takes the next member."""
+    """Many runs in the lanes of a batch integrator; a lane that has finished integrates the next member."""
 
     def __init__(self, hy: Any, tasks: list[Task], end: float, tolerance: float) -> None:
         rates, events = _system(hy, tasks[0])
@@ -286,7 +287,7 @@ class Batch:
 
 
 def entries(task: Task, quick: bool) -> list[Entry]:
-    """Return heyoka's entries, one run at a time.
+    """Return the benchmark entries of heyoka for single runs.
 
     Raises
     ------
@@ -316,7 +317,7 @@ def entries(task: Task, quick: bool) -> list[Entry]:
 
 
 def ensembles(task: Task, quick: bool, members: int) -> list[Entry]:
-    """Return heyoka's entries, ensembles of so many members.
+    """Return the benchmark entries of heyoka: ensembles of `members` members.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""numbalsoda: LSODA and DOP853 called from compiled code, right-hand sides and events compiled as well.
+"""numbalsoda: LSODA and DOP853 called from compiled code, with compiled right-hand sides and events.
 
-Its events stop at a crossing in either direction, located to 1e-8 in units of time; a Newton step takes the
-state from there to the surface. Times and lengths are in units in which that is enough.
+Events are located at a crossing in either direction to 1e-8 of the time unit; a Newton step then moves the
+state to the surface. The units of time and length are chosen such that this accuracy suffices.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ _MOST_STEPS = 10_000_000
 
 
 def entries(task: Task, quick: bool) -> list[Entry]:
-    """Return numbalsoda's entries.
+    """Return the benchmark entries of numbalsoda.
 
     Raises
     ------
     Absent
-        It is not installed.
+        numbalsoda is not installed.
     """
     try:
         importlib.import_module("numbalsoda")
@@ -80,7 +80,7 @@ def entries(task: Task, quick: bool) -> list[Entry]:
 
 @lru_cache(maxsize=1)
 def _functions() -> tuple[Any, Any, list[Any]]:
-    """Compile both ways of marching through a run."""
+    """Compile the two integration loops: split at events, and with one right-hand side."""
     numba: Any = importlib.import_module("numba")
 
     numbalsoda: Any = importlib.import_module("numbalsoda")

@@ -1,6 +1,6 @@
-"""SciPy's `solve_ivp`, as an engineer would call it, and as an expert would.
+"""SciPy's `solve_ivp`, with one right-hand side for all modes and split at events.
 
-Naive: one right-hand side with all switches in it, handed to the solver as it is. Expert: split at events.
+Naive: the solver integrates one right-hand side that contains all switches. Expert: runs are split at events.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 def entries(task: Task, quick: bool) -> list[Entry]:  # noqa: ARG001
-    """Return SciPy's entries."""
+    """Return the benchmark entries of SciPy: naive runs, and runs split at events."""
     import scipy
 
     found = []
@@ -49,7 +49,7 @@ def entries(task: Task, quick: bool) -> list[Entry]:  # noqa: ARG001
 
 
 def naive(task: Task, end: float, grid: FloatArray, **options: Any) -> FloatArray:
-    """Integrate one right-hand side that tests for contacts and pulses itself; return x on the grid, m."""
+    """Integrate one right-hand side that contains all contacts and pulses; return x on the grid, m."""
     from scipy.integrate import solve_ivp
 
     c = hammer_constants(task)

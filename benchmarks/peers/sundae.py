@@ -1,4 +1,4 @@
-"""SUNDIALS from Python: CVODE through scikit-sundae, driven as SciPy is."""
+"""SUNDIALS from Python: CVODE through scikit-sundae, split at events like SciPy."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ _CLOSE = 1e-13
 
 
 def entries(task: Task, quick: bool) -> list[Entry]:  # noqa: ARG001
-    """Return scikit-sundae's entry.
+    """Return the benchmark entry of scikit-sundae.
 
     Raises
     ------
     Absent
-        It is not installed.
+        scikit-sundae is not installed.
     """
     try:
         sundae = importlib.import_module("sksundae")

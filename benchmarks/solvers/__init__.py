@@ -1,1 +1,1 @@
-"""The benchmark: printhammer against its reference and other solvers, and its ensembles by the clock."""
+"""The benchmark: printhammer compared with its reference and other solvers, and timings of ensembles."""

@@ -28,7 +28,7 @@ EXAMPLE: Final = f"{NAME} --quick --out build/bench.json"
     "solvers",
     EXAMPLE,
     out=opt.file(
-        "Figures (.json) or tables (.md); may be given repeatedly.",
+        "Results (.json) or tables (.md); repeatable.",
         ".json",
         ".md",
         many=True,
@@ -36,9 +36,9 @@ EXAMPLE: Final = f"{NAME} --quick --out build/bench.json"
 )
 def solvers(
     job: Job,
-    quick: bool = opt.switch("Short runs, one round: to see that everything works."),
+    quick: bool = opt.switch("Short runs and one round, to check that all solvers run."),
     threads: int | None = opt.whole("Largest number of threads of ensembles (2)."),
-    peers: str | None = opt.text("FOLDER", "Other solvers, such as benchmarks/peers."),
+    peers: str | None = opt.text("FOLDER", "Folder of other solvers, such as benchmarks/peers."),
 ) -> Answer:
     """Measure speed and error against a slow reference and other solvers, single runs and ensembles."""
     from benchmarks.solvers.entry import load_peers
@@ -57,7 +57,7 @@ def solvers(
 
 
 def described(report: Report) -> list[RenderableType]:
-    """Return the tables of a report, and what they say of this machine."""
+    """Render the tables of a report, and a description of the machine, for the terminal."""
     from benchmarks.solvers.report import FRAME_HEADS, MASS_HEADS, SOLVER_HEADS
 
     machine = ", ".join(f"{name} {value}" for name, value in report.machine.items())
@@ -96,7 +96,7 @@ app.command(epilog=f"Example: {EXAMPLE}")(solvers.call)
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
-    """Run the program on arguments, by default those of the process, and exit."""
+    """Run the program with command-line arguments, by default those of the process, and exit."""
     run_program(app, NAME, arguments)
 
 

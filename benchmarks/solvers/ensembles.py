@@ -1,4 +1,4 @@
-"""Ensembles by the clock: Figure 9 in one frame, thousands of long trains, growth with members, errors."""
+"""Timings of ensembles: Figure 9 in one frame, thousands of long trains, growth with members, errors."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ LOWEST: Final = 500.0
 HIGHEST: Final = 2000.0
 """Highest firing rate, Hz."""
 TAIL: Final = 1e-3
-"""A run ends so long after its last period, s."""
+"""Time from the end of the last period to the end of a run, s."""
 DISPLAY: Final = 1e-4
-"""Error that a picture does not show, in strokes."""
+"""Error that is invisible in a figure, as a fraction of the stroke."""
 EXACT: Final = 1e-8
-"""Error that counts as exact, in strokes."""
+"""Error up to which a result counts as exact, as a fraction of the stroke; arbitrary."""
 
 _TOLERANCES: Final = (1e-6, 3e-7, 1e-7, 1e-8, 1e-9, 3e-10, 1e-10, 5e-11, TOLERANCE)
 _STROBES: Final = 200
@@ -40,10 +40,10 @@ _STROBES: Final = 200
 
 @dataclass(frozen=True)
 class Frame:
-    """Figure 9 at one tolerance, with one engine, on so many threads.
+    """Timing of Figure 9 for one tolerance, engine and number of threads.
 
-    Median and least time of many, s, by the wall clock, sampling included; median and 95th percentile over
-    members of their largest error before their horizon, in strokes.
+    Median and smallest wall-clock time over all rounds, s, including sampling; median and 95th percentile,
+    over the members, of the largest error before the horizon, as a fraction of the stroke.
     """
 
     engine: str
@@ -57,7 +57,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Mass:
-    """Many members at once: length of all runs together, hammer-seconds, and time by the wall clock, s."""
+    """Timing of many members: total length of the runs, hammer-seconds, and wall-clock time, s."""
 
     engine: str
     tolerance: float
@@ -69,17 +69,18 @@ class Mass:
 
     @property
     def speed(self) -> float:
-        """Hammer-seconds per second and thread."""
+        """Hammer-seconds per second of wall-clock time and thread."""
         return self.hammer_seconds / self.seconds / self.threads
 
 
 @dataclass(frozen=True)
 class Figures:
-    """All figures about ensembles.
+    """All timings of ensembles.
 
-    The size of Figure 9, `rates` x `pulses`, sampled at `times`; the length of its runs together, s; the time
-    of the first run of all, s, in which the kernel is compiled or loaded; the number of members compared with
-    the reference; Figure 9, long trains, and Figure 9 with more and more members, on one thread.
+    The size of Figure 9, `rates` x `pulses`, sampled at `times`; the total length of its runs, s; the time of
+    the very first run, s, which compiles or loads the kernel; the number of members compared with the
+    reference; the timings of Figure 9, of long trains, and of Figure 9 with an increasing number of members
+    on one thread.
     """
 
     rates: int
@@ -93,13 +94,13 @@ class Figures:
     growth: list[Mass]
 
     def fastest(self, error: float, threads: int) -> Frame | None:
-        """Return the fastest Figure 9 whose median error is at most `error`, strokes, on so many threads."""
+        """Return the fastest timing of Figure 9 on `threads` threads with a median error up to `error`."""
         good = [f for f in self.frames if f.error_median <= error and f.threads == threads]
         return min(good, key=lambda f: f.seconds, default=None)
 
 
 def trains(task: Task, members: int, pulses: int) -> tuple[list[PulseTrain], FloatArray]:
-    """Return trains at rates from 500 Hz to 2 kHz, and the ends of their runs, s."""
+    """Build trains at rates from 500 Hz to 2 kHz; return the trains and the end times of their runs, s."""
     from printhammer.drive.trains import PulseTrain
 
     waveform: Any = task.hammer.waveform
@@ -109,7 +110,7 @@ def trains(task: Task, members: int, pulses: int) -> tuple[list[PulseTrain], Flo
 
 
 def measure(task: Task, quick: bool, threads: int, say: Say) -> Figures:
-    """Measure ensembles of the hammer, on up to so many threads; few members and repeats if `quick`."""
+    """Time ensembles of the hammer on up to `threads` threads; few members and repeats if `quick`."""
     from printhammer.run.ensemble import Ensemble
 
     rates, pulses, times = (32, 3, 64) if quick else (512, 9, 512)
@@ -184,7 +185,7 @@ def _errors(
 
 
 def _rounds(works: list[Callable[[], object]], rounds: int, say: Say) -> list[list[float]]:
-    """Return the times of each, s; all have their turn in each round."""
+    """Time each function once in every round; return the times, s, by function."""
     for work in works:
         work()
     samples: list[list[float]] = [[] for _ in works]

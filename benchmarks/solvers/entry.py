@@ -1,4 +1,4 @@
-"""Solvers of the table: how each is asked for its motion and timed, and where peers come from."""
+"""Entries of the table of solvers: functions that compute and time a run, and the import of other solvers."""
 
 from __future__ import annotations
 
@@ -13,41 +13,41 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
 
 Say = Callable[[str], None]
-"""Called with a line before each step."""
+"""Callback that receives a line of text before each step."""
 
 
 class Absent(Exception):
-    """A peer that is not installed here, or does not work here; the message says why."""
+    """Raised for a solver that is not installed or does not work; the message states the reason."""
 
 
 @dataclass
 class Entry:
-    """One solver with one setting."""
+    """One solver with one method and tolerance."""
 
     name: str
     """Solver, method and tolerance."""
     positions: Callable[[], FloatArray]
-    """Returns the displacement, m: of a single run at `benchmarks.solvers.problem.GRID`; of the members of an
-    ensemble that are compared at `benchmarks.solvers.problem.ENDS`. The first call may compile."""
+    """Function that returns displacements, m: of a single run at `benchmarks.solvers.problem.GRID`; of the
+    checked members of an ensemble at `benchmarks.solvers.problem.ENDS`. The first call may compile."""
     integrate: Callable[[], object]
-    """Does what is timed, without output."""
+    """Function that is timed: the integration without output."""
     duration: float
-    """Hammer-seconds of what is timed, over all members."""
+    """Hammer-seconds of the timed integration, summed over all members."""
     members: int = 1
-    """1 for a single run; the number of runs of an ensemble."""
+    """Number of runs: 1 for a single run, the number of members for an ensemble."""
     ours: bool = False
-    """Whether it is this program."""
+    """Whether the solver is printhammer."""
 
 
 SingleMaker = Callable[["Task", bool], list[Entry]]
-"""Makes a peer's entries from the problem and whether runs are short; raises `Absent`."""
+"""Function that builds a solver's entries from the problem and the flag `quick`; raises `Absent`."""
 EnsembleMaker = Callable[["Task", bool, int], list[Entry]]
-"""The same for ensembles of so many members."""
+"""Function that builds a solver's entries for ensembles with a number of members; raises `Absent`."""
 
 
 @dataclass(frozen=True)
 class Peers:
-    """Solvers of others, by name, and what the page says about how they are used."""
+    """Other solvers, by name, and the text of the documentation page about their use."""
 
     single: dict[str, SingleMaker] = field(default_factory=dict)
     ensembles: dict[str, EnsembleMaker] = field(default_factory=dict)
@@ -55,12 +55,12 @@ class Peers:
 
 
 def load_peers(folder: Path) -> Peers:
-    """Import a folder of peers: a package whose `SINGLE`, `ENSEMBLES` and `USED` become those of `Peers`.
+    """Import a folder of solvers: a package with `SINGLE`, `ENSEMBLES` and `USED`, the fields of `Peers`.
 
     Raises
     ------
     InputError
-        The folder is no such package.
+        The folder is not such a package.
     """
     import importlib.util
     import sys

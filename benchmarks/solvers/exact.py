@@ -1,4 +1,4 @@
-"""Errors against the reference, which shares no code with the kernel, as far in time as it can be trusted."""
+"""Reference displacements, from a solver that shares no code with the kernel, up to its horizon."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ _APART: Final = 1e-10
 
 @lru_cache(maxsize=2)
 def single(task: Task) -> FloatArray:
-    """Return the displacement of the single run on the grid of the table, m."""
+    """Return the reference displacement of the single run, m, on the grid of the table."""
     return reference(task.hammer, task.drive(_pulses(task)), FIRST, tolerance=_FINE, times=GRID).x
 
 
 @lru_cache(maxsize=2)
 def ensemble(task: Task, members: int) -> FloatArray:
-    """Return the displacements of the members that are compared, shape (times, members), m."""
+    """Return the reference displacements of the checked members, m, shape (times, members)."""
     tasks = ensemble_tasks(task, members)
     runs = [
         reference(one.hammer, one.drive(_pulses(one)), FIRST, tolerance=_FINE, times=ENDS).x
@@ -38,10 +38,10 @@ def ensemble(task: Task, members: int) -> FloatArray:
 
 
 def trusted(hammer: Hammer, drive: Drive, end: float, times: FloatArray, stroke: float) -> FloatArray:
-    """Return the displacement at times, m, NaN from the horizon of the run on.
+    """Return the reference displacement at times, s, in m; NaN from the horizon of the run onward.
 
-    There two references with tolerances 1e-13 and 1e-14 differ by more than 1e-10 of the stroke: beyond it no
-    comparison means anything.
+    At the horizon, two references with the tolerances 1e-13 and 1e-14 differ by 1e-10 of the stroke; later
+    comparisons are meaningless.
     """
     coarse = reference(hammer, drive, end, tolerance=_COARSE, times=times).x
     fine = reference(hammer, drive, end, tolerance=_FINE, times=times).x

@@ -1,4 +1,4 @@
-"""What a benchmark ran on."""
+"""Description of the machine on which a benchmark runs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from printhammer.support.threads import thread_count
 
 
 def machine() -> dict[str, str]:
-    """Return processor, cores, how busy they are now, system and versions, in words."""
+    """Return processor, number of cores, present load, system and package versions as text."""
     processor, wide, busy = platform.processor() or platform.machine(), "", "unknown"
     with suppress(OSError):
         info = Path("/proc/cpuinfo").read_text("utf-8")

@@ -1,4 +1,4 @@
-"""Printhammer in the table: single runs at several tolerances, the integrators of 1983, and ensembles."""
+"""Entries of printhammer in the table: single runs, the integrators of 1983, and ensembles."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ def _chosen(quick: bool) -> tuple[float, ...]:
 
 
 def engines() -> list[str]:
-    """Return the engines of an ensemble that can be asked for by name."""
+    """Return the names of the ensemble engines that a caller can select."""
     from printhammer.run.ensemble import Engine
 
     return [engine for engine in get_args(Engine) if engine != "auto"]
 
 
 def singles(task: Task, quick: bool) -> list[Entry]:
-    """Return the single runs."""
+    """Return the benchmark entries of single runs, one per tolerance."""
     pulses = 5 if quick else 50
     entries = []
     for tolerance in _chosen(quick):
@@ -43,7 +43,7 @@ def singles(task: Task, quick: bool) -> list[Entry]:
 
 
 def schemes(task: Task, quick: bool) -> list[Entry]:
-    """Return the integrators of the paper, on its schedule of steps."""
+    """Return the benchmark entries of the paper's integrators, with the step sizes of the paper."""
     from printhammer.run.scheme_runs import SchemeProblem
 
     pulses = 5 if quick else 50
@@ -70,7 +70,7 @@ def _single(name: str, problem: Problem, pulses: int) -> Entry:
 
 
 def ensembles(task: Task, quick: bool, members: int) -> list[Entry]:
-    """Return ensembles of so many members, on one thread, with each engine that there is."""
+    """Return the benchmark entries of ensembles of `members` members, on one thread, for each engine."""
     from printhammer.run.ensemble import Ensemble
 
     tasks = ensemble_tasks(task, members)

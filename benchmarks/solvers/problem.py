@@ -1,4 +1,4 @@
-"""The problem that all solvers are given: the frozen hammer, a train of 1.35 ms."""
+"""The problem that all solvers integrate: the frozen hammer and a train with the period 1.35 ms."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Task(Declared):
         return rest_state(self.hammer)
 
     def drive(self, pulses: int) -> PulseTrain:
-        """Return the drive with so many firings."""
+        """Return the drive with `pulses` firings."""
         from printhammer.drive.trains import PulseTrain
 
         assert self.hammer.waveform is not None
@@ -45,25 +45,25 @@ class Task(Declared):
 
 @lru_cache(maxsize=1)
 def frozen() -> Task:
-    """Return the problem of the benchmark."""
+    """Return the problem of the benchmark, with the hammer that is never changed."""
     from printhammer.hammer.hammer import load
 
     return Task(load(Path(__file__).with_name("frozen-hammer.toml")))
 
 
 MEMBERS: Final = 512
-"""Runs of an ensemble in the table."""
+"""Number of members of an ensemble in the table."""
 CHECKED: Final = 8
-"""So many of them, evenly spread, are compared with the reference."""
+"""Number of evenly spaced members that are compared with the reference."""
 ENDS: Final = np.linspace(3e-4, FIRST, 10)
-"""Times at which they are compared, s."""
+"""Times at which these members are compared with the reference, s."""
 
 
 def ensemble_tasks(task: Task, members: int) -> list[Task]:
-    """Return the problem with periods from 0.9 to 1.1 of its own, evenly spread."""
+    """Return copies of the problem with evenly spaced periods, from 0.9 to 1.1 times its period."""
     return [Task(task.hammer, task.period * factor) for factor in np.linspace(0.9, 1.1, members).tolist()]
 
 
 def checked(members: int) -> list[int]:
-    """Return the numbers of the members that are compared with the reference."""
+    """Return the indices of the members that are compared with the reference."""
     return [int(i) for i in np.linspace(0, members - 1, min(CHECKED, members)).round()]

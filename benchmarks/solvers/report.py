@@ -1,4 +1,4 @@
-"""The figures of a benchmark, as data, as JSON and in Markdown."""
+"""Report of a benchmark: results as data, JSON and Markdown."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ MASS_HEADS: Final = (
 
 
 class Report(Declared):
-    """All figures of a benchmark."""
+    """All results of a benchmark."""
 
     machine: dict[str, str] = part("what it ran on")
     quick: bool = part("whether it was a short one, whose figures mean little")
@@ -43,7 +43,7 @@ class Report(Declared):
     peers: str = part("how the peers are used, in words", default="")
 
     def to_json(self) -> str:
-        """Return the figures as JSON; null where there is no number."""
+        """Return the results as JSON; NaN and infinity become null."""
         figures = asdict(self.figures)
         for kind in ("masses", "growth"):
             for row, mass in zip(figures[kind], getattr(self.figures, kind), strict=True):
@@ -59,7 +59,7 @@ class Report(Declared):
         return json.dumps(_finite(data), indent=1, allow_nan=False) + "\n"
 
     def solvers(self, *, ensembles: bool) -> Rows:
-        """Return the rows of the single runs, or of the ensembles."""
+        """Return the table rows of the single runs or of the ensembles."""
         rows: Rows = []
         for line in self.lines:
             if (line.members > 1) != ensembles:
@@ -72,7 +72,7 @@ class Report(Declared):
         return rows
 
     def least_lead(self, *, ensembles: bool) -> str:
-        """Say over which peer this program is ahead by least, or which it is behind."""
+        """Describe, in a sentence, the other solver that is fastest relative to printhammer."""
         ratios = {
             line.solver: line.ratio
             for line in self.lines
@@ -84,7 +84,7 @@ class Report(Declared):
         return f'The closest other solver is "{nearest}", with a speed ratio of {ratios[nearest]:.3g}.'
 
     def frames(self) -> Rows:
-        """Return the rows of Figure 9."""
+        """Return the table rows of the timings of Figure 9."""
         return [
             (
                 frame.engine,
@@ -100,15 +100,15 @@ class Report(Declared):
         ]
 
     def masses(self) -> Rows:
-        """Return the rows of long trains."""
+        """Return the table rows of the timings of long trains."""
         return [_mass(mass) for mass in self.figures.masses]
 
     def growth(self) -> Rows:
-        """Return the rows of growth with members."""
+        """Return the table rows of the growth with the number of members."""
         return [_mass(mass) for mass in self.figures.growth]
 
     def frame_sentences(self) -> list[str]:
-        """Say how fast Figure 9 is where its error is small enough for a picture, and where it is exact."""
+        """Return sentences with the time of Figure 9 at display accuracy and at full accuracy."""
         sentences = []
         for name, error in (("display", DISPLAY), ("exact", EXACT)):
             for threads in sorted({frame.threads for frame in self.figures.frames}):
@@ -122,7 +122,7 @@ class Report(Declared):
         return sentences
 
     def to_markdown(self) -> str:
-        """Return the page of the documentation."""
+        """Render the documentation page with all tables."""
         from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
         # Markdown, not HTML: nothing is escaped.

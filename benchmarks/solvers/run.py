@@ -34,13 +34,13 @@ def run(
     Parameters
     ----------
     quick : bool, optional
-        Short runs, few members, one round: to see that it works.
+        Whether to use short runs, few members and one round, as a test of the program.
     threads : int, optional
-        Largest number of threads of ensembles; by default 2, or 1 where there is one core only.
+        Largest number of threads of ensembles; by default 2, or 1 on a single core.
     peers : Peers, optional
         Third-party solvers; see `benchmarks.solvers.entry.load_peers`.
     say : callable, optional
-        Called with a line before each step.
+        Called with a line of text before each step.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def run(
 
 
 def _compiling(engine: str) -> float:
-    """Return the time, s, to compile what an engine needs, in a process with nothing on disk."""
+    """Return the time, s, to compile the code of an engine in a process with an empty cache."""
     with tempfile.TemporaryDirectory(prefix="printhammer-bench-") as folder:
         done = subprocess.run(
             [sys.executable, "-c", _COMPILING, engine],

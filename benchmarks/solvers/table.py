@@ -1,4 +1,4 @@
-"""The table of solvers: who is there, how exact, how fast, and by how much this program is ahead."""
+"""The table of solvers: error, speed, and speed of printhammer relative to each other solver."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from benchmarks.solvers.problem import Task
 
 _SHORTEST: Final = 0.02
-"""Processor time of a turn, s; shorter work is repeated within it."""
+"""Smallest processor time of a measurement, s; a shorter integration is repeated within a measurement."""
 _SLOW: Final = 1.0
-"""A solver whose turn takes longer has two turns only, s."""
+"""Processor time above which a solver is measured only twice, s; arbitrary."""
 
 
 class Line(Declared):
-    """One solver of the table."""
+    """Table row of one solver."""
 
     solver: str = part("solver, version, method, tolerance")
     ours: bool = part("whether it is this program")
@@ -48,10 +48,10 @@ class Line(Declared):
 def measure(
     task: Task, quick: bool, members: int, peers: Peers, say: Say
 ) -> tuple[list[Line], dict[str, str]]:
-    """Measure all solvers that are there.
+    """Measure all installed solvers.
 
-    Short runs and one round if `quick`; ensembles of so many members; `say` is called before each step.
-    Return the lines of the table, and why each peer that is absent is.
+    Runs are short, with one round, if `quick`; ensembles have `members` members; `say` is called before each
+    step. Return the table rows, and for each missing solver the reason why it is missing.
     """
     absent: dict[str, str] = {}
     solvers: list[Entry] = []
@@ -98,7 +98,7 @@ def measure(
 
 
 def _largest(x: np.ndarray, true: np.ndarray) -> float:
-    """Return the largest deviation where there is a value to compare; NaN where a run was lost."""
+    """Return the largest deviation from the reference, m; NaN if a run was lost or nothing is comparable."""
     wanted = np.ones(true.shape, bool)
     if true.ndim == 2:
         # An ensemble may be compared at some of the times only.
@@ -107,7 +107,7 @@ def _largest(x: np.ndarray, true: np.ndarray) -> float:
 
 
 def _rounds(solvers: list[Entry], rounds: int, say: Say) -> list[float]:
-    """Return the best processor time of one call of each, s; all have their turn in each round."""
+    """Measure all solvers once in each round; return the smallest processor time of a call of each, s."""
     best = [math.inf] * len(solvers)
     repeats = [1] * len(solvers)
     for turn in range(rounds):
@@ -124,7 +124,7 @@ def _rounds(solvers: list[Entry], rounds: int, say: Say) -> list[float]:
 
 
 def with_ratios(lines: list[Line]) -> list[Line]:
-    """Return the lines with, for each peer, the fastest of ours of its kind that is at least as exact."""
+    """Add to each other solver the fastest printhammer row of its kind that is at least as accurate."""
     return [line if line.ours or math.isnan(line.error) else _rated(line, lines) for line in lines]
 
 

@@ -16,7 +16,7 @@ app: Final = build_program(NAME, HELP, EXAMPLE, VERBS, {})
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
-    """Run the program on arguments, by default those of the process, and exit."""
+    """Run the program with command-line arguments, by default those of the process, and exit."""
     run_program(app, NAME, arguments)
 
 

@@ -1,4 +1,4 @@
-"""Files of JSON lines that grow while a search or a judge runs: reading complete lines, and appending."""
+"""JSON Lines files that grow while a search or an evaluation runs: reading complete lines, appending."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def read_text(path: Path, what: str = "file", *, required: bool = False) -> str:
-    """Return the text of a file; an empty text if there is no file, unless it is required.
+    """Return the text of a file; for a missing file, empty text or, if `required`, an error.
 
     Raises
     ------
@@ -30,7 +30,7 @@ def read_text(path: Path, what: str = "file", *, required: bool = False) -> str:
 
 
 def read_object(line: str) -> dict[str, Any] | None:
-    """Return the JSON object of a line; None if the line is not one."""
+    """Parse a line as a JSON object; None if the line is not a JSON object."""
     try:
         row = json.loads(line)
     except ValueError:
@@ -39,7 +39,7 @@ def read_object(line: str) -> dict[str, Any] | None:
 
 
 def append(path: Path, text: str, what: str = "file", *, kept: str | None = None) -> None:
-    """Append text to a file; with `kept`, the file is first cut to that beginning.
+    """Append text to a file; with `kept`, the file is first truncated to the text `kept`.
 
     Raises
     ------

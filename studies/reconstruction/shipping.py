@@ -24,7 +24,7 @@ Other constants do so about as well, see the family. A reconstructed constant is
 
 
 def gauge() -> str:
-    """Return a sentence on the two scales that the motion does not determine, and how both were fixed."""
+    """Describe, in a sentence, how the two scales that the motion does not determine were fixed."""
     pounds = from_si(PRINT_FORCE, "N", "lbf")
     return (
         "Mass and all forces scale together without a change of the motion, and so do the current and 1 / Bm:"
@@ -56,8 +56,8 @@ def search_json(
 ) -> dict[str, Any]:
     """Build the contents of `search.json`: the search, and the best hammer for each claim that fails.
 
-    `hammer` is the shipped one, `rows` are judged candidates. Of each search, `aim`, `seed` and the number of
-    `candidates` are kept. `progress` is called with the name of each claim before it is judged.
+    `hammer` is the shipped hammer, `rows` are judged candidates. For each search, `aim`, `seed` and the
+    number of `candidates` are stored. `progress` is called with the name of each claim before it is judged.
     """
     results = judge_all(hammer, progress=progress)
     held = {result.claim.name for result in results if result.verdict == "holds"}

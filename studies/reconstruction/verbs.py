@@ -45,7 +45,7 @@ def _json(table: dict[str, Any]) -> str:
 @verb(
     "search",
     EXAMPLE,
-    log=_written("JSON lines, one for each candidate; a search begun there goes on.", "LOG", continued=True),
+    log=_written("Log of the search (JSON Lines); an existing log is continued.", "LOG", continued=True),
 )
 def search(
     job: Job,
@@ -59,17 +59,17 @@ def search(
         "rectangle|trapezoid|half-sine", "Shape of the current of a firing.", default="rectangle"
     ),
     seed: int = _SEED,
-    sample: int = opt.bounded(1, "Points of the wide sample that comes first.", default=16384),
+    sample: int = opt.bounded(1, "Number of points of the initial Sobol sample.", default=16384),
     start_from: str = opt.text(
         "LOG",
-        "Another search, or the word family, from whose best hammers to begin too.",
+        "Log of another search, or the word family, whose best hammers are additional starting points.",
         default="",
         flag="--from",
     ),
     minutes: float = opt.bounded(0, "Search time in minutes; 0: until interrupted.", default=60.0),
     workers: int = _WORKERS,
 ) -> Answer:
-    """Try candidates, ranked by the claims, and log each of them; interrupting with Ctrl-C loses nothing."""
+    """Search for hammers that satisfy the claims, and log each candidate; Ctrl-C loses nothing."""
     from time import monotonic
 
     from studies.reconstruction.search.evaluation import AIMS, WEIGHTS
@@ -118,7 +118,7 @@ def judge(
     job: Job,
     log: Path = _LOG,
     best: int = opt.bounded(1, "Number of candidates to judge.", default=100),
-    every_claim: bool = opt.switch("Judge all claims, not the stated ones alone."),
+    every_claim: bool = opt.switch("Judge all claims, not only the stated claims."),
     workers: int = _WORKERS,
 ) -> Answer:
     """Judge the best candidates of a search by the claims themselves, at the default tolerance."""
@@ -167,7 +167,7 @@ def base_rates(
     seed: int = _SEED,
     workers: int = _WORKERS,
 ) -> Answer:
-    """Count for how many random plausible hammers each claim holds."""
+    """Count the random plausible hammers for which each claim holds."""
     from studies.reconstruction.judging.base_rates import base_rates as count
     from studies.reconstruction.workers import worker_pool
 
@@ -189,7 +189,7 @@ def base_rates(
     out=_written("JSON file to write."),
 )
 def predictions(log: Path = _LOG, judged: Path = _JUDGED) -> Answer:
-    """Count for how many hammers, found by the stated claims alone, each of the other claims holds."""
+    """Count the hammers found with the stated claims alone for which each other claim holds."""
     from studies.reconstruction.judging.log import read_judged
     from studies.reconstruction.judging.predictions import predictions as count
     from studies.reconstruction.search.log import read_search
@@ -213,7 +213,7 @@ def schemes(
     seed: int = _SEED,
     workers: int = _WORKERS,
 ) -> Answer:
-    """Count how often an integrator of 1983 gives another verdict on Fig. 11 than the exact motion."""
+    """Count how often an integrator of 1983 and the exact motion have different verdicts on Fig. 11."""
     from studies.reconstruction.judging.schemes import schemes_json
     from studies.reconstruction.workers import worker_pool
 
@@ -251,7 +251,7 @@ def front(
     ),
     core_hours: float = opt.bounded(0, "Core time of the searches in hours.", default=0.0),
 ) -> Answer:
-    """Show panels of Fig. 11 against all other claims, and the hammers that no other one beats in both."""
+    """Show the Pareto front of judged hammers: panels of Fig. 11 against all other claims that hold."""
     from studies.reconstruction.judging.front import front as pareto
     from studies.reconstruction.judging.log import read_judged
 
@@ -274,10 +274,10 @@ def family(
         "JUDGED...", "Logs of judged candidates.", type=Path, is_input=True, many=True, default=...
     ),
     out: Path = opt.folder("Folder to write to.", default=Path("build/family")),
-    hammers: int = opt.bounded(1, "Number of hammers wanted.", default=24),
-    least: int = opt.bounded(1, "Number of hammers needed.", default=20),
+    hammers: int = opt.bounded(1, "Largest number of hammers in the family.", default=24),
+    least: int = opt.bounded(1, "Smallest number of hammers in the family.", default=20),
 ) -> Answer:
-    """Choose clearly different hammers that do equally well, and tell which conclusions hold for all."""
+    """Select clearly different hammers that do equally well; report which conclusions hold for all."""
     from studies.reconstruction.family.family import WRITTEN, write_family
 
     job.check_new(out / name for name in WRITTEN)
@@ -306,7 +306,7 @@ def ship(
     name: str = opt.text("TEXT", "Name of the hammer.", default="hendriks-1983"),
     core_hours: float = opt.bounded(0, "Core time of the searches in hours.", default=0.0),
 ) -> Answer:
-    """Write the best judged candidate as a hammer file, and for each claim that fails the best for it."""
+    """Write the best judged candidate as a hammer file, and the best candidate for each failing claim."""
     from printhammer.claims import claims
     from printhammer.support.files import check_outputs, make_folder, write_file
     from studies.reconstruction.judging.log import read_judged

@@ -1,1 +1,1 @@
-"""The family of clearly different hammers, and what holds for all of them."""
+"""The family of clearly different hammers, and the conclusions that hold for all of them."""

@@ -1,9 +1,10 @@
-"""The choice of clearly different hammers.
+"""Selection of clearly different hammers.
 
-Two hammers are clearly different if at least three of their constants are at least a tenth apart, a distance
-being ``|a - b| / min(|a|, |b|)``. Two changes of the constants leave the motion as it is, and must not count:
-mass and all forces scale together, and so do the current and 1 / Bm. Hammers are therefore compared twice, as
-they are and brought to a common print force and a common current; they have to differ both times.
+Two hammers are clearly different if at least three of their constants have a relative difference, ``|a - b| /
+min(|a|, |b|)``, of at least a tenth. Two scalings leave the motion unchanged and must not count as
+differences: mass and all forces multiplied by one factor, and current and 1 / Bm multiplied by one factor.
+Hammers are therefore compared twice, with their own constants and with constants scaled to a common print
+force and current; they have to differ in both comparisons.
 """
 
 from __future__ import annotations
@@ -33,16 +34,16 @@ FORCE_POWERS: Final[dict[str, float]] = {
     "N^0.5 m^0.25": 0.5,
     "N^0.5 m^0.25/A": 0.5,
 }
-"""Exponent with which a constant of that SI unit scales when mass and all forces are multiplied; else 0."""
+"""Exponent, by SI unit of a constant, with which it scales with mass and all forces; 0 for other units."""
 
 CURRENT_POWERS: Final[dict[str, float]] = {"A": 1.0, "N^0.5 m^0.25/A": -1.0}
-"""Exponent with which a constant of that SI unit scales when all currents are multiplied; else 0."""
+"""Exponent, by SI unit of a constant, with which it scales with all currents; 0 for other units."""
 
 
 def scaled(
     constants: Mapping[str, float], units: Mapping[str, str], force: float = 1.0, current: float = 1.0
 ) -> dict[str, float]:
-    """Return constants with the same motion: all forces and the mass times `force`, currents times `current`.
+    """Return constants with the same motion: mass and forces scaled by `force`, currents by `current`.
 
     `constants` are in SI, `units` their SI units, both by key of a hammer file.
     """
@@ -57,7 +58,7 @@ def scaled(
 def at_gauge(
     constants: Mapping[str, float], units: Mapping[str, str], print_force: float
 ) -> dict[str, float]:
-    """Return constants with the same motion, normalized to the print force and current of the search.
+    """Return constants with the same motion, scaled to the print force and current of the search.
 
     See `scaled`; `print_force` is the peak force, N, of the dot of a single pulse with these constants.
     """
@@ -66,10 +67,10 @@ def at_gauge(
 
 
 def distances(constants: FloatArray, others: FloatArray) -> FloatArray:
-    """Return the distances of one hammer from others: the third largest relative difference of a constant.
+    """Return the distances of a hammer from others: the third largest relative difference of constants.
 
-    Two hammers are clearly different where this is at least `APART`. `constants` has shape (k,), `others`
-    (n, k); the result has shape (n,).
+    Two hammers are clearly different if this distance is at least `APART`. `constants` has shape (k,),
+    `others` (n, k); the result has shape (n,).
     """
     least = np.minimum(np.abs(constants), np.abs(others))
     apart = np.abs(others - constants)
@@ -85,13 +86,13 @@ def choose(
     *,
     wide: bool = True,
 ) -> list[int]:
-    """Choose at most `count` pairwise clearly different hammers; return their indices.
+    """Select at most `count` pairwise clearly different hammers; return their indices.
 
-    Each of the `tables` (n, k) holds the constants of all candidates in one normalization, the best candidate
-    first. The choice is greedy and deterministic: with `wide`, the candidate farthest from all chosen so far
-    is taken next (farthest-point sampling), which spreads the family; otherwise the nearest one that is still
-    clearly different, which makes the family large. `accept` is called with each index before it is chosen; a
-    candidate for which it returns false is skipped.
+    Each of the `tables` (n, k) contains the constants of all candidates in one scaling, the best candidate
+    first. The selection is greedy and deterministic: with `wide`, the next member is the candidate farthest
+    from all selected hammers (farthest-point sampling), which spreads the family; otherwise the nearest
+    candidate that is still clearly different, which makes the family large. `accept` is called with the index
+    of each candidate; a candidate for which `accept` returns false is skipped.
     """
     total = len(tables[0]) if tables else 0
     nearest: FloatArray = np.full(total, np.inf)

@@ -1,7 +1,7 @@
-"""Conclusions: quantities that an engineer would read off the model of one hammer, each with its unit.
+"""Conclusions: quantities that an engineer would compute with the model of a hammer, each with its unit.
 
 The constants of the hammer of the paper are not known. Comparing the conclusions over a family of hammers
-shows which of them do not depend on the unknown constants.
+shows which conclusions do not depend on the unknown constants.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ ONSET_STEP: Final = 5e-6  # Step of the strobe times over which the onset of cha
 GRID: Final = (100, 3000, 5)  # First rate, last rate and step of the grid for the safe rate, Hz
 
 RATES: Final = (500, 1250, 5)
-"""First rate, last rate and step of the grid of bursts, Hz: from independent dots into the erratic band."""
+"""First rate, last rate and step of the grid of bursts, Hz: from independent dots to the erratic band."""
 
 _AT_ONCE: Final = 40
 
 
 class Conclusions(Declared):
-    """The conclusions about one hammer; field names end in the unit. None: it has no such value."""
+    """Conclusions about one hammer, None for a value that does not exist; field names end in the unit."""
 
     safe_rate_Hz: float | None = scalar(
         "Hz",
@@ -89,8 +89,7 @@ class Conclusions(Declared):
 
 
 QUANTITIES: Final = columns_of(Conclusions)
-"""Every conclusion, by the name of its field in `Conclusions`: its `unit`, its `meaning`, and as `name` a few
-words."""
+"""Declarations of the conclusions by field name in `Conclusions`: `unit`, `meaning`, and a short `name`."""
 
 
 def conclude(hammer: Hammer, context: Context | None = None) -> Conclusions:
@@ -120,7 +119,7 @@ def conclude(hammer: Hammer, context: Context | None = None) -> Conclusions:
 
 
 def rate_from_rest(context: Context) -> float | None:
-    """Return the rate, Hz, up to which all patterns of eight slots from rest print well, or None.
+    """Return the rate, Hz, up to which all patterns of eight slots from rest are within limits, or None.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """The family: clearly different hammers that reproduce the claims of the paper about equally well.
 
 The constants of the hammer of 1983 are not determined uniquely. From the log of a search, pairwise clearly
-different hammers are chosen, each is judged by the claims, and its conclusions are computed. A conclusion
+different hammers are selected and judged by the claims, and their conclusions are computed. A conclusion
 on which all members agree does not depend on the constants that the paper did not print.
 """
 
@@ -48,7 +48,7 @@ LEAST: Final = 20  # Least number of hammers of a family
 COUNT: Final = 24  # Default number of hammers of the family
 
 WRITTEN: Final = ("family.csv", "family.json")
-"""Files that a family is written to."""
+"""Names of the files to which a family is written."""
 
 FORMAT: Final = 1
 
@@ -60,8 +60,8 @@ _MOST: Final = 2000
 def family_hammers(folder: str | Path | None = None) -> list[Hammer]:
     """Return the hammers of the family; the status of each constant is "reconstructed".
 
-    They are in the order of the table, named "hendriks-1983-family-01" and so on, and come from the
-    `family.json` in a folder or, without a folder, from the one shipped with the program.
+    The hammers are in the order of the table, named "hendriks-1983-family-01" and so on, and are read from
+    the `family.json` in a folder or, without a folder, from the file shipped with the program.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def write_family(
     count: int = COUNT,
     least: int = LEAST,
 ) -> list[FamilyMember]:
-    """Choose a family from logs of judged candidates, judge it and write `family.json` and `family.csv`.
+    """Select a family from logs of judged candidates, judge it, and write `family.json` and `family.csv`.
 
     Verdicts and conclusions are kept in `family.part.jsonl` in the folder until the family is complete, so
     that an interrupted run can be resumed.
@@ -112,19 +112,19 @@ def write_family(
     logs : iterable of path
         See `studies.reconstruction.family.log`.
     folder : path
-        Where to write; created if it is missing, after the logs have been read.
+        Output folder; created if it is missing, after the logs have been read.
     progress : callable, optional
         Called with a line of text at each step.
     count : int, optional
-        Number of members wanted.
+        Largest number of members.
     least : int, optional
-        Number of members needed.
+        Smallest number of members.
 
     Raises
     ------
     InputError
-        A log is invalid, a hammer of it cannot be built, the logs hold too few clearly different hammers, or
-        a file cannot be written.
+        A log is invalid, a logged hammer cannot be built, the logs contain too few clearly different hammers,
+        or a file cannot be written.
     """
     tell = progress or (lambda _: None)
     paths = list(logs)
@@ -175,7 +175,7 @@ def _too_few(paths: Sequence[str | Path], count: int, least: int) -> str:
 
 
 def promising(logged: Sequence[Logged], most: int = _MOST) -> list[Logged]:
-    """Return the hammers of logs that pass all stated claims judged so far, the best first.
+    """Return the logged hammers that satisfy all stated claims judged so far, the best first.
 
     If there are more than `most`, hammers in the same cell of a logarithmic lattice of constants count once.
     """
@@ -201,7 +201,7 @@ def _cell(constants: Mapping[str, float], width: float) -> tuple[tuple[str, floa
 
 
 def print_forces(hammers: Sequence[Hammer]) -> FloatArray:
-    """Return the peak force, N, of the dot of a single pulse for each hammer; NaN where it does not print."""
+    """Return the peak force of each hammer's single-pulse dot, N; NaN for a hammer that does not print."""
     able = [i for i, hammer in enumerate(hammers) if hammer.waveform is not None]
     forces = np.full(len(hammers), np.nan)
     if able:
@@ -213,7 +213,7 @@ def print_forces(hammers: Sequence[Hammer]) -> FloatArray:
 
 
 def compared(constants: Sequence[Mapping[str, float]], forces: Sequence[float]) -> list[FloatArray]:
-    """Return the constants of hammers, as they are and normalized to the common gauge, each of shape (n, k).
+    """Return the constants of hammers, unscaled and scaled to the common gauge, each of shape (n, k).
 
     A constant that a hammer lacks is taken from the shipped hammer; `forces` are the peak forces, N, of the
     dots of a single pulse.
@@ -229,15 +229,15 @@ def compared(constants: Sequence[Mapping[str, float]], forces: Sequence[float]) 
 
 
 def _keys(constants: Sequence[Mapping[str, float]]) -> list[str]:
-    """Return the keys given by at least one hammer, and the amplitude, in the order of the hammer file."""
+    """Return the keys of the constants of any hammer, and the amplitude, in the order of the hammer file."""
     named = {key for row in constants for key in row} | {"waveform.amplitude"}
     return [key for key in template().constants if key in named]
 
 
 def _judged(row: Logged, hammer: Hammer, shelf: Shelf) -> FamilyMember | None:
-    """Return a logged hammer as a member of the family, not yet named; None if it does not qualify.
+    """Return a logged hammer as an unnamed member of the family; None if the hammer does not qualify.
 
-    Verdicts of kind "stated" are judged here; the others are taken from the log.
+    Claims of kind "stated" are judged again; the verdicts on other claims are those of the log.
     """
     known = shelf.get(hammer)
     if known is None:
@@ -290,7 +290,7 @@ def _described(member: FamilyMember | None) -> str:
 def json_text(family: Sequence[FamilyMember], gauged: Sequence[Mapping[str, float]]) -> str:
     """Return the text of `family.json`; see `printhammer.report.reconstruction.results.Family`.
 
-    `gauged` are the constants of the members normalized to the common gauge, key to value, SI.
+    `gauged` maps the keys of the constants to the values of the members, SI, scaled to the common gauge.
     """
     hammers = ",\n".join(f"  {_table(member.model_dump(), 3)}" for member in family)
     held = robustness([member.conclusions for member in family], gauged)

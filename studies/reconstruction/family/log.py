@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
 LEAST_PANELS: Final = 8
-"""Least number of the twelve verdicts of Fig. 11 that must be as printed for a member of the family."""
+"""Smallest number of the twelve panels of Fig. 11 that a member of the family must classify as printed."""
 
 
 class Logged(Declared):
@@ -26,7 +26,7 @@ class Logged(Declared):
 
     @property
     def promising(self) -> bool:
-        """Whether no stated claim judged so far fails and enough panels of Fig. 11 are as printed."""
+        """Whether no judged stated claim fails and `LEAST_PANELS` panels of Fig. 11 are as printed."""
         enough = self.panels is not None and self.panels >= LEAST_PANELS
         return enough and all(self.verdicts.get(name, True) for name in STATED)
 
@@ -34,13 +34,13 @@ class Logged(Declared):
 def read_logs(paths: Iterable[str | Path]) -> list[Logged]:
     """Read logs of judged candidates (`reconstruction.judging.log`), in the order of the files.
 
-    A hammer judged several times, also in different files, is returned once with all its verdicts; of each
-    claim the last verdict counts.
+    A hammer judged several times, also in different files, is returned once with all its verdicts; the last
+    verdict on each claim counts.
 
     Raises
     ------
     InputError
-        A file cannot be read, is not such a log, or holds no candidates.
+        A file cannot be read, is not such a log, or contains no candidates.
     """
     hammers: dict[Key, tuple[dict[str, Any], str]] = {}
     for path in map(Path, paths):

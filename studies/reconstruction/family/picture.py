@@ -17,15 +17,15 @@ if TYPE_CHECKING:
 
 
 def family_picture(hammer: Hammer, results: Results | None = None) -> Figure:
-    """Draw the constants of the family relative to those of a hammer, and the conclusions about its members.
+    """Draw the constants of the family relative to those of a hammer, and the conclusions of the family.
 
     See `studies.reconstruction.figures.family`.
 
     Parameters
     ----------
     hammer : Hammer
-        The reference hammer, whose constants are drawn as 1, usually the shipped one. It is first normalized
-        to the print force and the current of the family, which does not change its motion.
+        The reference hammer, whose constants are drawn as 1, usually the shipped one. This hammer is first
+        scaled to the print force and the current of the family, which does not change its motion.
     results : Results, optional
         Results that contain the table of the family; by default those shipped with the program.
 

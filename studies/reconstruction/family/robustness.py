@@ -1,9 +1,9 @@
 """Robustness: which conclusions hold for all hammers of a family, and which depend on unknown constants.
 
-A conclusion is robust if the spread of its values is less than a tenth of their median, or if no member has
-it; a statement is robust if it is true of every member or of none. For a conclusion that is not robust, rank
-correlations with the constants show which constants decide it. The members were chosen to differ and are not
-a random sample: ranges and correlations describe these members, not a population.
+A conclusion is robust if the spread of its values is less than a tenth of their median, or if no member has a
+value; a statement is robust if it is true for every member or for none. For a conclusion that is not robust,
+rank correlations show the constants on which it depends. The members were selected to differ and are not a
+random sample: ranges and correlations describe these members, not a population.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _SCALING: Final = ("J", "N")
 
 
 class Statement(Declared):
-    """A general statement of the paper, expressed as a margin that is positive where it is true."""
+    """A general statement of the paper, expressed as a margin that is positive if the statement is true."""
 
     text: str = part("the statement")
     source: str = part("where the paper says it")
@@ -41,7 +41,7 @@ class Statement(Declared):
 
 
 def _tolerated(name: str) -> float:
-    """Return the spread of flight times, s, that the paper calls tolerable for a kind of printing."""
+    """Return the spread of flight times, s, that a kind of printing tolerates according to the paper."""
     return float(claims()["flight_time_spread"].settings[name])
 
 
@@ -83,7 +83,7 @@ STATEMENTS: Final[dict[str, Statement]] = {
         lambda known: known["backstop_loss_J"] - known["pack_loss_J"],
     ),
 }
-"""Statements that are checked on every member, by name."""
+"""Statements of the paper that are evaluated for every member, by name."""
 
 
 def robustness(
@@ -96,16 +96,16 @@ def robustness(
     conclusions : sequence of dict
         One mapping per member, as returned by `Conclusions.as_dict`.
     constants : sequence of mapping
-        One mapping per member, normalized to the common gauge, key to value, SI.
+        One mapping per member: constants, SI, by key, scaled to the common gauge.
 
     Returns
     -------
     dict
         By name of the conclusion or statement: `kind` ("quantity" or "statement"), `title`, `unit`, `known`
-        (number of members that have it), `low`, `high`, `median` (None where no member has it), `robust`,
-        and `text`, one sentence; of a quantity also `spread` (of the median) and `correlations` (constant to
-        rank correlation), of a statement `held` (number of members of which it is true) and `source`. The
-        values of a statement are its margins.
+        (number of members with a value), `low`, `high`, `median` (None if no member has a value), `robust`,
+        and `text`, one sentence; for a quantity also `spread` (as a fraction of the median) and
+        `correlations` (rank correlation by constant), for a statement `held` (number of members for which it
+        is true) and `source`. The values of a statement are its margins.
     """
     rows: dict[str, dict[str, Any]] = {}
     for name, quantity in QUANTITIES.items():
@@ -168,7 +168,7 @@ def _quantity(
 
 
 def decisive_constants(correlations: Mapping[str, float], count: int) -> dict[str, float]:
-    """Return the rank correlations that are significant after a Bonferroni correction, the strongest first.
+    """Return the rank correlations that are significant with a Bonferroni correction, the strongest first.
 
     Two-sided test with Student's t for a rank correlation over `count` members, each at the level
     `SIGNIFICANT` divided by the number of constants.

@@ -1,4 +1,4 @@
-"""Figure of a family of reconstructed hammers: constants side by side, and the conclusions from each."""
+"""Figure of a family of reconstructed hammers: relative constants, and conclusions of each member."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
 
 _SHOWN: Final = {"s": ("ms", "ms"), "J": ("mJ", "mJ"), "Hz": ("Hz", "Hz"), "N": ("N", "N"), "m": ("um", "µm")}
-"""SI unit to the unit in the figure and its label."""
+"""Unit and label of a quantity in the figure, by its SI unit."""
 
 _ROW: Final = 0.2
 _STRIP: Final = 0.52
@@ -45,10 +45,10 @@ def family(
 ) -> Figure:
     """Draw the constants of a family relative to those of a hammer, and below them the conclusions.
 
-    Each row has one dot per member. `constants` holds those of the hammer, then those of each member, by key
-    of a hammer file, SI, normalized to the common gauge; `conclusions` holds those of each member by name,
-    SI, None if it has none. `drawn` gives `title`, `unit`, `robust`, `low` and `high` of each conclusion.
-    Members are coloured from light to dark by the value of the conclusion `order`, in all panels.
+    Each row has one dot per member. `constants` lists the constants of the hammer, then those of each member,
+    by key of a hammer file, SI, scaled to the common gauge; `conclusions` lists the conclusions of each
+    member by name, SI, or None. `drawn` contains `title`, `unit`, `robust`, `low` and `high` of each
+    conclusion. Members are coloured from light to dark by the value of the conclusion `order`, in all panels.
     """
     from matplotlib.colors import LinearSegmentedColormap
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from studies.reconstruction.judging.front import Front
 
 _SIZE: Final = 14.0
-"""Area of the mark of a single hammer, in square points."""
+"""Area of a mark that represents one hammer, in square points."""
 
 
 @styled

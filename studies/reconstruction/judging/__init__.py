@@ -1,1 +1,1 @@
-"""Candidates judged by the claims, and how often claims hold by chance."""
+"""Evaluation of the claims for candidates, and base rates: how often claims hold by chance."""

@@ -1,6 +1,6 @@
 """Base rates: how often each claim holds by chance for random hammers of the search space.
 
-The hammers are restricted to those that rest at the backstop, print with one pulse and come back to rest.
+Counted are only hammers that rest at the backstop, print with one pulse and return to rest.
 
 A randomly drawn hammer does not have the printed stroke. The claim about the stroke is therefore judged with
 a random mass; then the mass is set such that the stroke is as printed, and the other claims are judged.
@@ -69,7 +69,7 @@ def base_rates(
     pool: Executor | None = None,
     tell: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
-    """Count for how many random hammers each claim holds; return the contents of `base_rates.json`.
+    """Count the random hammers for which each claim holds; return the contents of `base_rates.json`.
 
     Slow claims are judged for the first `slow` hammers only (None: all). `tell` is called with the number of
     hammers done and the total.

@@ -1,8 +1,8 @@
-"""Claims judged as with the integrators of 1983: the same measures, applied to motions of a 1983 scheme.
+"""Claims judged with an integrator of 1983: the same measures, applied to motions computed by a scheme.
 
-The paper read its figures from such computations. Claims that need no motion give the same verdict either
-way. Left out are the claims about the schemes themselves and those whose measure needs ensembles or a search,
-which are not implemented for the schemes.
+The paper read its figures from such computations. Claims that require no motion have the same verdict with
+every integrator. Claims about the schemes themselves are omitted, and so are claims whose measure requires
+ensembles or a search, which are not implemented for the schemes.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Front(Result):
-    """Judged hammers with the numbers of panels of Fig. 11 and of other claims that hold."""
+    """Judged hammers, with the number of panels of Fig. 11 and the number of other claims that hold."""
 
     candidate: IntArray = coordinate(
         "1", "number of the judged hammer", "hammer", more="in the order of the logs, the first is number 1"

@@ -1,4 +1,4 @@
-"""Judging candidates by the claims; a slow claim is judged only if its verdict can still matter."""
+"""Evaluation of the claims for candidates; slow claims only if their verdict can still matter."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 FIGURE_11: Final = "poincare"
 SLOW: Final = ("map_sensitivity", "no_period_doubling_cascade")
-"""Claims that may take minutes for a hammer far from that of the paper."""
+"""Claims that may take minutes for a hammer unlike that of the paper."""
 
 STATED: Final = tuple(
     name for name, claim in claims().items() if claim.kind == "stated" and name != FIGURE_11
@@ -43,7 +43,7 @@ def plain_panels(hammer: Hammer, tolerance: float = TOLERANCE) -> dict[str, tupl
 
 
 def row_of(constants: Mapping[str, float], names: Iterable[str], *, panels: bool = True) -> dict[str, Any]:
-    """Judge a candidate, constants in SI, by the named claims, and by Fig. 11 if `panels` is set.
+    """Judge a candidate (constants, SI) by the named claims, and by Fig. 11 if `panels` is set.
 
     The claim on Fig. 11, with all its perturbations, is judged only if all panels are as printed without
     them. The row has `constants`, `verdicts` (claim to true or false), `values` (claim to the measured values
@@ -71,5 +71,5 @@ def row_of(constants: Mapping[str, float], names: Iterable[str], *, panels: bool
 
 
 def text_of(row: Mapping[str, Any]) -> str:
-    """Return the line of a row in a log of judged candidates."""
+    """Format a row as a line of the log of judged candidates."""
     return json.dumps(row, default=float) + "\n"

@@ -26,9 +26,9 @@ def key_of(constants: Mapping[str, float]) -> Key:
 def read_judged(path: Path, *, some: bool = False) -> list[dict[str, Any]]:
     """Return the candidates of a log (`judged.row_of`), in the order in which they first occur.
 
-    A candidate judged more than once is returned once with all its verdicts; of each claim the last verdict
-    counts. An incomplete last line is ignored: the program was stopped while writing it. A missing file
-    counts as an empty one.
+    A candidate judged more than once is returned once with all its verdicts; the last verdict on each claim
+    counts. An incomplete last line, written when the program was stopped, is ignored. A missing file counts
+    as an empty file.
 
     Raises
     ------
@@ -56,12 +56,12 @@ def joined(before: dict[str, Any] | None, row: dict[str, Any]) -> dict[str, Any]
 
 
 def mend(path: Path) -> None:
-    """Cut off an incomplete last line, so that rows can be appended.
+    """Remove an incomplete last line from a log, so that rows can be appended.
 
     Raises
     ------
     InputError
-        The file cannot be written, or its end is no beginning of a judged candidate.
+        The file cannot be written, or its last line is not the beginning of a judged candidate.
     """
     whole, newline, rest = read_text(path).rpartition("\n")
     if not rest:

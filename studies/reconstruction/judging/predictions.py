@@ -1,4 +1,4 @@
-"""Predictions: what hammers found on the stated claims alone say about the claims that were not used."""
+"""Predictions: claims that hold for hammers of a search that used only the stated claims."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ if TYPE_CHECKING:
 
 
 def predictions(rows: Sequence[dict[str, Any]], seed: int, candidates: int) -> dict[str, Any]:
-    """Count for how many hammers each claim of kind "shape" holds; return the contents of `predictions.json`.
+    """Count the hammers for which each "shape" claim holds; return the contents of `predictions.json`.
 
-    `rows` are judged candidates of a search on the stated claims alone; only those count for which all stated
-    claims outside Fig. 11 hold. `seed` and `candidates` identify the search and the number it tried.
+    `rows` are judged candidates of a search that used only the stated claims; only candidates for which all
+    stated claims outside Fig. 11 hold are counted. `seed` identifies the search; `candidates` is the number
+    of candidates that the search evaluated.
     """
     kept = [row for row in rows if all(row["verdicts"].get(name) for name in STATED)]
     counts: dict[str, dict[str, Any]] = {}

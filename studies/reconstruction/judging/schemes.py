@@ -1,10 +1,10 @@
 """Effect of the integrators of 1983 on verdicts: for the shipped hammer, its family and random hammers.
 
 The paper judged its figures from computations with steps of 10, 1 and 20 us that do not locate contacts. The
-study counts how often such a computation gives another verdict on a panel of Fig. 11 than the exact motion.
-The random hammers are those of the base rates for which both schemes complete the single-pulse cycle on the
-schedule, as those of the paper did. The panels of one hammer are not independent, so that the interval of a
-share is that of the mean over hammers (cluster sampling), plus and minus two standard errors.
+study counts how often such a computation and the exact motion have different verdicts on a panel of Fig. 11.
+The random hammers are those of the base rates for which both schemes complete the single-pulse cycle with the
+steps of the paper, as they did in the paper. The panels of one hammer are not independent, so the interval of
+a fraction is that of the mean over hammers (cluster sampling), plus and minus two standard errors.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ if TYPE_CHECKING:
     from printhammer.run.scheme_runs import Scheme
 
 CHANGE: Final = 1e-5
-"""Relative increase of all constants at once, to see how sensitive a verdict is to their last digits."""
+"""Relative increase of all constants at once, which tests the sensitivity of a verdict; arbitrary."""
 
 Way = tuple["Scheme | None", Reading, bool]
-"""How a verdict is computed: scheme (None: exact), reading of the schedule, constants changed or not."""
+"""Computation of a verdict: scheme (None: exact), reading of the schedule, constants changed or not."""
 
 READING: Final[Reading] = "firings"
 """Reading of the schedule used for both schemes; the other readings use the first scheme only."""
@@ -45,7 +45,7 @@ PLAIN: Final[tuple[Way, ...]] = (
     *((SCHEMES[0], reading, False) for reading in READINGS),
     (SCHEMES[1], READING, False),
 )
-"""The combinations that are compared with the exact verdicts."""
+"""Computations whose verdicts are compared with the exact verdicts."""
 
 PAIRS: Final[tuple[tuple[Way, Way], ...]] = (
     (EXACT, (None, READING, True)),
@@ -56,7 +56,7 @@ PAIRS: Final[tuple[tuple[Way, Way], ...]] = (
 
 
 def panel_verdicts(hammer: Hammer, way: Way) -> list[str]:
-    """Return the verdicts on the panels of Fig. 11, computed in the given way."""
+    """Compute the verdicts on the panels of Fig. 11 with the computation `way`."""
     scheme, reading, moved = way
     periods = list(printed_verdicts())
     which = changed(hammer, lambda _: 1, CHANGE) if moved else hammer
@@ -89,7 +89,7 @@ def _random(constants: dict[str, float]) -> dict[Way, list[str]]:
 def _comparison(
     first: Way, second: Way, before: Sequence[list[str]], after: Sequence[list[str]]
 ) -> dict[str, Any]:
-    """Count differing verdicts in both directions (periodic, strange); return them with share and error."""
+    """Count verdicts that change in either direction (periodic, strange); return fraction and error, too."""
     pairs = [list(zip(one, other, strict=True)) for one, other in zip(before, after, strict=True)]
     every = [pair for row in pairs for pair in row]
     each = np.array([np.mean([one != other for one, other in row]) for row in pairs])
@@ -109,7 +109,7 @@ def _comparison(
 
 
 def named(way: Way) -> str:
-    """Return a short text that describes how verdicts are computed."""
+    """Describe a computation of verdicts in a short text: scheme, reading, changed constants."""
     scheme, reading, moved = way
     words = "exact" if scheme is None else f"{scheme}, {reading}"
     return f"{words}, constants changed by {CHANGE:g}" if moved else words

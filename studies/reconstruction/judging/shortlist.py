@@ -1,4 +1,4 @@
-"""Judging the best candidates of searches by the claims; the log is the input of all later steps."""
+"""Evaluation of the claims for the best candidates of a search; later steps read its log."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _TOGETHER: Final = 8
 def shortlist(rows: Sequence[dict[str, Any]], count: int, apart: float = APART) -> list[dict[str, Any]]:
     """Return the best candidates of a log that are not close to each other.
 
-    Any two differ in at least one variable by `apart` times its range.
+    Any two returned candidates differ in at least one variable by `apart` times its range.
     """
     chosen: list[dict[str, Any]] = []
     points = np.empty((0, 0))
@@ -59,11 +59,11 @@ def judge_candidates(
     pool: Executor | None = None,
     tell: Callable[[int, int, dict[str, Any]], None] | None = None,
 ) -> list[dict[str, Any]]:
-    """Judge candidates and append them to a log; those already in it are not judged again.
+    """Judge candidates and append them to a log; candidates already logged are not judged again.
 
-    `every` holds constants of hammer files, SI. Besides Fig. 11 the stated claims are judged unless `names`
-    gives others. `tell` is called with the number done, the total and the row. The rows of these candidates
-    are returned; see `judged.row_of`.
+    `every` lists constants of hammer files, SI. In addition to Fig. 11, the claims in `names` are judged, by
+    default the stated claims. `tell` is called with the number of judged candidates, the total and the row.
+    The rows of these candidates are returned; see `judged.row_of`.
     """
     wanted = [dict(constants) for constants in every]
     known = {key_of(row["constants"]): row for row in read_judged(path)}
@@ -87,7 +87,7 @@ def judge_candidates(
 
 
 def standing(row: dict[str, Any]) -> tuple[float, int]:
-    """Return the rank of a judged candidate: the claims that hold, and how many of them are stated.
+    """Return the rank of a judged candidate: number of claims that hold, and of stated claims among them.
 
     A panel of Fig. 11 counts as a twelfth of a claim; claims of kind "typical" do not count.
     """

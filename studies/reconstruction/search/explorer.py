@@ -1,8 +1,8 @@
-"""Differential steps in the region in which the claims other than Fig. 11 are met.
+"""Differential evolution in the region in which all claims except Fig. 11 hold.
 
-The verdicts of Fig. 11 jump between neighbouring points, so that the whole region has to be sampled.
-As in differential evolution (Storn & Price 1997), a scaled difference of two points is added to a third: such
-steps follow the shape of the region, however narrow it is.
+The verdicts on Fig. 11 change abruptly between neighbouring points, so the whole region has to be sampled. As
+in differential evolution (Storn & Price 1997), a scaled difference of two points is added to a third point:
+such steps adapt to the shape of the region, however narrow it is.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ CHEAP: Final = (
     "two_pulses_700us",
     "second_dot_lost",
 )
-"""Claims that define the region, as far as they have a weight in the search."""
+"""Claims that define the region; claims without a weight in the search are ignored."""
 
 MOST: Final = 3000  # Largest number of points of the region that are kept; arbitrary
 
@@ -44,7 +44,7 @@ class Explorer:
         self._nearest: list[dict[str, Any]] = []
 
     def note(self, rows: list[dict[str, Any]]) -> None:
-        """Store the points in the region and, while these are few, the points of least loss."""
+        """Store the points in the region and, while it has few points, the points with the smallest loss."""
         for row in rows:
             if row["constants"] is None:
                 continue
@@ -58,7 +58,7 @@ class Explorer:
             del self._inside[: len(self._inside) - MOST]
 
     def ask(self, count: int) -> list[FloatArray]:
-        """Return `count` new points to evaluate."""
+        """Propose `count` new points to evaluate."""
         known = self._inside if len(self._inside) >= _FEW else [*self._inside, *self._nearest]
         proposed = []
         for _ in range(count):

@@ -23,7 +23,7 @@ _CANDIDATE: Final = {"point", "total", "constants"}
 
 
 def read_search(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Return the heading and the candidates of the log of a search.
+    """Read the log of a search; return its heading and its candidates.
 
     Raises
     ------
@@ -51,9 +51,9 @@ def read_search(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
 
 
 class Log:
-    """A log on disk, new or resumed: JSON lines, of which the first determines the search.
+    """Log of a search on disk, new or resumed: JSON lines, the first of which defines the search.
 
-    An incomplete last line is cut off: the search was stopped while writing it.
+    An incomplete last line, written when the search was stopped, is removed.
 
     Raises
     ------
@@ -92,7 +92,7 @@ class Log:
             append(self.path, "".join(json.dumps(row) + "\n" for row in rows), "log")
 
     def known(self, place: int, points: Sequence[FloatArray]) -> list[dict[str, Any]]:
-        """Return the logged candidates from the given index on, at most one for each point.
+        """Return the logged candidates from index `place` on, at most one for each of `points`.
 
         Raises
         ------

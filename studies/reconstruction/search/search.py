@@ -33,7 +33,7 @@ SAMPLE: Final = 16384
 
 ISLANDS: Final = 4
 EXPLORED: Final = 64
-"""Number of points per generation from the explorer, beside those of the islands; arbitrary."""
+"""Number of points that the explorer proposes per generation, in addition to the islands; arbitrary."""
 
 POPULATION: Final = 16
 SIGMA: Final = 0.08
@@ -48,7 +48,7 @@ _TOGETHER: Final = 128
 _GAIN: Final = 1e-3
 _APART: Final = 0.03
 STARTS: Final = 64
-"""Default number of points taken over from another search."""
+"""Default number of starting points from another search."""
 
 
 class Plan(Declared):
@@ -81,13 +81,13 @@ class Plan(Declared):
 
 
 def starts_of(path: Path, aim: Aim, count: int = STARTS) -> tuple[tuple[float, ...], ...]:
-    """Return the best points of another search as starts for this aim, not close to each other.
+    """Return the best points of another search that are not close to each other, as starts for an aim.
 
     Raises
     ------
     InputError
-        The file is not the log of a search, or the aim is "stated" and the other search used further claims,
-        which would then influence this one.
+        The file is not the log of a search; or the aim is "stated" and the other search used additional
+        claims, which would then influence this search.
     """
     from studies.reconstruction.judging.shortlist import shortlist
 
@@ -103,7 +103,7 @@ def known_starts(aim: Aim) -> tuple[tuple[float, ...], ...]:
     Raises
     ------
     InputError
-        The aim is "stated": those hammers were found with further claims, which would then influence the
+        The aim is "stated": these hammers were found with additional claims, which would then influence the
         search.
     """
     from printhammer.report.reconstruction.results import shipped_results
@@ -123,10 +123,10 @@ def search(
     pool: Executor | None = None,
     tell: Callable[[int, float, dict[str, Any]], None] | None = None,
 ) -> Iterator[dict[str, Any]]:
-    """Search without end; each candidate is yielded, as a row of the log, after it has been written.
+    """Search without end; yield each candidate, as a row of the log, after writing the row.
 
     A search already in the log is resumed. `tell` is called after each batch with the number of candidates,
-    the least total loss so far, and its row.
+    the smallest total loss, and the row with this loss.
 
     Raises
     ------
@@ -183,7 +183,7 @@ def search(
 
 
 def _strategies() -> Any:
-    """Return the class of the evolution strategy, CMA, from the optional package `cmaes`."""
+    """Return the class CMA (an evolution strategy) of the optional package `cmaes`."""
     try:
         from cmaes import CMA
     except ImportError:
@@ -192,7 +192,7 @@ def _strategies() -> Any:
 
 
 class _Island:
-    """One run of CMA-ES, started at one of the best points known."""
+    """One run of CMA-ES, started at one of the best known points."""
 
     def __init__(self, start: list[dict[str, Any]], rng: np.random.Generator) -> None:
         # Better points are drawn more often.
@@ -219,5 +219,5 @@ class _Island:
 
     @property
     def done(self) -> bool:
-        """Whether the run no longer improves."""
+        """Whether the run has stopped improving."""
         return self._since > PATIENCE or self._strategy.should_stop()
