@@ -129,7 +129,7 @@ def _residuals(ax: Axes, fit: Fit, across: Scale, up: Scale) -> None:
 
 
 def _spread(fit: Fit) -> FloatArray:
-    """Compute the standard deviation of each datum, normalised by the RMS of those that are not outliers."""
+    """Compute the standard deviation of each datum, normalised by the RMS over all data except outliers."""
     used = ~fit.outliers
     spread = 1.0 / np.sqrt(fit.weights)
     return np.asarray(spread / np.sqrt(np.mean(spread[used] ** 2)))

@@ -67,7 +67,7 @@ class Sheet:
 def inked(
     sheet: Sheet, across: FloatArray, down: FloatArray, density: FloatArray, diameter: float, finest: float
 ) -> FloatArray:
-    """Render dots; return the optical density on a sheet from the top left, shape (rows, columns).
+    """Render dots; return the optical densities of a sheet's pixels from the top left, shape (rows, columns).
 
     The dots are given by centres, m, densities and a common diameter, m, and are clipped at the edges of the
     sheet. The pixel size is at least `finest`, m.

@@ -60,7 +60,7 @@ _SPARE: Final = 4
 """Smallest number of rows in excess of parameters for which standard errors are computed; arbitrary."""
 
 _EXACT: Final = 1e-6
-"""Residual, as a fraction of the current, below which integration errors dominate and the test is omitted."""
+"""Residual, as a fraction of the current, below which the test of the law would see integration errors."""
 
 _COARSE: Final = 1.5
 """Ratio of resolution to residual standard deviation above which quantisation dominates the residuals."""
@@ -245,7 +245,7 @@ class CurrentLaw:
         return np.concatenate(shown)
 
     def missing(self, p: FloatArray) -> dict[str, FloatArray]:
-        """Return the derivatives of the currents by each undeclared probe error, keyed by advice on it."""
+        """Return the derivatives of the currents with respect to undeclared probe errors, by advice."""
         short = _SHORT * self.step
         steps = {"offset": 1.0, "gain": 1.0, "delay": short, "time constant": short}
         unstated = [name for name in steps if name not in [error.name for error in self.errors]]

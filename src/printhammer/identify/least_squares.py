@@ -35,7 +35,7 @@ _ALONE: Final = 0.9
 """Leverage above which a row alone determines a parameter."""
 
 _HOLDING: Final = 4.0
-"""Factor on a parameter's variance if rows are omitted, above which the rows are essential; arbitrary."""
+"""Smallest factor by which omitting essential rows increases the variance of a parameter; arbitrary."""
 
 _AT_BOUND: Final = 1e-6
 """Distance from a bound, as a fraction of the parameter, below which the parameter counts as at the bound."""

@@ -181,7 +181,7 @@ def statics(hammer: Hammer, picture: EquilibriumPicture) -> Summary:
 
 
 POOR = 0.15
-"""Relative deviation of a force from the data sheet above which the fit is called poor."""
+"""Relative deviation of a force from the data sheet above which the fit is called poor; arbitrary."""
 
 
 @verb(

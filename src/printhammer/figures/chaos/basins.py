@@ -2,8 +2,8 @@
 
 `plot_manifolds` draws stable and unstable manifolds of saddles.
 
-`plot_quench` draws the quench map of two pulses: the force of the second dot, or the peak displacement of the
-second response where the dot is lost.
+`plot_quench` draws the quench map of two pulses: the force of the second dot or, where the dot is lost, the
+second peak of the displacement.
 """
 
 from __future__ import annotations

@@ -90,7 +90,7 @@ def total_force(hammer: Hammer, *, duration: float | str | None = None) -> Figur
 
 
 def rigid_remark(motion: Motion) -> str:
-    """Remark that a force diagram omits rigid impacts; empty for a motion without such impacts."""
+    """Return the remark that a force diagram omits rigid impacts; empty if there are no rigid impacts."""
     impacts = any(c.surface == "backstop" and c.peak_force is None and not c.initial for c in motion.contacts)
     return "The rigid backstop changes the velocity at once; its impulses are not drawn." if impacts else ""
 

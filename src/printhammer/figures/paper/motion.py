@@ -70,7 +70,7 @@ def _text(delay: float) -> str:
 
 
 def buzz(hammer: Hammer, *, search: BuzzSearch | None = None, duration: float | str | None = None) -> Figure:
-    """Draw Fig. 7: the train of `find_buzz_train`, or if none prints by buzzing, the best attempt.
+    """Draw Fig. 7: the buzz-printing train found by `find_buzz_train`, or else the best train tried.
 
     Numbers at the dots are peak forces relative to the single-pulse force.
 

@@ -96,7 +96,7 @@ def magnet(
     displacements: npt.ArrayLike | None = None,
     currents: npt.ArrayLike | None = None,
 ) -> Bench:
-    """Measure the static force on the armature at given displacements, m, and coil currents, A."""
+    """Compute the static force on the armature at given displacements, m, and coil currents, A."""
     if hammer.magnet is None:
         raise InputError(
             f"{hammer.path}: the hammer has no [magnet]",
@@ -131,7 +131,7 @@ def spring(
     *,
     displacements: npt.ArrayLike | None = None,
 ) -> Bench:
-    """Measure the static spring force at given displacements of the armature, m, with the magnet removed."""
+    """Compute the static spring force at given displacements, m, with the magnet removed."""
     if hammer.spring is None:
         raise InputError(
             f"{hammer.path}: the hammer has no [spring]",
@@ -155,7 +155,7 @@ def pack(
     peaks: npt.ArrayLike | None = None,
     points: int = BRANCH_POINTS,
 ) -> Bench:
-    """Measure load cycles of the pack up to given peak indentations, m, each cycle on fresh paper."""
+    """Compute load cycles of the pack up to given peak indentations, m, each cycle on fresh paper."""
     if hammer.pack is None:
         raise InputError(
             f"{hammer.path}: the hammer has no [pack]",
@@ -197,7 +197,7 @@ def pack(
 
 
 def backstop(hammer: Hammer, sensor: Sensor, *, speeds: npt.ArrayLike | None = None) -> Bench:  # noqa: ARG001
-    """Measure rebound speeds of the armature alone, thrown at the backstop at `speeds`, m/s."""
+    """Compute rebound speeds of the armature alone, thrown at the backstop at `speeds`, m/s."""
     if hammer.backstop is None:
         raise InputError(
             f"{hammer.path}: the hammer has no [backstop]",
@@ -221,7 +221,7 @@ def backstop(hammer: Hammer, sensor: Sensor, *, speeds: npt.ArrayLike | None = N
 def motion(
     hammer: Hammer, sensor: Sensor, *, duration: float | str | None = None, before: float | str = BEFORE
 ) -> Bench:
-    """Record one shot from rest, from the time `before`, s, before firing to `duration`, s, after firing."""
+    """Simulate one shot from rest, from `before`, s, before the firing to `duration`, s, after the firing."""
     from printhammer.drive.trains import PulseTrain
 
     if hammer.waveform is None:
@@ -263,7 +263,7 @@ def current(
     before: float | str = BEFORE,
     locked: float | str | None = None,
 ) -> Bench:
-    """Record the coil current of one voltage-driven shot, with the armature free or locked at `locked`, m."""
+    """Simulate the coil current of one voltage-driven shot, the armature free or locked at `locked`, m."""
     from printhammer.drive.input import read_number
 
     check_driver(hammer)

@@ -169,7 +169,7 @@ _WEAK: Final = 0.1
 _GRID: Final = 25  # Number of values of a profile likelihood
 
 _COARSE: Final = 1e-8
-"""Relative tolerance of the least-squares iterations of a profile."""
+"""Relative tolerance of the least-squares iterations of a profile likelihood."""
 
 
 class Data(Declared, eq=False):
@@ -310,9 +310,10 @@ def _unseen(constant: FittedConstant) -> str:
 
 
 def profile(law: Law, data: FloatArray, solution: Solution, index: int) -> Profile:
-    """Compute the profile of one parameter: fix it at values around the optimum; refit the other parameters.
+    """Compute the profile likelihood of one parameter: fix its value, and refit the other parameters.
 
-    The values extend to four standard errors, within the bounds; rows and weights are those of the fit.
+    The values extend to four standard errors from the optimum, within the bounds; rows and weights are those
+    of the fit.
     """
     used, space = solution.used, replace(solution.parameters, tolerance=_COARSE)
     root = np.sqrt(solution.variance[used])
@@ -340,7 +341,7 @@ def profile(law: Law, data: FloatArray, solution: Solution, index: int) -> Profi
 
 
 def _crossing(values: FloatArray, increase: FloatArray, level: float, never: float) -> float:
-    """Locate where a profile first reaches a level, by linear interpolation of the profile's square root."""
+    """Locate where a profile likelihood first reaches a level, by linear interpolation of its square root."""
     above = np.flatnonzero(increase >= level)
     if not above.size:
         return never

@@ -132,7 +132,7 @@ LOADING, UNLOADING = 2.7, 11.0
 _SPARE: Final = 4  # Smallest number of rows beyond the number of unknowns
 _LOADING_ROWS: Final = 4  # Smallest number of rows of a loading branch
 _MEETS: Final = 0.02
-"""Deviation of a fitted from a measured turning point, as a fraction of the latter, that is reported."""
+"""Smallest relative deviation of a fitted from a measured turning point that is reported; arbitrary."""
 
 _FAR: Final = 1.0
 """Largest accepted absolute logarithm of the ratio of fitted to measured turning point."""
