@@ -415,7 +415,7 @@ class LearningLaw:
         growth = press.multipliers(settings)
         steady = bool(np.quantile(np.nan_to_num(growth), 1.0 - self.doubt) <= 1.0)
         gains = steady and self._leads(table.mean(axis=1), shares)
-        # Open-loop drive that is better over the production, unless the other is better on the posterior.
+        # The open loop that is better over the production, unless another is better on the posterior samples.
         loops = self.entries.loops
         chosen = next(k for k, loop in enumerate(loops) if loop.pulse is self.first.pulse)
         chosen = next((k for k in range(len(loops)) if self._leads(shares[k], shares[[chosen]])), chosen)

@@ -126,7 +126,7 @@ class Task:
     force: float  # Least force of a dot, N
     loading: float  # Loading work of a dot with that force, J; the unit of the cost
     heat: bool  # Whether to minimise the squared current instead of the positive work
-    tolerance: float  # As for `printhammer.simulate`
+    tolerance: float  # Error tolerance per integration step
 
     def run(self, begin: SlotState, currents: FloatArray, duration: float, tolerance: float) -> Outcomes:
         """Simulate M slots of `duration`, s, with nodal currents, A, shape (M, nodes), first node omitted."""
