@@ -103,7 +103,7 @@ class ImpactEstimator:
     Raises
     ------
     InputError
-        The pulse is not a voltage or makes no dot, too few samples fall on the contact, or the expected
+        The pulse is not a voltage or prints no dot, too few samples fall on the contact, or the expected
         signature is below the noise.
     """
 

@@ -91,7 +91,7 @@ def dot_values(motion: Motion) -> FloatArray:
 
 
 def _touches(contacts: Sequence[Contact]) -> list[int]:
-    """Return the row index of the contact that makes each dot, in order of the firings."""
+    """Return the row index of the contact that prints each dot, in order of the firings."""
     return [
         row
         for row, contact in enumerate(contacts)

@@ -1,6 +1,6 @@
 """Batches of pulse trains as flat arrays of firing times, for maps and for statistics over patterns.
 
-`Ragged` holds rows of unequal length in one array: firing times, strobe times, dots of many runs.
+`Ragged` stores rows of unequal length in one array: firing times, strobe times, dots of many runs.
 """
 
 from __future__ import annotations

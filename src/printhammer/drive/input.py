@@ -79,7 +79,7 @@ def read_count(value: SupportsIndex | None, name: str, least: int = 1) -> int:
 def read_array(values: npt.ArrayLike, name: str, what: str = "numbers", si: str = "") -> FloatArray:
     """Parse numbers into a new float array of any shape.
 
-    With a unit `si`, a list may hold text with units beside numbers in SI.
+    With a unit `si`, a list may contain text with units besides numbers in SI.
     """
     if si and isinstance(values, (list, tuple)) and any(isinstance(value, str) for value in values):
         return np.array([read_number(value, si, name) for value in values], dtype=np.float64)

@@ -349,7 +349,7 @@ def basins(
     Parameters
     ----------
     hammer : Hammer or Regime
-        The hammer, or a regime; a hammer requires the keywords of `printhammer.Regime.of`. States are taken
+        The hammer, or a regime; a hammer requires the keywords of `printhammer.Regime.of`. States are those
         at a firing, independent of the phase of the regime.
     x, v : tuple, optional
         Least and largest displacement, m, and velocity, m/s, or text with a unit, and number of values, both

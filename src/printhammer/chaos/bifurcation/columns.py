@@ -99,7 +99,7 @@ def run_columns(
 
     Initial states, shape (M, 7), are displacement, velocity, branch of the pack (negative: derived from the
     state), memory, and, with a voltage drive, the electric part of the state
-    (`printhammer.run.start.Beyond`). They are taken at the first firing, with pulses of earlier firings still
+    (`printhammer.run.start.Beyond`). They apply at the first firing, with pulses of earlier firings still
     active; a row of NaN is a train from rest without earlier firings (`FROM_REST`).
     """
     points = firings - transient
@@ -122,7 +122,7 @@ def run_columns(
 def _run(
     regimes: Sequence[Regime], states: FloatArray, firings: int, transient: int, effort: Effort
 ) -> Columns:
-    """Run trains whose initial states are all of one kind: at rest, inside the pack, or free."""
+    """Simulate trains that all start at rest, all inside the pack, or all free; return their columns."""
     rest = bool(np.isnan(states[0, 0]))
     # The cells of a basin share one regime; the columns of a diagram have one regime each.
     known = {id(regime): regime for regime in regimes}

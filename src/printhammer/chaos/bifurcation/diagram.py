@@ -390,7 +390,7 @@ class Bifurcation(Result, rows="direction column"):
 def hysteresis(diagram: Bifurcation) -> BoolArray:
     """Mask of the parameter values at which rising and falling parameters lead to different attractors.
 
-    Periodic trains differ if their periods differ or their orbits are further apart than
+    Periodic trains differ if their periods differ or their orbits are farther apart than
     `printhammer.chaos.bifurcation.builder.SAME`; an aperiodic train differs from every periodic train and
     from no aperiodic train. The shape is (C,); all False for a single direction.
     """

@@ -247,7 +247,7 @@ def zero_between(
 def _changes(
     follower: Corrector, here: Node, ahead: Node, after: int, margin: Callable[[Node], float] | None
 ) -> list[tuple[float, Kind, BranchPoint]]:
-    """Locate all changes of the contact sequence between two nodes of a curve."""
+    """Locate the contact changes between two nodes; return step fraction, kind and point of each."""
     changes: list[tuple[float, Kind, BranchPoint]] = []
     begin, first = 0.0, here
     while first.value.label != ahead.value.label and len(changes) < _ROUNDS:
@@ -273,7 +273,7 @@ def _change(
     start: tuple[float, Node],
     margin: Callable[[Node], float] | None,
 ) -> tuple[float, tuple[Node, Node], bool]:
-    """Locate the first contact change in a step: step fraction, nodes on both sides, whether converged."""
+    """Locate the first contact change in a step; return step fraction, nodes on both sides, convergence."""
     low, inside = start
     high, beyond = 1.0, ahead
     m_low = m_high = math.nan

@@ -111,7 +111,7 @@ class RegimeFamily:
         self.regime, self.name, self.firings, self.tolerance = regime, name, firings, tolerance
 
     def __call__(self, state: FloatArray, parameter: float) -> MapValue:
-        """Evaluate the map at a state, m and m/s, and a value of the parameter, SI."""
+        """Evaluate the iterated strobe map at a state, m and m/s, and a value of the parameter, SI."""
         try:
             regime = self.regime.with_(self.name, parameter)
             problem, end = self._problem(regime, state)

@@ -234,7 +234,7 @@ class _Chart:
         self.value = branch.regime.value(second)
 
     def across(self, effort: Effort) -> list[tuple[float, list[Start]]]:
-        """Locate stability limits of branches in the second parameter, started at orbits of the branch."""
+        """Locate stability limits along the second parameter; return (first-parameter value, starts) each."""
         branch, values = self.branch, self.branch.values
         low, high = float(values.min()), float(values.max())
         # Prefer a stable orbit: its branch loses stability at its limits.
@@ -263,7 +263,7 @@ class _Chart:
         return self.value if start.other is None else start.other
 
     def curves(self, starts: list[Start], effort: Effort) -> tuple[list[BifurcationCurve], list[str]]:
-        """Trace a curve through every start that does not lie on a curve already traced."""
+        """Trace a curve through every start on no earlier curve; return curves and reasons for failure."""
         curves: list[BifurcationCurve] = []
         refused: list[str] = []
         left = starts

@@ -136,13 +136,13 @@ def is_approaching(
 def noise_about(multiplier: float) -> float:
     """Compute the largest distance from a stable orbit, in half-widths, attributable to integration errors.
 
-    The distance grows as the largest multiplier falls, since the basin boundary is then further away.
+    The distance grows as the largest multiplier falls, since the basin boundary is then farther away.
     """
     return max(LIES_ON, DISTINCT * (1.0 - multiplier))
 
 
 def _by_states(points: FloatArray, scaled: FloatArray, period: int) -> Settled:
-    """Determine the orbit from the states alone, without derivatives of the strobe map."""
+    """Determine the settled orbit from the states alone, without derivatives of the strobe map."""
     early, late = _apart(scaled, period, period)
     shrinking = [bool(_shrinking(scaled, d, period)[0]) for d in _largest_divisors(period)]
     if late[0] > max(AGREES, early[0]) or any(shrinking):

@@ -5,7 +5,7 @@ trains without memory.
 
 A motion that comes to rest on a rigid backstop forgets its past and repeats exactly. A ball on a shaken table
 may bounce ever lower and lie still until the table launches it again, always at the same phase. The motion
-that follows is the same each time: a superstable cycle, whose multipliers are 0. It may be hundreds of
+that follows is the same each time: a superstable cycle, whose multipliers are 0. The cycle may be hundreds of
 firings long; between two rests small errors grow as in a chaotic motion, so that rounding often decides the
 length of a cycle.
 """

@@ -3,8 +3,8 @@
 In flight the acceleration is that of magnet and spring, a known function of displacement and current. Three
 numbers are unknown: displacement X and speed V at a reference time, and the relative deviation s of all
 currents from nominal, e.g. with another supply. With c the twice integrated acceleration, x = X + V tau +
-c(tau; s). This is linear in X and V and nearly linear in s, so a few Gauss-Newton steps, with the expectation
-as a prior, give the maximum a posteriori estimate.
+c(tau; s). This expression is linear in X and V and nearly linear in s, so a few Gauss-Newton steps, with the
+expectation as a prior, give the maximum a posteriori estimate.
 
 Contacts serve to estimate two constants recursively: the position of the pack's front and the current scale.
 The front may be farther away than nominal by a distance f, and all currents may deviate from nominal by a

@@ -198,8 +198,8 @@ class Learned:
 class Touched:
     """Pack contact whose sensor samples correct the estimated position of the pack's front.
 
-    `start` is before and `end` after the contact, s. At the start, `state` holds displacement, m, speed, m/s,
-    and current scale, and `covariance`, shape (3, 3), their covariances.
+    `start` is before and `end` after the contact, s. At the start, `state` contains displacement, m, speed,
+    m/s, and current scale, and `covariance`, shape (3, 3), their covariances.
     """
 
     start: float

@@ -79,7 +79,7 @@ class PositionSensor(Declared):
     def numbers(self, since: FloatArray, until: FloatArray, most: int) -> IntArray:
         """Return the indices of the latest samples of each run in its time span, shape (M, most).
 
-        `until` is the time at which the samples are needed, so the latest was taken one delay earlier. The
+        `until` is the time at which the samples are needed, so the latest sample is one delay older. The
         indices ascend, padded with -1 at the front.
         """
         last = np.floor((until - self.delay) / self.interval + _SLACK).astype(np.int64)

@@ -5,12 +5,12 @@ Magazine* 26(3), 2006)
 
     u(s+1) = Q u(s) - L e(u(s)),    Q = 1 - forgetting,
 
-where e holds the deviations of force and arrival of all dots of a line. The sensor measures one or two noisy
-numbers per dot, so e is estimated: the mean deviation of the posterior modes when they print with these
-entries, plus a fraction a of the model error, which is the difference between measured and predicted
-readings beyond the noise. L = G+ is the regularised pseudo-inverse of G, the sensitivity of e to the entries
-for the most probable hammer; dots with large deviations have a larger weight. Simulated hammers cost no
-paper: on them the law is iterated until it converges (norm-optimal learning control by Newton's method).
+where e contains the deviations of force and arrival of all dots of a line. The sensor measures one or two
+noisy numbers per dot, so e is estimated: the mean deviation of the posterior modes when they print with these
+entries, plus a fraction a of the model error, which is the difference between measured and predicted readings
+beyond the noise. L = G+ is the regularised pseudo-inverse of G, the sensitivity of e to the entries for the
+most probable hammer; dots with large deviations have a larger weight. Simulated hammers cost no paper: on
+them the law is iterated until it converges (norm-optimal learning control by Newton's method).
 
 Convergence: the difference of two corrections does not grow if no eigenvalue of Q - L (G + a (G' - G))
 exceeds 1 in absolute value, where G' is the sensitivity of the unit. G' is unknown; a starts at 1 and is

@@ -85,7 +85,7 @@ def calibrate(
     sensor: ImpactSensor,
     report: Callable[[], None] = lambda: None,
 ) -> tuple[list[Learner], list[Progress]]:
-    """Calibrate units, each with its own learner; all units are fired with the pulse of the task.
+    """Calibrate units, each with its own learner; return the learners and the progress at every stage.
 
     The simulation is deterministic: the runs of a stage print identical dots, so each stage is simulated
     once, and only the noise of the readings differs. `report` is called after each stage.

@@ -1,13 +1,13 @@
 """Test prints of a learner: test pulses (the ladder), chosen by greedy A-optimal design, and a test line.
 
 The *ladder* is a set of pulses from rest, each called a rung: a single pulse or a pair. The impact times of
-single pulses of different widths separate the strength of the coil from the distance of the pack. They do not
-depend on the stiffness of the paper, since the armature touches before the paper resists. The time of a
-second impact depends on the stiffness: the second pulse of a pair catches the rebounding armature and returns
-it to the paper (pump and probe). Rungs are added one at a time; each step adds the rung that most reduces the
-variance of the estimated single-pulse force, averaged over the production (greedy A-optimal design;
-Pukelsheim, *Optimal Design of Experiments*, 2006, chapter 6). A greedy choice can miss a better combination
-of rungs.
+single pulses of different widths separate the strength of the coil from the distance of the pack. These times
+do not depend on the stiffness of the paper, since the armature touches before the paper resists. The time of
+a second impact depends on the stiffness: the second pulse of a pair catches the rebounding armature and
+returns it to the paper (pump and probe). Rungs are added one at a time; each step adds the rung that most
+reduces the variance of the estimated single-pulse force, averaged over the production (greedy A-optimal
+design; Pukelsheim, *Optimal Design of Experiments*, 2006, chapter 6). A greedy choice can miss a better
+combination of rungs.
 
 `Surrogate` approximates a reading by a quadratic function of the constants, to plan the ladder and to start
 searches. Learners are coroutines that yield print jobs; `printed` runs pending jobs in few ensembles. The
@@ -247,7 +247,7 @@ class Press:
     ) -> tuple[DotTable, Judgement]:
         """Simulate a test line on every hammer; return the dots and their deviations.
 
-        `settings` holds one array of shape (4, entries) per hammer. `pulses` are the waveforms, one per
+        `settings` contains one array of shape (4, entries) per hammer. `pulses` are the waveforms, one per
         hammer; the default is the pulse of the task for all hammers.
         """
         return printed(self.order_line(settings, slots, pulses), self.task)
@@ -317,7 +317,7 @@ def printed(work: Printing[T], task: Task) -> T:
 
 
 def _run(orders: Sequence[Order], effort: Effort) -> list[Printed]:
-    """Simulate print jobs in as few ensembles of at most `_MOST` hammers as possible."""
+    """Simulate print jobs in as few ensembles of at most `_MOST` hammers as possible; return the results."""
     done: list[Printed] = []
     while len(done) < len(orders):
         batch: list[Order] = []

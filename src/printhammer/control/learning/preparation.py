@@ -51,7 +51,7 @@ def law_for(
     threads: int | None = None,
     report: Callable[[], None] = lambda: None,
 ) -> tuple[LearningLaw, CompensationTable]:
-    """Prepare the learning law, with a robust starting table, for a hammer at a slot rate, Hz.
+    """Prepare learning for a hammer at a slot rate, Hz; return the learning law and its starting table.
 
     Arguments are those of `printhammer.learn`.
     """
@@ -93,7 +93,7 @@ def law_for(
 def _law(
     production: Production, entries: Adjustable, members: int, seed: int, forgetting: float, doubt: float
 ) -> LearningLaw:
-    """Choose the test pulses, and fit surrogates of their readings to simulated hammers."""
+    """Build the learning law: choose the test pulses, and fit surrogates to readings of simulated hammers."""
     task, constants = production.task, production.constants
     drawn = production.variability.draw_rows(production.nominal, members, seed)
     press = production.press([hammer for _row, hammer in drawn])

@@ -35,8 +35,8 @@ Sound takes 20 us for 7 mm of air before a microphone."""
 class Production:
     """Model of production variability: maps rows of deviations to hammers and to their sensor readings.
 
-    A row holds, in prior standard deviations, the deviations of the constants, followed by the errors of the
-    sensor: gain of the times, gain of the forces if forces are measured, offset of the times.
+    A row contains, in prior standard deviations, the deviations of the constants, followed by the errors of
+    the sensor: gain of the times, gain of the forces if forces are measured, offset of the times.
     """
 
     task: Task

@@ -109,9 +109,9 @@ class SupplyCheck(Declared):
 class LeastWork(Result, rows="node"):
     """A burst that prints adequate dots with least coil work, from rest to rest.
 
-    The Dataset holds motion and power over time and the pack contacts; the data frame holds the nodes of the
-    current. Saved as CSV, the nodes are a sampled waveform (`printhammer.drive.waveforms.shapes.Sampled`),
-    which, fired once, reproduces the drive of the burst.
+    The Dataset contains motion and power over time and the pack contacts; the data frame contains the nodes
+    of the current. Saved as CSV, the nodes are a sampled waveform
+    (`printhammer.drive.waveforms.shapes.Sampled`), which, fired once, reproduces the drive of the burst.
     """
 
     hammer: Hammer = part("driven hammer")

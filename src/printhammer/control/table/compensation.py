@@ -241,7 +241,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         Raises
         ------
         InputError
-            The table is made for a hammer with another fingerprint, was learned on another unit, or has
+            The table was tuned for a hammer with another fingerprint, was learned on another unit, or has
             pulses that exceed `largest_current`.
         """
         if self.serial and serial not in (self.serial, ANY_UNIT):
@@ -431,7 +431,7 @@ def checked_tick(tick: float | str) -> float:
 
 
 class TableStrategy:
-    """A compensation table as a drive strategy, made by `CompensationTable.strategy`.
+    """A compensation table as a drive strategy, created by `CompensationTable.strategy`.
 
     The pulses have the waveform of the table's hammer, with the widths of the table.
     """

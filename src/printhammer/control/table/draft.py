@@ -218,7 +218,7 @@ _STEP: Final = 0.5e-6  # Step of the finite differences, s
 def polish(draft: Draft) -> None:
     """Improve all entries of a draft in place; the entry from rest is not changed.
 
-    The draft must hold an initial guess for every history of one gap.
+    The draft must contain an initial guess for every history of one gap.
     """
     task = draft.task
     for known in range(1, task.gaps + 1):

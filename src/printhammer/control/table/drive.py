@@ -38,7 +38,7 @@ History = tuple[int, ...]
 
 
 def checked_size(gaps: int, reach: int) -> tuple[int, int]:
-    """Validate the number of gaps and the reach of a compensation table."""
+    """Validate the number of gaps and the reach of a compensation table; return both as integers."""
     for name, value, most in (("history", gaps, MOST_GAPS), ("reach", reach, MOST_REACH)):
         if isinstance(value, bool) or not 1 <= value <= most:
             raise InputError.of(name, value, f"a whole number from 1 to {most}")

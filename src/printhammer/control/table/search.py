@@ -2,13 +2,13 @@
 
 A candidate ("way") consists of a firing time, a pulse width and an optional brake pulse, for a dot that
 follows another dot after a given period. If the first dot is right, the state after the first dot is always
-the same, so the candidates are a function of the period alone. At most periods several candidates make the
-second dot right: fired before, on or after a rebound, and with different brake pulses while the armature
-returns. The bucking current that releases the armature slows it down on its return; Fig. 6 of F. Hendriks,
-*Bounce and Chaotic Motion in Impact Print Hammers* (1983), calls that a quenched response. The candidates
-differ in stability: in a long row on a slightly different hammer, with some the dots
-drift away from the single-pulse dot, with others they return to it. The cost of a candidate is therefore the
-deviation of such a row.
+the same, so the candidates are a function of the period alone. At most periods several candidates print the
+second dot as required: fired before, on or after a rebound, and with different brake pulses while the
+armature returns. The bucking current that releases the armature slows it down on its return; Fig. 6 of F.
+Hendriks, *Bounce and Chaotic Motion in Impact Print Hammers* (1983), calls that a quenched response. The
+candidates differ in stability: in a long row on a slightly different hammer, with some candidates the dots
+drift away from the single-pulse dot, with others they return to the single-pulse dot. The cost of a candidate
+is therefore the deviation of such a row.
 
 Method: (1) at periods `SPACING` apart, start Newton iterations from the best cells of a grid over firing
 time, width and brake pulse, and keep the best few solutions; (2) at every period, re-solve the solutions of
@@ -227,7 +227,7 @@ def _distinct(ways: Ways) -> Ways:
 
 
 def _path(ways: Ways, groups: Sequence[IntArray], jump: float) -> IntArray:
-    """Choose one candidate per group by dynamic programming over costs and branch changes.
+    """Choose one candidate per group by dynamic programming over costs and branch changes; return indices.
 
     A table can be interpolated between two periods only if the branch is the same: if firing times
     relative to the slots differ by at most `jump`, s.

@@ -47,7 +47,7 @@ class Single:
 
 
 def single_of(hammer: Hammer, pulse: Waveform, tolerance: float) -> Single:
-    """Simulate a single pulse from rest."""
+    """Simulate a single pulse from rest; return its dot and the times of departure and settling."""
     known = nominal(hammer, pulse, tolerance=tolerance)
     longest = max(_LONGEST, _WINDOWS * wait_of(hammer, pulse))
     times = np.arange(0.0, longest, _SAMPLE)

@@ -46,10 +46,10 @@ def solve(
 
     `measure` returns deviations (active, shifts, deviations), as fractions of the limits and NaN for a lost
     dot, from all current values, the indices of the active dots, and shifts (shifts, 2) of their values.
-    `start` holds firing time, or advance, and width, s. Derivatives are finite differences with `steps`, s,
-    forward in time and backward in width; a step is at most `longest`, s. A dot is finished at a deviation of
-    `good`; widths stay between `least` and `most`, s. `bounded` clips values in place to their bounds, from
-    all values, the indices of the active dots, and a mask of the dots that made a step.
+    `start` contains firing time, or advance, and width, s. Derivatives are finite differences with `steps`,
+    s, forward in time and backward in width; a step is at most `longest`, s. A dot is finished at a deviation
+    of `good`; widths stay between `least` and `most`, s. `bounded` clips values in place to their bounds,
+    from all values, the indices of the active dots, and a mask of the dots that made a step.
     """
     now, best, best_off = start.copy(), start.copy(), np.full(len(start), np.inf)
     shifts = np.array([(0.0, 0.0), (steps[0], 0.0), (0.0, -steps[1])])

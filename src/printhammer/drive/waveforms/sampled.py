@@ -93,7 +93,7 @@ def read_csv(path: Path) -> Samples:
     Raises
     ------
     InputError
-        The file cannot be read, is empty, lacks units, holds something other than finite numbers at
+        The file cannot be read, is empty, lacks units, contains something other than finite numbers at
         increasing times, or the drive is not zero before time 0.
     """
     what = str(path)
