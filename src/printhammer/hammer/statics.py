@@ -217,7 +217,7 @@ class Work(NamedTuple):
     found: Any
     """Roots, m, with the signs of the force on both sides, shape (3 `MOST_PLACES`, 3)."""
     ascending: Any
-    """Function that sorts the first numbers of the grid and returns the number of different ones."""
+    """Function that sorts the first numbers of the grid, drops duplicates and returns the count."""
 
 
 def equilibria_between(low: float, high: float, current: float, s: Statics, work: Work) -> int:

@@ -3,7 +3,7 @@
 A fit writes these errors with its constants, and the next fit uses them as priors. The table
 ``[uncertainty]`` of the file has the entries ``constants``, their ``standard_errors`` with units, the
 ``correlation`` of each constant with the preceding constants, and ``records``, the fingerprints of the
-records of motion from which the constants were fitted.
+records of motion to which the constants were fitted.
 """
 
 from __future__ import annotations

@@ -245,7 +245,10 @@ class CurrentLaw:
         return np.concatenate(shown)
 
     def missing(self, p: FloatArray) -> dict[str, FloatArray]:
-        """Return the derivatives of the currents with respect to undeclared probe errors, by advice."""
+        """Return the derivatives of the currents with respect to undeclared probe errors.
+
+        The keys are the texts of `SIGNS`, which advise to state or fit the error.
+        """
         short = _SHORT * self.step
         steps = {"offset": 1.0, "gain": 1.0, "delay": short, "time constant": short}
         unstated = [name for name in steps if name not in [error.name for error in self.errors]]

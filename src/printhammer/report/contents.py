@@ -128,7 +128,7 @@ def _both(value: float, unit: str, digits: str, *, other: bool = True) -> str:
 
 
 def _number(value: float, digits: str) -> str:
-    """Format a number with a short exponent and a true minus sign."""
+    """Format a number, with exponents such as "e-5" instead of "e-05", and a true minus sign."""
     return re.sub(r"e(-?)\+?0*(\d)", r"e\1\2", f"{value:{digits}}").replace("-", "−")
 
 
@@ -163,7 +163,7 @@ class Report(Declared):
 
     @property
     def statements(self) -> tuple[int, int]:
-        """Number of the paper's statements that hold, and total number; each panel of Fig. 11 is one."""
+        """Number of statements of the paper that hold, and of all; each panel of Fig. 11 is a statement."""
         pairs = [result.statements for result in self.results]
         return sum(held for held, _ in pairs), sum(made for _, made in pairs)
 

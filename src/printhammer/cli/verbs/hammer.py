@@ -68,7 +68,7 @@ def show(
 
 @verb("hammer check", "printhammer hammer check hendriks-1983")
 def check(hammer: str = opt.NAMED) -> Answer:
-    """Check a hammer file; the exit status is 2 for an error, 0 for warnings."""
+    """Check a hammer file; the exit status is 2 for an error, 0 for warnings only."""
     from printhammer.hammer.hammer import load
 
     loaded = load(hammer)

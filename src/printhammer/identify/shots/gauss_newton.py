@@ -31,7 +31,7 @@ _TIED: Final = 0.98
 _WEAK: Final = 0.1
 """Relative standard error above which a constant is reported as weakly determined."""
 _SHARE: Final = 0.02
-"""Relative component in the degenerate direction above which a message names the constant."""
+"""Component in the degenerate direction, relative to the largest, above which a constant is named."""
 
 
 def condition_number(design: FloatArray) -> float:
