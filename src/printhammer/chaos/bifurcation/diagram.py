@@ -375,7 +375,7 @@ class Bifurcation(Result, rows="direction column"):
         return windows
 
     def _is_strange(self, row: int, k: int) -> bool:
-        """Whether an aperiodic train is chaotic, by the Lyapunov exponent of its continuation."""
+        """Whether an aperiodic train is chaotic, by the Lyapunov exponent of its later firings."""
         x, v = (float(states[row, k, -1]) for states in (self.x, self.v))
         regime = self.regime.with_(self.parameter, float(self.values[k]))
         front = regime.hammer.front

@@ -221,7 +221,7 @@ def _integrate(grid: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatA
 
 
 def _interpolate(grid: FloatArray, values: FloatArray, times: FloatArray) -> FloatArray:
-    """Interpolate rows over evenly spaced times linearly; arguments beyond the ends are clipped."""
+    """Interpolate rows linearly over evenly spaced times; times beyond the ends are clipped."""
     count = grid.shape[1] - 1
     span = np.maximum(grid[:, -1:] - grid[:, :1], 1e-300)
     place = np.clip((times - grid[:, :1]) / span, 0.0, 1.0) * count

@@ -177,7 +177,7 @@ SURE: Final = 0.9
 """Smallest fraction of posterior samples that agree on the better open loop, to choose it; arbitrary."""
 
 TRIED: Final = slots_of(cycle_with_lead_in(6, 0))
-"""Slots of the line on which simulated corrections are evaluated: the de Bruijn cycle of order 6."""
+"""Slots of the line on which corrections are evaluated in simulation: the de Bruijn cycle of order 6."""
 
 
 def _judged_slots() -> tuple[int, ...]:
