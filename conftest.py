@@ -70,7 +70,7 @@ gc.set_threshold(50_000, 20, 20)
 
 
 def pytest_collection_finish() -> None:
-    """Take what stays anyway out of the collector's sight."""
+    """Freeze permanent objects, so that the garbage collector skips them."""
     gc.freeze()
 
 
@@ -126,7 +126,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Compile what most tests need while the workers collect tests; a worker waits for code that it needs."""
+    """Compile the code of most tests while workers collect tests; a worker waits for code it needs."""
     watch_compiling(COMPILING)
     if hasattr(config.option, "loadscopereorder"):
         config.option.loadscopereorder = False
@@ -150,14 +150,14 @@ def pytest_itemcollected(item: pytest.Item) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the files in order: those named above, then the ones with most tests."""
+    """Put the files in order: the files named above, then the files with the most tests."""
     count = Counter(item.path for item in items)
     rank = {name: place for place, name in enumerate(FIRST)}
     items.sort(key=lambda item: (rank.get(item.path.stem, len(FIRST)), -count[item.path]))
 
 
 def compiled() -> bool:
-    """Tell whether the machine code for the hammer of most tests is on disk."""
+    """Whether the machine code for the hammer of most tests is on disk."""
     from printhammer.kernel.compile.specialise import specialise
     from printhammer.run.problem import laws_of
 
@@ -168,5 +168,5 @@ def compiled() -> bool:
 
 @pytest.fixture(scope="session")
 def hammer() -> "ph.Hammer":
-    """Return a hammer that stays as it is; frozen, so that all tests can share it."""
+    """Return an immutable hammer, which all tests can share."""
     return ph.load(CRUDE)

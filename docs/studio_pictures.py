@@ -1,4 +1,4 @@
-"""Pictures of the studio for these pages, by a headless Chromium: python docs/studio_pictures.py."""
+"""Draw the pictures of the studio for the pages with a headless Chromium: python docs/studio_pictures.py."""
 
 import sys
 from pathlib import Path
@@ -10,7 +10,7 @@ STORIES = ("one-dot", "figure-6", "buzz", "second-dot-lost", "strange", "hung-up
 DEVICES = ("bouncing-ball", "relay-5v")
 STATE = "#rate=1250&pulses=9"
 TIMES = (3.9e-4, 1.6e-3, 6.2e-3, 2.5e-3, 1.16e-2, 3.3e-3)
-"""Where the time stands in a story, s."""
+"""Time at which each story is pictured, s."""
 SETTLED = "!window.studio.studio.busy && !window.studio.studio.stale"
 SETTLED += " && !document.querySelector('.outdated')"
 OPENED = f"window.studio?.studio?.frames.map?.detail === 'full' && {SETTLED}"

@@ -1,4 +1,4 @@
-"""What Sphinx and its numpydoc reader make of four kinds of docstrings here, put right."""
+"""Corrections of the way in which Sphinx and its numpydoc reader parse four kinds of docstrings."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ written: dict[str, list[str]] = {}
 
 
 def keep(_app: Sphinx, what: str, name: str, _object: Any, _options: Any, lines: list[str]) -> None:
-    """Remember a property's docstring as it is written."""
+    """Store the docstring of a property before numpydoc processes it."""
     if what == "property" and not any(re.match(r"^\s*-{3,}\s*$", line) for line in lines):
         written[name] = list(lines)
 
 
 def restore(_app: Sphinx, _what: str, name: str, _object: Any, _options: Any, lines: list[str]) -> None:
-    """Undo three readings: "How it ended: ..." as a type, "N." as a list, "a, b" as a type and a name."""
+    """Undo three misreadings: "Word: ..." as a type, "N." as a list, "a, b" as a type and a name."""
     if name in written:
         lines[:] = written.pop(name)
     lines[:] = [LETTER.sub(r"\1\\", line) for line in lines]
@@ -33,7 +33,7 @@ def restore(_app: Sphinx, _what: str, name: str, _object: Any, _options: Any, li
 
 
 def unlink(_app: Sphinx, doctree: nodes.document) -> None:
-    """Make the dimensions of "array, shape (rate, time)" words again, not links to what has such a name."""
+    """Replace links by plain words in shapes such as "shape (rate, time)": dimensions are not names."""
     for link in list(doctree.findall(pending_xref)):
         dimension = link.get("reftype") == "class" and link["reftarget"].islower()
         if dimension and "shape (" in link.parent.astext():
@@ -41,7 +41,7 @@ def unlink(_app: Sphinx, doctree: nodes.document) -> None:
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Connect to autodoc."""
+    """Connect the corrections to the events of autodoc."""
     app.connect("autodoc-process-docstring", keep, priority=BEFORE)
     app.connect("autodoc-process-docstring", restore, priority=AFTER)
     app.connect("doctree-read", unlink)

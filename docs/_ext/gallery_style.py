@@ -1,4 +1,4 @@
-"""The gallery: its order, the look of its pictures, and how they are taken from an example."""
+"""The gallery: order of the examples, style of the figures, and collection of the figures of an example."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ ORDER = (
     "rocking_block",
     "own_part",
 )
-"""The examples in the order in which one would teach them."""
+"""Names of the examples in teaching order."""
 
 STYLE = {
     **style.RC,
@@ -57,17 +57,17 @@ STYLE = {
     "legend.frameon": False,
     "savefig.dpi": 160,
 }
-"""That of the pictures of the program, so that those which an example draws itself look alike."""
+"""Matplotlib style of the program's figures, also for figures that an example draws itself."""
 
 
 class TeachingOrder:
-    """Sort key of the examples; one that is not in the list is an error."""
+    """Sort key of the examples; an example that is not in `ORDER` is an error."""
 
     def __init__(self, folder: str) -> None:
         self.folder = folder
 
     def __call__(self, filename: str) -> int:
-        """Return the place of an example."""
+        """Return the index of an example in `ORDER`."""
         return ORDER.index(Path(filename).stem)
 
     def __repr__(self) -> str:
@@ -75,7 +75,7 @@ class TeachingOrder:
 
 
 def plain_style(_conf: dict[str, Any], _filename: str) -> None:
-    """Set the look of all pictures before an example runs."""
+    """Set the style of all figures before an example runs."""
     import matplotlib as mpl
 
     mpl.use("agg")
@@ -84,17 +84,17 @@ def plain_style(_conf: dict[str, Any], _filename: str) -> None:
 
 
 def figures(_block: Any, variables: dict[str, Any], conf: dict[str, Any]) -> str:
-    """Save the figures that a block has made: those of pyplot, and those that a plot function returns.
+    """Save the figures of a code block: figures of pyplot, and figures that a plot function returns.
 
     Parameters
     ----------
     _block, variables, conf
-        As sphinx-gallery gives them to a scraper.
+        Arguments that sphinx-gallery passes to a scraper.
 
     Returns
     -------
     str
-        reStructuredText that shows them.
+        reStructuredText that shows the figures.
     """
     import matplotlib.pyplot as plt
     from matplotlib.figure import Figure

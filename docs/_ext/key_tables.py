@@ -1,4 +1,4 @@
-"""Tables of the keys of hammer files, made from the declarations in the code."""
+"""Tables of the keys of hammer files, generated from the declarations in the code."""
 
 from __future__ import annotations
 
@@ -28,12 +28,13 @@ MEANINGS = {
 
 
 class KeyTable(SphinxDirective):
-    """The keys of one table of a hammer file, such as ``pack``; ``top`` for those before the first."""
+    """Directive for the keys of a table of a hammer file, such as ``pack``; ``top`` for the keys above all
+    tables."""
 
     required_arguments = 1
 
     def run(self) -> list[nodes.Node]:
-        """Return the table."""
+        """Return the nodes of the table."""
         section = self.arguments[0]
         first = SELECTORS.get(section, "")
         head = ["key", "unit", "meaning", "value"]
@@ -56,7 +57,7 @@ class KeyTable(SphinxDirective):
 
 
 def _cells(model: type[BaseModel]) -> list[list[str]]:
-    """Return key, unit, meaning and what is accepted, of each constant and option of a model."""
+    """Return key, unit, meaning and accepted values of each constant and option of a model."""
     rows = [
         [f"`{name}`", _unit(note), f"{note.meaning} ({note.symbol})", _accepted(note)]
         for name, note in quantities(model).items()
@@ -93,6 +94,6 @@ def _line(cells: list[str]) -> str:
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Register the directive."""
+    """Register the directive with Sphinx."""
     app.add_directive("hammer-keys", KeyTable)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

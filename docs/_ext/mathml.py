@@ -1,4 +1,4 @@
-"""Formulas as MathML, converted when the pages are built: a reader's browser needs no script for them."""
+"""Formulas as MathML, converted when the pages are built, so that a browser needs no script."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ UPRIGHT = re.compile(r"\\mathrm\{([A-Za-z]+)\}")
 
 
 def mathml(latex: str, display: str, node: nodes.Element) -> str:
-    """Return the MathML of a formula; one that becomes faulty is a warning."""
+    """Convert a formula to MathML; warn if the result is invalid."""
     found = convert(UPRIGHT.sub(r"\\text{\1}", latex), display=display)
     # A minus after an opening or an equals sign is a sign, not a difference.
     found = SIGN.sub(r'\1<mo form="prefix">&#x02212;</mo>', found)
@@ -33,13 +33,13 @@ def mathml(latex: str, display: str, node: nodes.Element) -> str:
 
 
 def visit_inline(writer: HTML5Translator, node: nodes.math) -> None:
-    """Write a formula inside a line."""
+    """Write an inline formula."""
     writer.body.append(mathml(node.astext(), "inline", node))
     raise nodes.SkipNode
 
 
 def visit_block(writer: HTML5Translator, node: nodes.math_block) -> None:
-    """Write a formula of its own line, with its number if it has one."""
+    """Write a displayed formula, with its equation number, if any."""
     writer.body.append(writer.starttag(node, "div", CLASS="math"))
     writer.body.append(mathml(node.astext(), "block", node))
     if node["number"]:

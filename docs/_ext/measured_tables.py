@@ -1,4 +1,4 @@
-"""Tables that scripts under docs/measure have measured; at the end of a build, which of them are stale."""
+"""Tables measured by the scripts in docs/measure; a build ends with a list of the stale tables."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ log = getLogger(__name__)
 
 
 class MeasuredTable(SphinxDirective):
-    """A measured table, by its name.
+    """Directive that shows a measured table, by name.
 
-    ``columns`` chooses columns, ``name; name``; ``format`` says how numbers are written, ``name = .2e; ...``.
+    ``columns`` selects columns, ``name; name``; ``format`` sets number formats, ``name = .2e; ...``.
     """
 
     required_arguments = 1
     option_spec: ClassVar = dict.fromkeys(("columns", "format"), directives.unchanged_required)
 
     def run(self) -> list[nodes.Node]:
-        """Return the table, and where it comes from."""
+        """Return the nodes of the table, and of the line that names its script."""
         name = self.arguments[0]
         self.env.note_dependency(str(measured.FOLDER / f"{name}.json"))
         try:
@@ -51,7 +51,7 @@ class MeasuredTable(SphinxDirective):
 def chosen(
     table: measured.Measured, wanted: str, formats: str
 ) -> tuple[list[measured.Column], list[list[measured.Cell]]]:
-    """Return the columns and rows that a page asks for."""
+    """Return the columns and rows that a page selects, with its number formats."""
     places = {column.name: place for place, column in enumerate(table.columns)}
     order = [part.strip() for part in wanted.split(";")] if wanted else list(places)
     given = dict(map(str.strip, part.split("=", 1)) for part in formats.split(";") if part.strip())
@@ -67,7 +67,7 @@ def chosen(
 
 
 def origin(table: measured.Measured) -> str:
-    """Return the line below a table."""
+    """Return the line below a table, which names the script that measured it."""
     if not table.code:
         return f"`{table.command}` measures this; the code of these figures was not recorded."
     marks = {**table.hammers, "code": table.code}
@@ -78,13 +78,13 @@ def origin(table: measured.Measured) -> str:
 
 
 def tell(_app: Sphinx, error: Exception | None) -> None:
-    """Say which tables are stale."""
+    """Report the stale tables at the end of a build."""
     for line in [] if error else measured.report():
         log.info(line)
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Register the directive."""
+    """Register the directive with Sphinx."""
     app.add_directive("measured", MeasuredTable)
     app.connect("build-finished", tell)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,4 +1,4 @@
-"""The studio as a file of the documentation, which the front page shows: ``studio.html``."""
+"""The studio as the file ``studio.html`` of the documentation, shown on the front page."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ NAME = "studio.html"
 
 
 def write_page(app: Sphinx, exception: Exception | None) -> None:
-    """Write the page with all shipped hammers beside the front page."""
+    """Write the studio page with all shipped hammers next to the front page."""
     if exception is not None or app.builder.format != "html":
         return
     from printhammer.studio import Shelf, live_page
@@ -21,6 +21,6 @@ def write_page(app: Sphinx, exception: Exception | None) -> None:
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Register the step at the end of a build."""
+    """Register `write_page` for the end of a build."""
     app.connect("build-finished", write_page)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -196,7 +196,7 @@ class Summary(tuple[str | Facts | Grid, ...]):
 
 
 def worded(each: Any, strike: str) -> Any:
-    """Replace the words "dot" and "printed" in texts, and in facts, tables and sequences of texts."""
+    """Replace "dot" and "printed" by words for the noun `strike` in texts, facts, tables and sequences."""
     if strike == "dot":
         return each
     if isinstance(each, str):

@@ -74,7 +74,7 @@ class Dot(Declared):
 
 
 def touches_of(record: Record) -> list[tuple[Literal["pack", "backstop"], float]]:
-    """Return surface and time, s, of every touch in a run; contacts under way at the start are excluded."""
+    """Return surface and time, s, of every touch in a run; contacts open at the start are excluded."""
     return [
         ("pack" if int(row[0]) == PACK_SURFACE else "backstop", float(row[1]))
         for row in record.contacts

@@ -35,7 +35,7 @@ TOLERANCE: Final = 2e-11
 
 LEAST_TOLERANCE: Final = 1e-15  # Smallest accepted tolerance, near the rounding error of doubles
 LARGEST_TOLERANCE: Final = 1e-5
-"""Largest accepted tolerance; with larger steps the dense output would be inaccurate."""
+"""Largest accepted tolerance; at larger tolerances, long steps would make the dense output inaccurate."""
 
 MAX_STEPS: Final = 50_000_000  # Default largest number of steps of a run
 _NODES: Final = 2048  # Rows of nodes in the smallest working space

@@ -245,7 +245,7 @@ def size_text(size: float) -> str:
 
 
 def identity(spec: Spec) -> dict[str, str]:
-    """Return the properties that all results in a store must share, human-readable ones first."""
+    """Return the properties that all results in a store must share, human-readable properties first."""
     return {
         "store_format": FORMAT,
         **provenance(hammer=spec.base.hammer, tolerance=spec.base.tolerance),
