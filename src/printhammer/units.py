@@ -2,7 +2,7 @@
 
 All internal quantities are floats in SI; units occur in hammer files, drives, tables, the command line and on
 the axes of figures. Units are written in the usual way: "N/m^1.5", "N^0.5 m^0.25/A", "in", "us", "lbf", "1"
-for a pure number; a slash divides by the one factor after it. ``units.txt`` lists the known units.
+for a pure number; a slash divides by the single factor after it. ``units.txt`` lists the known units.
 
 Conversions are correctly rounded: a float stands for its shortest decimal, factors are exact fractions (60
 digits where an exponent is not whole), and the result is rounded once, so that 0.002 in is 5.08e-05 m to the

@@ -1,8 +1,8 @@
 """Base classes of parts: a frozen set of SI constants, a law, and an entry in the registry.
 
-Each part is one file, which holds the law as plain scalar functions of the module (see `printhammer.parts`)
-and a `Part` subclass with the constants, decorated with `register`. The kernel compiles the functions and
-passes them the floats of `packed` as one float64 array `c`.
+Each part is one file, which contains the law as plain scalar functions of the module (see
+`printhammer.parts`) and a `Part` subclass with the constants, decorated with `register`. The kernel compiles
+the functions and passes them the floats of `packed` as one float64 array `c`.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ class MagnetPart(Part):
     def domain(self) -> tuple[float, float]:
         """Range of displacements in which the law is valid, `(x_min, x_max)`, m.
 
-        By default the function ``magnet_domain(q, ends)`` of the module writes it to `ends`.
+        By default the function ``magnet_domain(q, ends)`` of the module writes the range to `ends`.
         """
         ends = [-math.inf, math.inf]
         bounds = self.function("magnet_domain")

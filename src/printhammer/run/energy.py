@@ -178,7 +178,7 @@ class Ledger(Declared):
 def increments_of(problem: Problem, record: Record) -> FloatArray:
     """Integrate work (coil, drive) and losses (pack, backstop, damping) over each step, J.
 
-    Under a voltage drive, further columns hold the supply work and the losses in coil, driver and shorted
+    Under a voltage drive, further columns contain the supply work and the losses in coil, driver and shorted
     turn.
     """
     times = record.nodes[:, 0]

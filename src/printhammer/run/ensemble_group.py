@@ -58,10 +58,10 @@ class Group:
     """Ensemble members with the same laws, overlap rule, kinds of waveform pieces and kind of start.
 
     The group of a member depends on that member only, so that its kernel does not depend on other members.
-    `members` are their indices in the ensemble; `hammers` and `hammer_of` hold the distinct hammers and the
-    index for each member, and `fired` the drives of all members. Each member of the ensemble has a row of
-    `states` (time, displacement, velocity and further components at the start) and an end, s. No run takes
-    more than `max_steps`.
+    `members` lists the indices of the group's members in the ensemble; `hammers` and `hammer_of` are the
+    distinct hammers and the index for each member, and `fired` contains the drives of all members. Each
+    member of the ensemble has a row of `states` (time, displacement, velocity and further components at the
+    start) and an end, s. No run takes more than `max_steps`.
     """
 
     def __init__(

@@ -65,8 +65,8 @@ def window_of(hammer: Hammer, drive: Drive) -> Window:
     The window is that of Fig. 11 if backstop and pack have the positions of the paper. For other hammers the
     half-widths are a sixth of the distance from backstop to pack, as in Fig. 11, and a sixth of the speed
     that the largest force imparts to the armature over that distance; without a backstop or without a pack,
-    they are the scales of the hammer (`printhammer.run.problem.scales_of`). As in Fig. 11 the backstop, or
-    the origin, lies a quarter of the width from the left.
+    the half-widths are the scales of the hammer (`printhammer.run.problem.scales_of`). As in Fig. 11 the
+    backstop, or the origin, lies a quarter of the width from the left.
     """
     place, front = hammer.position, hammer.front
     place = math.nan if place is None else place

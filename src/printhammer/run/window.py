@@ -53,8 +53,8 @@ class Single(NamedTuple):
 def least_wait(waveform: Waveform) -> float:
     """Compute the smallest time from the last firing to the end of a run, s, for any device.
 
-    With a driver the run ends 4 ms after switch-off, with a current or a force 4 ms after the firing, or
-    after its end.
+    With a driver, the run ends 4 ms after switch-off; with a current or a force, 4 ms after the firing or, if
+    later, at the end of the pulse.
     """
     return least_window(waveform.support, waveform.replaces)
 

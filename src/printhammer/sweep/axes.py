@@ -71,7 +71,7 @@ def read_axis(
     """Parse one `[[axis]]` table of a sweep spec.
 
     `own_waveform` is the waveform table of the drive, if any; `named` are the waveforms of a sequence, by
-    name. A grid takes values or a range, a Latin hypercube a range only.
+    name. An axis of a grid has values or a range, an axis of a Latin hypercube only a range.
 
     Raises
     ------

@@ -32,8 +32,8 @@ from printhammer.sweep.spec import Spec
 def latin_hypercube(members: int, seed: int, axes: int) -> FloatArray:
     """Draw a Latin hypercube, shape (members, axes), of numbers in [0, 1).
 
-    Each axis is divided into as many equal strata as there are members; each stratum holds one random point
-    (McKay, Beckman and Conover, Technometrics 21 (1979) 239).
+    Each axis is divided into as many equal strata as there are members; each stratum contains one random
+    point (McKay, Beckman and Conover, Technometrics 21 (1979) 239).
     """
     random = np.random.Generator(np.random.PCG64(seed))
     drawn = np.empty((members, axes))

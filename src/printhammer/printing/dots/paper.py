@@ -1,7 +1,7 @@
 """Paper that varies along the line: stiffness and front of the pack are random functions of position.
 
-Both are normal and independent of each other, with the correlation exp(-d / length) between two positions d
-apart: a first-order autoregressive process. Draws are clipped at three standard deviations.
+Stiffness and front are normal and mutually independent, with the correlation exp(-d / length) between two
+positions d apart: a first-order autoregressive process. Draws are clipped at three standard deviations.
 
 A paper file is TOML with the keys ``stiffness``, ``front``, ``length`` and ``seed``, each of them optional::
 
@@ -11,8 +11,9 @@ A paper file is TOML with the keys ``stiffness``, ``front``, ``length`` and ``se
     seed = 1
 
 On such paper the pack of a hammer changes from firing to firing. The motion is integrated segment by segment.
-A segment ends at the next firing; if the armature is then inside the pack of this segment or of the next one,
-the segment is extended until the armature is inside neither, so that a contact meets a single pack.
+A segment ends at the next firing; if the armature is then inside the pack of this segment or of the next
+segment, the segment is extended until the armature is outside both packs, so that a contact meets a single
+pack.
 """
 
 from __future__ import annotations

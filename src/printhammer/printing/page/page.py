@@ -1,9 +1,9 @@
 """The printed page: position and darkness of every dot on the paper.
 
-Each wire of each print line is a separate simulation from rest; all of them form one ensemble. The carriage
-passes slot n at n / rate after slot 0, at the speed rate x pitch. A dot lands where the carriage is at touch;
-all dots are shifted together by the carriage travel during the flight time of the single pulse, which a
-printer corrects. The remaining offset is the placement error: arrival deviation x carriage speed.
+Each wire of each print line is a separate simulation from rest; all simulations form one ensemble. The
+carriage passes slot n at n / rate after slot 0, at the speed rate x pitch. A dot lands where the carriage is
+at touch; all dots are shifted together by the carriage travel during the flight time of the single pulse,
+which a printer corrects. The remaining offset is the placement error: arrival deviation x carriage speed.
 
 Darkness: the optical density of a dot is that of the single-pulse dot times the ratio of the peak forces, and
 its darkness, the fraction of light absorbed, is 1 - 10^-density. The relation assumes that ink is
@@ -11,7 +11,7 @@ proportional to force, and density to ink. Dots are as wide as the wire.
 
 Print heads: positions and diameter of the wires, and the darkness of a dot. The paper says of the head only
 that its wires are arranged in columns and that the carriage moves a fraction of a metre per second. The
-defaults are assumptions modelled on heads of the time: nine wires, 1/72 in apart and of about that diameter,
+defaults are assumptions modelled on heads of the time: nine wires, 1/72 in apart and about as thick,
 dot columns 1/60 in apart, so that a character of six columns is a tenth of an inch wide; 18 and 24 thinner
 wires over the same height.
 """

@@ -76,7 +76,8 @@ def materials(hammer: Hammer, single: Nominal) -> list[Material]:
 
     Hard backstops have other constants of equations (6) and (7); elastomers follow the law of Kuwabara and
     Kono; packs follow equation (5) with another stiffness, or are a spring with a dashpot. The stiffness of
-    that spring is such that the loading work of the single-pulse dot compresses it to the force of that dot.
+    the pack's spring is such that the loading work of the single-pulse dot compresses the spring to the force
+    of this dot.
     """
     listed = [Material("as it is", "as it is", {})]
     backstop, pack = hammer.backstop, hammer.pack
@@ -351,8 +352,8 @@ def tuned(hammers: Sequence[Hammer], force: float, effort: Effort) -> FloatArray
     """Solve for the amplitude factors with which single pulses print with a given force, N.
 
     The search covers `LEAST` to `MOST` on a grid, then ever finer grids around the crossing where the force
-    first rises through `force`; of several crossings the one nearest to a factor of 1 is refined. Factors are
-    accurate to 1e-6; NaN where no crossing is bracketed.
+    first rises through `force`; of several crossings, the crossing nearest to a factor of 1 is refined.
+    Factors are accurate to 1e-6; NaN where no crossing is bracketed.
     """
     scales = np.tile(np.linspace(LEAST, MOST, _COARSE), (len(hammers), 1))
     factors = np.full(len(hammers), np.nan)

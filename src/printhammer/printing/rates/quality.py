@@ -232,8 +232,8 @@ class Quality(Result):
     def dot_matrix(self) -> bool:
         """Whether no dot is lost and arrivals vary by at most 200 us, the limit for dot matrix printing.
 
-        If every dot is fired at its slot, arrivals vary as the flight times do, for which the paper states
-        the limit.
+        If every dot is fired at its slot, arrival times vary as much as flight times, for which the paper
+        states the limit.
         """
         return self._within(DOT_MATRIX_SPREAD)
 

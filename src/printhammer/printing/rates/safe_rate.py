@@ -353,7 +353,7 @@ def from_rest(*, every: bool) -> list[tuple[int, ...]]:
     """Return the patterns of eight slots, each as the indices of the slots with a dot.
 
     With `every`, all 255 patterns; otherwise the 128 that begin with a dot, which are enough in open loop
-    from rest since the other patterns are delayed copies of these.
+    from rest since the other patterns are delayed copies of these 128.
     """
     patterns = [slots_of(row) for row in eight_slot_patterns()]
     return [slots for slots in patterns if every or slots[0] == 0]

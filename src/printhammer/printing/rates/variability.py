@@ -1,8 +1,9 @@
 """Unit-to-unit variability of a production, and perturbations of a hammer.
 
-`Variability` is a diagonal covariance of the constants: hammers are drawn from a normal distribution, and its
-sigma points lie one standard deviation to either side of the design along each constant. A `Perturbation` is
-a single deviation from the design of a drive: supply, travel, forms, drift.
+`Variability` is a diagonal covariance of the constants: hammers are drawn from a normal distribution, and the
+sigma points lie one standard deviation on either side of the design along each constant. A `Perturbation` is
+a single deviation from the hammer for which a drive was designed: in current, travel, forms, magnet or
+damping.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 ``time=1, current=2*-10 A/V, displacement=3*50 um/V+120 um, delay(current)=2 us``: columns are counted from 1.
 The factor converts the number in the table to the quantity; if the table states a unit for the column, the
 factor is per that unit. An offset is added after multiplication. A delay is the time by which a column lags
-behind the time column. Times of even samples are ``time=-1 ms + 20 us``: first time and step.
+behind the time column. Times of evenly spaced samples are ``time=-1 ms + 20 us``: first time and step.
 
 The file beside ``trace.csv`` is ``trace.csv.toml``::
 
