@@ -74,7 +74,7 @@ def test_kills_at_any_moment(spec_file: Callable[..., Path], tmp_path: Path, byt
         kills += killed(spec, out, blocks, later) == -signal.SIGKILL
     assert kills >= 4
     finished(spec, out)
-    finished(spec, whole)
+    ph.sweep(spec, whole)
     assert bytes_of(out) == bytes_of(whole)
     assert {path.name for path in tmp_path.iterdir()} == {"spec.toml", "killed.zarr", "whole.zarr"}
 
@@ -86,7 +86,7 @@ def test_ctrl_c_keeps_what_is_done(spec_file: Callable[..., Path], tmp_path: Pat
     assert killed(spec, out, 3, 0.0, signal.SIGINT) == 130
     assert 3 <= blocks_done(out) < 120
     finished(spec, out)
-    finished(spec, whole)
+    ph.sweep(spec, whole)
     assert bytes_of(out) == bytes_of(whole)
 
 
@@ -110,5 +110,5 @@ def test_a_file_that_cannot_grow_is_told_and_what_is_done_stays(
     assert "Traceback" not in failed.stderr
     assert blocks_done(out) == done
     finished(spec, out)
-    finished(spec, whole)
+    ph.sweep(spec, whole)
     assert bytes_of(out) == bytes_of(whole)

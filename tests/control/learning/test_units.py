@@ -32,6 +32,12 @@ def apart(learner: Learner, row: np.ndarray) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
+def at_safe_rate() -> LearningLaw:
+    """Return a law for times alone near the safe rate."""
+    return law_for(nominal(), 850.0, members=100)[0]
+
+
+@pytest.fixture(scope="module")
 def learned(law: LearningLaw) -> tuple[list[Learner], list[Progress]]:
     """Return what two units learn from times and forces."""
     return calibrate(law, Variability().draw(nominal(), 2, 5), SENSOR)
@@ -107,12 +113,11 @@ def test_a_hidden_offset_of_the_sensor_costs_nothing(by_time: LearningLaw, delay
 
 
 @pytest.mark.slow
-def test_nothing_is_lost_where_the_own_pulse_prints_every_dot() -> None:
+def test_nothing_is_lost_where_the_own_pulse_prints_every_dot(at_safe_rate: LearningLaw) -> None:
     """Near the safe rate the fast switch loses a third of a row that the own pulse of the hammer prints."""
-    law = law_for(nominal(), 850.0, members=100)[0]
     (unit,) = Variability().times(0.5).draw(nominal(), 1, 1)
-    _learners, stages = calibrate(law, [unit], ImpactSensor(seed=7))
-    assert (worse(law, unit, stages) <= 0.0).all()
+    _learners, stages = calibrate(at_safe_rate, [unit], ImpactSensor(seed=7))
+    assert (worse(at_safe_rate, unit, stages) <= 0.0).all()
 
 
 class Hidden(ImpactSensor):
@@ -125,14 +130,13 @@ class Hidden(ImpactSensor):
 
 @pytest.mark.slow
 def test_no_unit_is_below_the_better_open_loop_where_the_readings_decide(
-    monkeypatch: pytest.MonkeyPatch,
+    at_safe_rate: LearningLaw, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """After one run of random units at the safe rate; otherwise the result says that they do not decide."""
     monkeypatch.setattr("printhammer.control.learning.learn.RUNS", RUNS[:1])
-    law, count = law_for(nominal(), 850.0, members=100)[0], 6
-    units = Variability().draw(nominal(), count, 4403)
-    stages = calibrate(law, units, Hidden(seed=3))[1]
-    below = np.array([worse(law, unit, stages, k)[0] for k, unit in enumerate(units)])
+    units = Variability().draw(nominal(), 6, 4403)
+    stages = calibrate(at_safe_rate, units, Hidden(seed=3))[1]
+    below = np.array([worse(at_safe_rate, unit, stages, k)[0] for k, unit in enumerate(units)])
     decided = stages[1].learned | (stages[1].loop_certainty >= SURE)
     assert decided.any()
     assert (below[decided] <= 0.0).all()
