@@ -37,6 +37,7 @@ ELSEWHERE = {
     "search": "the other examples begin with a shorter one",
     "judge": "the example of family begins with the same commands",
     "base-rates": "test_verbs.py, with claims at no cost",
+    "front": "test_verbs.py, with claims at no cost; the example of family begins with the same search",
     "ship": "test_verbs.py, with the stated claims",
 }
 

@@ -137,6 +137,12 @@ def test_the_best_are_judged_once(cli: Callable, here: Path, cheap: None) -> Non
     assert table.hammers == 3
     assert table.candidates == 128
     assert table.claims[SHAPE].measured == 3
+    # All have as many panels and claims, so that none is beaten.
+    done = cli("front", "judged.jsonl", "--core-hours", "2", "--out", "front.csv")
+    assert done.status == 0
+    assert "3 judged hammers, 3 on the front" in done.out
+    lines = (here / "front.csv").read_text().splitlines()
+    assert [line.split(",")[1:3] for line in lines[-3:]] == [["9", str(len(claims()) - 1)]] * 3
 
 
 def test_base_rates_are_counted(cli: Callable, here: Path, cheap: None) -> None:
