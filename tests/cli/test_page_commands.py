@@ -35,8 +35,8 @@ ELSEWHERE = {
 }
 # What takes minutes as printed runs with fewer values.
 FEWER = {
-    "--values 2000": "--values 20",
-    "'2e10 N s/m^2.5' --to '6e10 N s/m^2.5'": "'2e10 N s/m^2.5' --to '6e10 N s/m^2.5' --values 10",
+    "--values 2000": "--values 8",
+    "'2e10 N s/m^2.5' --to '6e10 N s/m^2.5'": "'2e10 N s/m^2.5' --to '6e10 N s/m^2.5' --values 4",
     "--from '1.39 ms' --to '1.41 ms'": "--from '1.39 ms' --to '1.41 ms' --values 20",
     "--steps 111": "--steps 4 --firings 200",
     "--longest 3 --starts 2000 --guesses 100": "--longest 1 --starts 50 --guesses 10",
@@ -47,7 +47,7 @@ FEWER = {
     "orbits mine.toml": "orbits mine.toml --longest 1 --starts 20",
     "tune mine.toml": "tune mine.toml --history 1 --no-judge",
     "--longest 4": "--longest 1 --starts 20",
-    "--longest 3 --out regimes": "--longest 1 --seeds 1 --most 20 --out regimes",
+    "'1300 Hz' --longest 3 --out regimes": "'720 Hz' --longest 1 --seeds 1 --most 10 --out regimes",
     "learn hendriks-1983-1": "learn hendriks-1983-1 --members 100",
     "--doublings 1": "--doublings 1 --most 20",
     "--second backstop": "--grid 3 --most 5 --second backstop",
