@@ -63,6 +63,7 @@ def lowered_modules() -> Files:
     from printhammer.kernel.compile.modules import Module, every_template, laws_of, plain_template
     from printhammer.kernel.model.laws import LAW_FUNCTIONS, Laws
     from printhammer.parts import PARTS
+    from printhammer.parts.friction import DryFriction
     from printhammer.parts.spring.forces import ForceSum
     from printhammer.run.plain import entries
 
@@ -79,8 +80,7 @@ def lowered_modules() -> Files:
     yield from map(lowered, (*every_template(), *entries.templates(), scheme))
     for role in LAW_FUNCTIONS:
         parts = {part.__module__ for (known, _), part in PARTS.items() if known == role}
-        if role == ForceSum.role:
-            parts.add(ForceSum.__module__)
+        parts |= {part.__module__ for part in (ForceSum, DryFriction) if part.role == role}
         for name in ("", *sorted(parts)):
             bindings = bindings_of(Laws(**{**_ABSENT, role: name}))
             yield from (lowered(laws_of(role, bindings, for_lanes)) for for_lanes in (False, True))

@@ -212,7 +212,8 @@ def test_a_page_fires_records_and_drivers_of_the_coil(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_page_follows_forces_and_contacts(tmp_path: Path) -> None:
+@pytest.mark.parametrize("dry", [False, True])
+def test_a_page_follows_forces_and_contacts(tmp_path: Path, dry: bool) -> None:
     contact = {"law": "hertz", "side": "front", "position": 0.3e-3, "stiffness": 1e5}
     hammer = ph.Hammer.build(1e-3, name="listed").replace(
         {
@@ -222,6 +223,9 @@ def test_a_page_follows_forces_and_contacts(tmp_path: Path) -> None:
             "contact.make": contact,
         }
     )
+    if dry:
+        hammer = hammer.replace("force.guide", {"law": "friction", "kinetic": 0.1, "static": 0.3})
+    assert describe(hammer)["dry"] == dry
     wave = {"shape": "half-sine", "amplitude": 3.0, "width": 1.5e-3, "quantity": "force"}
     state = {**STATE, "hammer": "listed", "waveform": wave, "rate": 300.0, "pulses": 3}
     assert [control["key"] for control in describe(hammer)["constants"]] == [

@@ -8,17 +8,18 @@ import math
 
 import numpy as np
 import pytest
-from tests.oracle.list_laws import Constant, Contact, Drive, Piece, Spring, Stop, System, gravity
+from tests.oracle.list_laws import Constant, Contact, Drive, Friction, Piece, Spring, Stop, System, gravity
 from tests.oracle.list_steps import Run
 from tests.oracle.lists import simulate
 
 import printhammer as ph
+from printhammer.run.motion import Motion
 
 END = 6e-3
 STROKE = 1e-3
 
 
-def draw(rng: np.random.Generator) -> tuple[ph.Hammer, ph.PulseTrain, System]:
+def draw(rng: np.random.Generator, *, dry: bool = False) -> tuple[ph.Hammer, ph.PulseTrain, System]:
     """Return a hammer with a rigid backstop at 0, its drive, and the same system for the oracle."""
 
     def log(low: float, high: float) -> float:
@@ -47,6 +48,15 @@ def draw(rng: np.random.Generator) -> tuple[ph.Hammer, ph.PulseTrain, System]:
         law = "hertz" if exponent == 1.5 else "linear"
         terms[f"contact.c{i}"] = {"law": law, "side": side, "position": position, "stiffness": k}
         contacts.append(Contact(f"c{i}", side, position, k, exponent))
+    frictions = []
+    if dry:
+        kinetic = log(0.1, 1.0)
+        static = kinetic * (1.0 if rng.random() < 0.3 else float(rng.uniform(1.0, 2.5)))
+        terms["force.guide"] = {"law": "friction", "kinetic": kinetic, "static": static}
+        frictions.append(Friction(kinetic, static))
+        if rng.random() < 0.3:
+            terms["force.seal"] = {"law": "friction", "kinetic": 0.05}
+            frictions.append(Friction(0.05, 0.05, "seal"))
     for key, term in terms.items():
         hammer = hammer.replace(key, term)
     period, pulses = width + log(0.2e-3, 2e-3), 3
@@ -55,7 +65,9 @@ def draw(rng: np.random.Generator) -> tuple[ph.Hammer, ph.PulseTrain, System]:
         for n in range(pulses)
     )
     stop = Stop("backstop", "back", 0.0, restitution)
-    system = System(mass, tuple(forces), (Drive(pieces),), contacts=tuple(contacts), stops=(stop,))
+    system = System(
+        mass, tuple(forces), (Drive(pieces),), tuple(frictions), contacts=tuple(contacts), stops=(stop,)
+    )
     return hammer, ph.PulseTrain(hammer.waveform, period=period, pulses=pulses), system
 
 
@@ -66,13 +78,13 @@ def horizon(system: System, x: float, v: float, times: np.ndarray, truth: Run) -
     return int(np.argmax(apart)) if apart.any() else times.size
 
 
-def check(seed: int, count: int) -> int:
-    """Compare random hammers; return the number of closings compared."""
-    rng = np.random.default_rng([38, seed])
-    closings = 0
+def check(seed: int, count: int, *, dry: bool = False) -> tuple[int, int]:
+    """Compare random hammers; return the numbers of closings and of sticking phases compared."""
+    rng = np.random.default_rng([38, seed, 1] if dry else [38, seed])
+    closings = sticks = 0
     times = np.linspace(0.0, END, 121)
     for _ in range(count):
-        hammer, drive, system = draw(rng)
+        hammer, drive, system = draw(rng, dry=dry)
         x, v = float(rng.uniform(0.05, 0.3)) * STROKE, float(rng.uniform(-0.5, 0.5))
         motion = ph.simulate(hammer, drive, duration=END, times=times, state=(x, v), tolerance=1e-12)
         truth = simulate(system, x, v, END)
@@ -90,16 +102,50 @@ def check(seed: int, count: int) -> int:
         hits = [e.time for e in truth.events if e.kind == "impact" and abs(e.v) > 1e-3 and e.time < end]
         blows = [each.t_in for each in motion.contacts if (each.v_out or 0.0) > 1e-3 and each.t_in < end]
         np.testing.assert_allclose(blows, hits, rtol=0.0, atol=1e-10)
-    return closings
+        sticks += check_sticks(motion, truth, end)
+    return closings, sticks
+
+
+def check_sticks(motion: Motion, truth: Run, end: float) -> int:
+    """Compare the sticking phases up to a time; return their number."""
+    mine = [(each.t_in, each.t_out) for each in motion.sticks if each.t_in < end]
+    found: list[tuple[float, float | None]] = []
+    for event in truth.events:
+        if event.kind == "stick":
+            found.append((event.time, None))
+        elif event.kind == "release" and found and found[-1][1] is None:
+            found[-1] = (found[-1][0], event.time)
+    found = [each for each in found if each[0] < end]
+    assert len(mine) == len(found)
+    for (t_in, t_out), (time_in, time_out) in zip(mine, found, strict=True):
+        assert t_in == pytest.approx(time_in, abs=1e-10)
+        if t_out is not None and t_out < end:
+            assert t_out == pytest.approx(time_out, abs=1e-10)
+    return len(mine)
 
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_random_lists(seed: int) -> None:
-    assert check(seed, 6) > 12
+    assert check(seed, 6)[0] > 12
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(100, 105))
 def test_many_random_lists(seed: int) -> None:
     """Seeds up to 119, a thousand lists in all, passed when the lists were added."""
-    assert check(seed, 50) > 100
+    assert check(seed, 50)[0] > 100
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_random_lists_with_dry_friction(seed: int) -> None:
+    closings, sticks = check(seed, 6, dry=True)
+    assert closings > 0
+    assert sticks > 3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(100, 105))
+def test_many_random_lists_with_dry_friction(seed: int) -> None:
+    closings, sticks = check(seed, 50, dry=True)
+    assert closings > 50
+    assert sticks > 50

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy.linalg import expm
-from scipy.optimize import minimize_scalar
+from tests.oracle.den_hartog import DenHartog
 from tests.oracle.list_laws import Damping, Drive, Friction, Piece, Spring, Stop, System
 from tests.oracle.list_steps import Run
 from tests.oracle.lists import simulate
@@ -17,36 +17,8 @@ def kinds(run: Run) -> list[tuple[str, str]]:
     return [(event.kind, event.name) for event in run.events]
 
 
-class DenHartog:
-    """Symmetric motion without stops of x'' + x + f sgn(x') = a cos(β t + φ), from x = x0, v = 0 at t = 0.
-
-    Half a cycle, v < 0, is x = f (1 - cos t - βU sin t) + aV cos(β t + φ), V = 1/(1 - β²), U = tan(π/2β)/β.
-    x(0) = -x(π/β) = x0 and x'(0) = 0 give aV cos φ = x0 and aV sin φ = -f U, so x0² = (aV)² - (f U)².
-    v < 0 in between needs x0 > f S/β², S the maximum of β (sin t + βU (cos β t - cos t))/sin β t; its limit
-    at t = 0 is 1, where the other forces at the turn are f. (Den Hartog, Trans. ASME 53 (1931) 107.)
-    """
-
-    def __init__(self, beta: float, f: float) -> None:
-        self.beta, self.f = beta, f
-        self.big_u, self.big_v = math.tan(0.5 * math.pi / beta) / beta, 1.0 / (1.0 - beta**2)
-        half = math.pi / beta
-        grid = np.linspace(0.0, half, 4002)[1:-1]
-        top = float(grid[np.argmax(self.ratio(grid))])
-        near = (max(top - half / 4000.0, 1e-9), min(top + half / 4000.0, half - 1e-9))
-        self.best = minimize_scalar(
-            lambda t: -self.ratio(t), bounds=near, method="bounded", options={"xatol": 1e-12}
-        )
-        self.big_s = max(1.0, -float(self.best.fun))
-        self.boundary = f * math.hypot(self.big_s / beta**2, self.big_u) / abs(self.big_v)
-
-    def ratio(self, t: np.ndarray) -> np.ndarray:
-        b = self.beta
-        return b * (np.sin(t) + b * self.big_u * (np.cos(b * t) - np.cos(t))) / np.sin(b * t)
-
-    def motion(self, a: float) -> tuple[float, float]:
-        """Amplitude x0 and phase φ."""
-        x0 = math.sqrt((a * self.big_v) ** 2 - (self.f * self.big_u) ** 2)
-        return x0, math.atan2(-self.f * self.big_u / (a * self.big_v), x0 / (a * self.big_v))
+class DenHartogRun(DenHartog):
+    """The motion without stops, computed by the oracle."""
 
     def run(self, a: float, static: float, cycles: float) -> tuple[Run, float, float]:
         x0, phase = self.motion(a)
@@ -58,7 +30,7 @@ class DenHartog:
 
 @pytest.mark.parametrize("beta", [0.42, 0.7, 1.4, 2.5])
 def test_den_hartog_motion(beta: float) -> None:
-    exact = DenHartog(beta, 0.3)
+    exact = DenHartogRun(beta, 0.3)
     a = 1.1 * exact.boundary
     run, x0, phase = exact.run(a, 0.3, 5.0)
     assert run.events == []
@@ -75,7 +47,7 @@ def test_den_hartog_motion(beta: float) -> None:
 
 @pytest.mark.parametrize("beta", [0.38, 0.42, 0.7, 1.4, 2.5])
 def test_den_hartog_boundary_of_motion_without_stops(beta: float) -> None:
-    exact = DenHartog(beta, 0.3)
+    exact = DenHartogRun(beta, 0.3)
     free, _x0, _phase = exact.run(exact.boundary * (1.0 + 1e-8), 0.3, 3.0)
     assert free.events == []
     stopped, _x0, _phase = exact.run(exact.boundary * (1.0 - 1e-8), 0.3, 1.0)
@@ -86,7 +58,7 @@ def test_den_hartog_boundary_of_motion_without_stops(beta: float) -> None:
 @pytest.mark.parametrize("beta", [0.7, 1.4])
 def test_a_larger_static_force_moves_the_boundary(beta: float) -> None:
     """At a turn the other forces are x0 β²; they must exceed the static force (Shaw 1986)."""
-    exact, static = DenHartog(beta, 0.3), 0.45
+    exact, static = DenHartogRun(beta, 0.3), 0.45
     boundary = math.hypot(static / beta**2, 0.3 * exact.big_u) / abs(exact.big_v)
     assert exact.run(boundary * (1.0 + 1e-9), static, 3.0)[0].events == []
     assert exact.run(boundary * (1.0 - 1e-9), static, 0.1)[0].events[0].kind == "stick"
@@ -250,7 +222,7 @@ def test_multipliers_of_den_hartog_motion(beta: float) -> None:
     a cycle a velocity dv moves the next turn by -dv/a. So |λ|² = d < 1: stable, marginal only where β = 1/n
     (Shaw, J. Sound Vib. 108 (1986) 305; Csernák, Stépán & Shaw, Nonlinear Dyn. 50 (2007) 93).
     """
-    exact = DenHartog(beta, 0.3)
+    exact = DenHartogRun(beta, 0.3)
     a = 1.3 * exact.boundary
     run, x0, _phase = exact.run(a, 0.3, 2.0)
     d = (x0 * beta**2 - 0.3) / (x0 * beta**2 + 0.3)

@@ -17,6 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from printhammer.derivatives.parameters import Parameter, as_arrays, rest_changes
+from printhammer.errors import InputError
 from printhammer.kernel.compile.specialise import variational
 from printhammer.kernel.model import modes as M
 from printhammer.kernel.model.layout import (
@@ -37,6 +38,8 @@ from printhammer.kernel.model.layout import (
 from printhammer.kernel.model.modes import PAUSED, STATUS_NAMES
 from printhammer.kernel.variational import layout as V
 from printhammer.kernel.variational.layout import SPACING
+from printhammer.parts.friction import DryFriction
+from printhammer.parts.spring.forces import Friction
 from printhammer.results import Declared, part
 from printhammer.run.problem import Problem, Record, Stretch
 from printhammer.support.arrays import FloatArray
@@ -105,6 +108,13 @@ def carry_columns(
     renormalise : bool, optional
         Whether to orthonormalise the columns at each step and record the growth.
     """
+    if isinstance(problem.hammer.damping, DryFriction):
+        key = next(key for key, law in problem.hammer.laws.items() if law == Friction.law)
+        raise InputError(
+            f"{key}: there are no derivatives of a motion under dry friction",
+            key=key,
+            expected="no dry friction for exponents, orbits found by Newton's method and sensitivities",
+        )
     forced, circuit, count = forcing is not None, problem.laws.circuit, initial.shape[1]
     rows = V.row_count(forced, circuit)
     if circuit and len(initial) == V.ENERGY:

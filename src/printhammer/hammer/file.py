@@ -28,9 +28,10 @@ from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError, located, nearest
 from printhammer.hammer.uncertainty import UNCERTAINTY, Uncertainty, read_uncertainty
 from printhammer.parts import PARTS, ROLES, BackstopPart, MagnetPart, PackPart, Part, laws
+from printhammer.parts.friction import DryFriction, with_friction
 from printhammer.parts.functions import check_functions
 from printhammer.parts.outside import load_installed
-from printhammer.parts.spring.forces import TERMS, ForceSum, Term, sum_of
+from printhammer.parts.spring.forces import TERMS, ForceSum, Friction, Term, sum_of
 from printhammer.support.constants import (
     STATUSES,
     Constant,
@@ -202,7 +203,11 @@ def _build(
             keys = [f"{section}.{name}" for name in table if name != selector]
             # An option may name a file that has changed since, so that it is read again.
             same = known is not None and table is before.get(section) and known.constants.keys() >= set(keys)
-            if same and known is not None and not isinstance(known.parts.get(section), ForceSum):
+            if (
+                same
+                and known is not None
+                and not isinstance(known.parts.get(section), (ForceSum, DryFriction))
+            ):
                 made[section] = known.parts.get(section, known.waveform)
                 constants |= {key: known.constants[key] for key in keys}
                 continue
@@ -217,8 +222,13 @@ def _build(
         for section in TERMS
         for entry in entries_of(document, section)
     }
-    if terms:
-        made["spring"] = sum_of(made.get("spring"), terms, body.mass)
+    frictions = [term for term in terms.values() if isinstance(term, Friction)]
+    if frictions:
+        made["damping"] = with_friction(made.get("damping"), frictions)
+        _check_friction(made.get("backstop"))
+    if len(terms) > len(frictions):
+        added = {key: term for key, term in terms.items() if not isinstance(term, Friction)}
+        made["spring"] = sum_of(made.get("spring"), added, body.mass)
     contents = Contents(
         **texts,
         views=_views(document),
@@ -231,6 +241,13 @@ def _build(
     )
     _check_order(contents)
     return contents
+
+
+def _check_friction(backstop: Part | None) -> None:
+    """Raise InputError for an elastic backstop: its contact is integrated without dry friction."""
+    if backstop is not None and not getattr(import_module(backstop.module), "RIGID", False):
+        expected = "rigid beside dry friction, or a [[contact]] with side = 'back' in its place"
+        raise InputError.of("backstop.law", backstop.law, expected)
 
 
 def _views(document: Mapping[str, Any]) -> tuple[str, ...]:

@@ -25,6 +25,7 @@ from printhammer.hammer.edit import Edit, changed, changed_text, edit_of
 from printhammer.hammer.file import FORMAT, Contents, build, file_options, read_document
 from printhammer.hammer.uncertainty import UNCERTAINTY, Uncertainty
 from printhammer.parts import BackstopPart, CoilPart, DampingPart, MagnetPart, PackPart, Part, SpringPart
+from printhammer.parts.friction import DryFriction
 from printhammer.parts.spring.forces import ForceSum, Term
 from printhammer.support.arguments import checked
 from printhammer.support.constants import Constant, quantities
@@ -240,10 +241,11 @@ class Hammer:
     def laws(self) -> dict[str, str]:
         """Laws of parts, forces and contacts, and the shape of the waveform, by table of the file."""
         laws = {role: part.law for role, part in self.parts.items()}
-        if isinstance(self.spring, ForceSum):
-            laws.pop("spring")
-            if "spring" in self._document:
-                laws["spring"] = self._document["spring"]["law"]
+        for role, part in (("spring", self.spring), ("damping", self.damping)):
+            if isinstance(part, (ForceSum, DryFriction)):
+                laws.pop(role)
+                if role in self._document:
+                    laws[role] = self._document[role]["law"]
         laws |= {key: term.law for key, term in self.terms.items()}
         return laws | ({} if self.waveform is None else {"waveform": self.waveform.shape})
 

@@ -18,7 +18,8 @@ pack      ``MEMORY``, ``pack_loading(c, x, v)``, ``pack_memory(c, peak)``, ``pac
           ``pack_switch(c, x, v)``
 backstop  ``RIGID``, ``backstop_rebound(c, v_in)``, or with w = sqrt(b - x) ``backstop_elastic(c, w)``,
           ``backstop_viscous(c, w, v)``, ``backstop_energy(c, w)``, ``backstop_switch(c, w, v)``
-damping   ``damping_force(c, v)``
+damping   ``damping_force(c, v)``; with dry friction also ``FRICTION`` = True and ``friction_force(c, k)``,
+          the kinetic (k = 0) and the static friction (k = 1)
 ========  ===================================================================================================
 
 ============  ===============================================================================================

@@ -11,6 +11,7 @@ from typing import Any
 MEMORY = False
 RIGID = False
 LEVELS = False
+FRICTION = False
 
 
 def magnet_force(c: Any, x: float, current: float) -> float:
@@ -80,6 +81,11 @@ def pack_switch(c: Any, x: float, v: float) -> float:
 
 def damping_force(c: Any, v: float) -> float:
     """Return 0 N, the damping force: the hammer has no damping."""
+    return 0.0
+
+
+def friction_force(c: Any, k: float) -> float:
+    """Return 0 N, the dry friction: the hammer has none."""
     return 0.0
 
 

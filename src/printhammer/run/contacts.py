@@ -1,4 +1,4 @@
-"""Contacts, closings and dots of a run, and tables of the dots of an ensemble."""
+"""Contacts, closings, sticking phases and dots of a run, and tables of the dots of an ensemble."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from printhammer.drive.batch import Ragged
 from printhammer.kernel.model import dots as layout
 from printhammer.kernel.model.dots import DOT
-from printhammer.kernel.model.modes import PACK_SURFACE
+from printhammer.kernel.model.modes import HELD, PACK_SURFACE
 from printhammer.kernel.readout import contacts as readout
 from printhammer.kernel.readout.sums import PARTIALS
 from printhammer.parts.spring.forces import LinearContact
@@ -251,6 +251,32 @@ class Closing(Declared):
     depth: float = scalar("m", "largest indentation")
     peak_force: float = scalar("N", "largest contact force")
     initial: bool = part("whether the contact was closed at the start of the run")
+
+
+class Stick(Declared):
+    """Interval during which dry friction holds the armature at rest."""
+
+    t_in: float = scalar("s", "time of the stop", more="start of the run if the armature was held then")
+    t_out: float | None = scalar("s", "time of release", more="None while the armature is held")
+    x: float = scalar("m", "displacement")
+    initial: bool = part("whether the armature was held at the start of the run")
+
+
+def sticks_of(record: Record) -> list[Stick]:
+    """Return the sticking phases of a run under dry friction, in order of time."""
+    nodes = record.nodes
+    held = nodes[:, 3] > HELD
+    # The last node has no step; it ends a phase only if the armature is released there.
+    held[-1] = len(held) > 1 and held[-2]
+    changes = np.flatnonzero(np.diff(held)) + 1
+    sticks = []
+    for first, last in pairwise([0, *changes.tolist(), len(held)]):
+        if held[first]:
+            t_out = float(nodes[last, 0]) if last < len(held) else None
+            sticks.append(
+                Stick(t_in=float(nodes[first, 0]), t_out=t_out, x=float(nodes[first, 1]), initial=first == 0)
+            )
+    return sticks
 
 
 def extrema(problem: Problem, record: Record, sign: float) -> tuple[FloatArray, FloatArray]:

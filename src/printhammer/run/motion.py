@@ -17,6 +17,7 @@ import numpy.typing as npt
 from printhammer.drive.trains import Drive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
+from printhammer.parts.friction import DryFriction
 from printhammer.results import Column, Result, Rows, derived, provenance
 from printhammer.results.declare import columns_of
 from printhammer.results.files import write_csv, write_parquet
@@ -35,11 +36,13 @@ from printhammer.run.contacts import (
     Closing,
     Contact,
     Dot,
+    Stick,
     closings_of,
     contact_rows,
     contacts_of,
     dots_of,
     extrema,
+    sticks_of,
 )
 from printhammer.run.energy import CoilWork, Ledger, coil_work_of, increments_of, ledger_of
 from printhammer.run.problem import Problem, Record, message_of
@@ -290,6 +293,12 @@ class Motion(Result, fields=False):
         return Rows(closings_of(self._problem, self._record), Closing)
 
     @cached_property
+    def sticks(self) -> Rows[Stick]:
+        """Phases in which dry friction holds the armature, in order of time; empty without dry friction."""
+        is_dry = isinstance(self.hammer.damping, DryFriction)
+        return Rows(sticks_of(self._record) if is_dry else [], Stick)
+
+    @cached_property
     def dots(self) -> Rows[Dot]:
         """Dots of all firings up to the end of the run, in order; a tuple, shown as a table."""
         return Rows(dots_of(self._problem, self._record, self._contact_rows, self._increments), Dot)
@@ -362,6 +371,9 @@ class Motion(Result, fields=False):
             count = f"{len(own)} {'closing' if len(own) == 1 else 'closings'}"
             largest = quantity(max(each.peak_force for each in own), "N")
             rows.append((name, f"{count} from {quantity(own[0].t_in, 's')}, up to {largest}"))
+        if self.sticks:
+            first = quantity(self.sticks[0].t_in, "s")
+            rows.append(("held by friction", f"{len(self.sticks)} x, first at {first}"))
         energies = Facts([*rows, *self._energy_facts()])
         if self.drive.quantity != "current" and self.hammer.pack is None:
             return Summary([energies])

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.drive.waveforms.drivers import Rail
 from printhammer.hammer.names import Range, range_of
+from printhammer.parts.friction import DryFriction
 from printhammer.parts.spring.forces import TERMS, Gravity
 from printhammer.support.constants import Constant, quantities
 
@@ -78,11 +79,13 @@ def span_of(hammer: Hammer, key: str, factor: float) -> Range | None:
     """Return the range of the control of a constant; None for a constant without a control.
 
     Coil constants that the hammer file leaves out have a control, too. If the file lists additional forces or
-    contacts, the page receives only their sum with the spring: the constants of spring, forces and contacts,
-    and the mass if a force is its weight, then have no control.
+    contacts, the page receives only their sum with the spring, or with the damping for dry friction: the
+    constants of these parts, and the mass if a force is its weight, then have no control.
     """
     section = key.partition(".")[0]
     if section == "waveform" or section in TERMS or (hammer.terms and section == "spring"):
+        return None
+    if section == "damping" and isinstance(hammer.damping, DryFriction):
         return None
     if key == "mass" and any(isinstance(term, Gravity) for term in hammer.terms.values()):
         return None

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, get_args
 
 from printhammer.drive.waveforms.drivers import DRIVERS, Rail
 from printhammer.drive.waveforms.shapes import SHAPES, Sine, Waveform
+from printhammer.parts.friction import DryFriction
 from printhammer.studio import bounds
 from printhammer.studio.coil import by_voltage, open_constants, rail_of, span_of
 from printhammer.support.constants import quantities
@@ -117,7 +118,7 @@ def describe(hammer: Hammer) -> dict[str, Any]:
         `rail` (default rail driver, or None), `combined` (controls that change several constants),
         `waveform` (shape and constants, or None), `start` (entries of the initial state that differ from the
         default), `places` (positions), the nouns `strike`, `struck` and `mover`, `views` (those listed in
-        the hammer file), and `rigid` (whether the backstop is rigid).
+        the hammer file), `rigid` (whether the backstop is rigid), and `dry` (whether dry friction acts).
     """
     constants = []
     for key, constant in hammer.constants.items():
@@ -139,6 +140,7 @@ def describe(hammer: Hammer) -> dict[str, Any]:
         "mover": hammer.mover,
         "views": list(hammer.views),
         "rigid": hammer.backstop is not None and hammer.backstop.law == "rigid",
+        "dry": isinstance(hammer.damping, DryFriction),
     }
 
 

@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.laws import Laws
 
 
+_CHOICES = {"pack": "MEMORY", "backstop": "RIGID", "spring": "LEVELS", "damping": "FRICTION"}
+"""Choice that the module of a part sets, by role."""
+
+
 class Bindings(NamedTuple):
     """Law functions by name, choices by name, and for each part a digest of the sources of its laws.
 
@@ -59,9 +63,8 @@ def bindings_of(laws: Laws) -> Bindings:
         sources = (absent, module, *(sys.modules[other] for other in others))
         digests[role] = code_digest(inspect.getsource(each) for each in sources)
         choices[f"HAS_{role.upper()}"] = bool(name)
-        for role_of_choice, choice in (("pack", "MEMORY"), ("backstop", "RIGID"), ("spring", "LEVELS")):
-            if role == role_of_choice:
-                choices[choice] = bool(getattr(module, choice, False))
+        if role in _CHOICES:
+            choices[_CHOICES[role]] = bool(getattr(module, _CHOICES[role], False))
     return Bindings(names, choices, digests, packing)
 
 

@@ -26,6 +26,7 @@ def suits(laws: Laws) -> bool:
         and choices["HAS_PACK"]
         and choices["MEMORY"]
         and not choices["LEVELS"]
+        and not choices["FRICTION"]
         and laws.pack_pulls
         and laws.backstop_pulls
     )

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import called, compiled, inlined
 from printhammer.kernel.model import modes as M
-from printhammer.kernel.model.layout import POSITION, Control, ForceLaw
+from printhammer.kernel.model.layout import DAMPING, INVERSE_MASS, POSITION, SPRING, Control, ForceLaw
 
 if TYPE_CHECKING:
     from printhammer.kernel.methods.dop853 import whole_contact_step, whole_time_step
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         path_may_change,
     )
     from printhammer.kernel.model.forces import Hammer, acceleration
+    from printhammer.kernel.model.laws import FRICTION, friction_force
     from printhammer.kernel.model.pulses import Drive
 
 STILL = 1e-12
@@ -68,9 +69,12 @@ def closes(g0: float, d0: float, g1: float, d1: float) -> int:
 
 
 @inlined
-def rest_gap(a: float, mode: int, control: Control) -> float:
+def rest_gap(a: float, mode: int, hammer: Hammer, control: Control) -> float:
     """Return the event function of a rest: positive while an acceleration `a` keeps the armature at rest."""
     unit = control[1] * control[1] / control[0]
+    if FRICTION:
+        limit = friction_force(hammer[DAMPING:SPRING], 1.0) * hammer[INVERSE_MASS]
+        return float((limit - a) / unit if mode == M.RESTING else 1.0 - (a / limit) * (a / limit))
     if mode == M.RESTING:
         return -a / unit
     return 1.0 - abs(a) / (STILL * unit)
@@ -84,8 +88,11 @@ def gap_at(
     mode, memory, hammer, _drive = law
     if which == PATH_GAP:
         return path_gap(x, v, electric, hammer, live)
-    branch = M.LOADING if mode == M.HELD_LOADING else (M.UNLOADING if mode == M.HELD_UNLOADING else mode)
-    return rest_gap(acceleration(t, x, v, branch, memory, hammer, driven(live, electric)), mode, control)
+    branch = mode
+    if not FRICTION:
+        branch = M.LOADING if mode == M.HELD_LOADING else (M.UNLOADING if mode == M.HELD_UNLOADING else mode)
+    a = acceleration(t, x, v, branch, memory, hammer, driven(live, electric))
+    return rest_gap(a, mode, hammer, control)
 
 
 @compiled
@@ -105,7 +112,7 @@ def gap_and_change(
     gap = gap_at(which, t, x, v, electric, law, live, control)
     pause = SHARE * h
     rates = electric_rates(t, x, v, electric, law.hammer, live)
-    if M.RESTING <= law.mode <= M.HELD_UNLOADING:
+    if M.RESTING <= law.mode <= M.HELD_FREE:
         v, a = 0.0, 0.0
     later = gap_at(
         which, t + pause, x + pause * v, v + pause * a, moved(electric, pause, rates), law, live, control
@@ -172,7 +179,7 @@ def circuit_switch(
     h = end[0] - start[0]
     live = law.drive[0]
     result = M.NO_SWITCH
-    resting = M.RESTING <= law.mode <= M.HELD_UNLOADING
+    resting = M.RESTING <= law.mode <= M.HELD_FREE
     for which in range(2 if resting else 1):
         if which == PATH_GAP and not path_may_change(live):
             continue

@@ -31,9 +31,10 @@ if TYPE_CHECKING:
     from printhammer.kernel.methods.dop853 import time_step, whole_time_step
     from printhammer.kernel.methods.nystrom8 import nystrom_step
     from printhammer.kernel.model.circuit import Electric, fastest_rate
-    from printhammer.kernel.model.forces import Hammer, acceleration
+    from printhammer.kernel.model.forces import Hammer, acceleration, slip
     from printhammer.kernel.model.laws import (
         BACKSTOP_PULLS,
+        FRICTION,
         HAS_BACKSTOP,
         HAS_CIRCUIT,
         HAS_DAMPING,
@@ -302,8 +303,11 @@ def first_switch(
             return M.UNRESOLVED, f, u, bound, 1.0
         if code == M.REACHED_FRONT and f < fraction:
             switch, fraction, upper, level, sign = reached, f, u, bound, 1.0
-    if HAS_PACK and MEMORY and mode in (M.LOADING, M.UNLOADING, M.RELOADING):
+    branching = HAS_PACK and MEMORY and mode in (M.LOADING, M.UNLOADING, M.RELOADING)
+    if branching or (FRICTION and mode < M.RESTING):
         turn = -1.0 if mode == M.UNLOADING else 1.0
+        if FRICTION:
+            turn = slip(mode, law.memory)
         code = turns_down(
             turn * start[1], turn * start[2], turn * start[3], turn * end[1], turn * end[2], turn * end[3], h
         )

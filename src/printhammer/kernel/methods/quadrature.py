@@ -42,9 +42,10 @@ if TYPE_CHECKING:
         path_of,
         source_of,
     )
-    from printhammer.kernel.model.forces import Hammer, pack_force, value_at
+    from printhammer.kernel.model.forces import Hammer, friction, pack_force, value_at
     from printhammer.kernel.model.laws import (
         FORCE_DRIVE,
+        FRICTION,
         HAS_CIRCUIT,
         backstop_energy,
         backstop_viscous,
@@ -87,6 +88,8 @@ def powers(
     if mode == M.BACKSTOP:
         backstop = -backstop_viscous(hammer[BACKSTOP_PART:MAGNET], w, v) * v
     damping = -damping_force(hammer[DAMPING:SPRING], v) * v
+    if FRICTION:
+        damping -= friction(mode, memory, hammer) * v
     return coil, force, pack, backstop, damping
 
 
@@ -169,7 +172,7 @@ def quadratures(
             lost = 0.5 * (v0 * v0 - nodes[i + 1, 2] * nodes[i + 1, 2]) / hammer[INVERSE_MASS]
             out[row, 3] = lost if mode != M.BACKSTOP and x0 != hammer[FRONT] else 0.0
             continue
-        resting = mode in (M.RESTING, M.HELD, M.HELD_LOADING, M.HELD_UNLOADING)
+        resting = mode >= M.RESTING
         if (resting and not HAS_CIRCUIT) or ends[row] <= starts[row]:
             continue
         memory = memory_of(mode, kept, hammer)

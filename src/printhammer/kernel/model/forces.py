@@ -18,18 +18,28 @@ from printhammer.kernel.model.layout import (
     POSITION,
     SPRING,
 )
-from printhammer.kernel.model.modes import LOADING, RELOADING, UNLOADING
+from printhammer.kernel.model.modes import (
+    HELD_LOADING,
+    HELD_UNLOADING,
+    LOADING,
+    RELOADING,
+    RESTING,
+    UNLOADING,
+)
 
 if TYPE_CHECKING:
     from printhammer.kernel.model.circuit import magnetising_current
     from printhammer.kernel.model.laws import (
         FORCE_DRIVE,
+        FRICTION,
         HAS_CIRCUIT,
         HAS_DAMPING,
         HAS_PACK,
+        MEMORY,
         backstop_elastic,
         backstop_viscous,
         damping_force,
+        friction_force,
         magnet_force,
         pack_loading,
         pack_unloading,
@@ -66,11 +76,31 @@ def field_force(t: float, x: float, v: float, hammer: Hammer, drive: Drive) -> f
 
 
 @inlined
+def slip(mode: int, memory: float) -> float:
+    """Return the direction in which the armature slides under dry friction, 1 or -1; 0 at rest.
+
+    The direction belongs to a step: the friction is smooth while a step is extended beyond its reversal.
+    Outside a pack with memory the direction is the `memory` of the mode.
+    """
+    if mode >= RESTING:
+        return 0.0
+    if MEMORY and mode in (LOADING, RELOADING):
+        return 1.0
+    return -1.0 if mode == UNLOADING else memory
+
+
+@inlined
+def friction(mode: int, memory: float, hammer: Hammer) -> float:
+    """Return the dry friction of the moving armature [N]; 0 at rest, where other forces determine it."""
+    return -slip(mode, memory) * friction_force(hammer[DAMPING:SPRING], 0.0)
+
+
+@inlined
 def pack_force(x: float, v: float, mode: int, memory: float, hammer: Hammer) -> float:
     """Return the pack force [N], equation (5) of the paper, on the loading or unloading branch of `mode`."""
-    if mode == LOADING:
+    if mode == LOADING or (FRICTION and mode == HELD_LOADING):
         return pack_loading(hammer[PACK:BACKSTOP_PART], x, v)
-    if mode in (UNLOADING, RELOADING):
+    if mode in (UNLOADING, RELOADING) or (FRICTION and mode == HELD_UNLOADING):
         return pack_unloading(hammer[PACK:BACKSTOP_PART], x, v, memory)
     return 0.0
 
@@ -83,6 +113,8 @@ def acceleration(
     force = field_force(t, x, v, hammer, drive)
     if HAS_PACK:
         force += pack_force(x, v, mode, memory, hammer)
+    if FRICTION:
+        force += friction(mode, memory, hammer)
     return float(force * hammer[INVERSE_MASS])
 
 

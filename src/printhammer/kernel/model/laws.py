@@ -76,7 +76,7 @@ LAW_FUNCTIONS = {
         "backstop_switch",
         "backstop_rebound",
     ),
-    "damping": ("damping_force",),
+    "damping": ("damping_force", "friction_force"),
 }
 """Names of the law functions that each part may define."""
 
@@ -100,6 +100,7 @@ HAS_CIRCUIT: bool
 MEMORY: bool
 RIGID: bool
 LEVELS: bool
+FRICTION: bool
 FORCE_DRIVE: bool
 PACK_PULLS: bool
 BACKSTOP_PULLS: bool
@@ -140,6 +141,8 @@ spring_level: Law1
 infinity if there are fewer positions."""
 damping_force: Law1
 """Damping force on the armature [N], a differentiable function; argument: velocity [m/s]."""
+friction_force: Law1
+"""Dry friction [N], at least 0; argument: 0 for the kinetic, 1 for the static friction."""
 pack_loading: Law2
 """Force of the pack on the loading branch [N], negative where the pack pushes back; arguments: displacement
 [m], velocity [m/s]."""

@@ -29,6 +29,9 @@ HELD_LOADING = 9
 HELD_UNLOADING = 10
 """Mode: at rest in the pack on an unloading branch; the motion is not integrated until the drive changes."""
 
+HELD_FREE = 11
+"""Mode: held by dry friction outside the pack; the motion is not integrated until the drive changes."""
+
 MODE_NAMES = (
     "free",
     "loading",
@@ -41,6 +44,7 @@ MODE_NAMES = (
     "held in the backstop",
     "held on the loading branch",
     "held on the unloading branch",
+    "held by friction",
 )
 """Public names of the modes, indexed by mode code."""
 

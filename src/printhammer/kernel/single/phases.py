@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from printhammer.kernel.compile.compiling import inlined
 from printhammer.kernel.model import modes as M
 from printhammer.kernel.model.circuit import BLOCKED, SOURCE, UNTIL
+from printhammer.kernel.model.layout import DAMPING, INVERSE_MASS, SPRING
 from printhammer.kernel.single import carry as C
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
         take_path,
     )
     from printhammer.kernel.model.forces import Hammer, acceleration
-    from printhammer.kernel.model.laws import HAS_CIRCUIT
+    from printhammer.kernel.model.laws import FRICTION, HAS_CIRCUIT, friction_force
     from printhammer.kernel.model.pulses import pass_edges
     from printhammer.kernel.single.carry import Setup
     from printhammer.kernel.single.record import add_node, note_circuit
@@ -84,6 +85,28 @@ def accelerate(state: State, setup: Setup) -> None:
 
 
 @inlined
+def hold_limit(hammer: Hammer) -> float:
+    """Return the largest acceleration [m/s^2] from which dry friction holds an armature at rest."""
+    return float(friction_force(hammer[DAMPING:SPRING], 1.0) * hammer[INVERSE_MASS])
+
+
+@inlined
+def mode_at_rest(mode: int) -> int:
+    """Return the mode of an armature that dry friction holds at the place where it moved in `mode`."""
+    if mode == M.LOADING:
+        return M.HELD_LOADING
+    if mode in (M.UNLOADING, M.RELOADING):
+        return M.HELD_UNLOADING
+    return M.RESTING if mode == M.RESTING else M.HELD_FREE
+
+
+@inlined
+def accelerate_at_rest(state: State, setup: Setup) -> None:
+    """Update the acceleration in the run state, at velocity 0 and without dry friction."""
+    state[C.ACCELERATION] = acceleration_in(mode_at_rest(int(state[C.MODE])), 0.0, state, setup)
+
+
+@inlined
 def rate_in_backstop(state: State, setup: Setup) -> None:
     """Update dv/ds, the derivative of the velocity in the regularised variables, in the run state."""
     drive = driven(setup.train.live, electric_of(state))
@@ -122,7 +145,7 @@ def note_node(mode: int, kept: float, state: State, setup: Setup, nodes: Any) ->
 def note_state(state: State, setup: Setup, nodes: Any) -> None:
     """Append the present state to the record as a node, with the present mode and its memory."""
     mode = int(state[C.MODE])
-    kept = 0.0
+    kept = state[C.MEMORY_NOW] if FRICTION else 0.0
     if mode == M.BACKSTOP:
         kept = state[C.ROOT]
     elif mode in (M.UNLOADING, M.RELOADING):

@@ -53,6 +53,13 @@ def relabel_node(nodes: Rows, used: int, mode: int) -> None:
 
 
 @compiled
+def renew_node(nodes: Rows, used: int, mode: int, memory: float) -> None:
+    """Change mode and memory of the latest node, valid from this node to the next."""
+    relabel_node(nodes, used, mode)
+    nodes[min(used, nodes.shape[0]) - 1, 4] = memory
+
+
+@compiled
 def open_contact(
     contacts: Rows, used: int, surface: int, t: float, v: float, node: int, initial: bool
 ) -> int:

@@ -16,6 +16,7 @@ from printhammer.kernel.model.layout import (
     BACKSTOP_PART,
     DAMPING,
     ELECTRIC,
+    INVERSE_MASS,
     MAGNET,
     PACK,
     POSITION,
@@ -39,9 +40,10 @@ if TYPE_CHECKING:
         take_path,
         turn_current,
     )
-    from printhammer.kernel.model.forces import Hammer, acceleration, pack_force, value_at
+    from printhammer.kernel.model.forces import Hammer, acceleration, friction, pack_force, value_at
     from printhammer.kernel.model.laws import (
         FORCE_DRIVE,
+        FRICTION,
         HAS_CIRCUIT,
         HAS_PACK,
         MEMORY,
@@ -61,10 +63,13 @@ SAMPLES = 4
 
 @compiled
 def memory_of(mode: int, kept: float, hammer: Hammer) -> float:
-    """Return the memory value of the pack law for the local maximum `kept` [m] stored in a node."""
+    """Return the memory value of the pack law for the local maximum `kept` [m] stored in a node.
+
+    Elsewhere, under dry friction, a node stores the direction of sliding, which is returned.
+    """
     if HAS_PACK and MEMORY and mode in (M.UNLOADING, M.RELOADING, M.HELD_UNLOADING):
         return pack_memory(hammer[PACK:BACKSTOP_PART], kept)
-    return 0.0
+    return kept if FRICTION else 0.0
 
 
 @compiled
@@ -74,6 +79,8 @@ def branch_of(mode: int) -> int:
         return M.BACKSTOP
     if mode == M.HELD_LOADING:
         return M.LOADING
+    if mode == M.HELD_FREE:
+        return M.FREE
     return M.UNLOADING if mode == M.HELD_UNLOADING else mode
 
 
@@ -82,7 +89,7 @@ def state_in_step(
     t: float, t0: float, x0: float, v0: float, mode: int, kept: float, hammer: Hammer, drive: Drive
 ) -> tuple[float, float, float]:
     """Return displacement [m], velocity [m/s] and w [m^0.5] at time `t` [s] in the step after a node."""
-    if mode in (M.RESTING, M.HELD, M.HELD_LOADING, M.HELD_UNLOADING) or t <= t0:
+    if mode >= M.RESTING or t <= t0:
         return x0, v0, kept if mode in (M.BACKSTOP, M.HELD) else 0.0
     if mode == M.BACKSTOP:
         kv0 = contact_rate(kept, v0, t0, hammer, drive)
@@ -182,6 +189,11 @@ def resample(
         out[row, 6] = backstop_elastic(hammer[BACKSTOP_PART:MAGNET], w) if compressed else 0.0
         out[row, 7] = backstop_viscous(hammer[BACKSTOP_PART:MAGNET], w, v) if compressed else 0.0
         out[row, 8] = damping_force(hammer[DAMPING:SPRING], v)
+        if FRICTION:
+            memory = memory_of(mode, kept, hammer)
+            out[row, 8] += friction(mode, memory, hammer)
+            if mode > M.HELD:
+                out[row, 8] = -acceleration(t, x, 0.0, mode, memory, hammer, drive) / hammer[INVERSE_MASS]
         out[row, 9] = mode
         if HAS_CIRCUIT:
             live, electric = drive

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from printhammer.kernel.compile.compiling import compiled
@@ -10,6 +11,10 @@ from printhammer.kernel.model.modes import RELOADING, UNLOADING
 if TYPE_CHECKING:
     from printhammer.kernel.model.forces import acceleration
     from printhammer.kernel.model.layout import ForceLaw
+
+BENT = 1e-3
+"""Deviation of the acceleration from a parabola, as a fraction of the range that dry friction holds, above
+which a pause is halved; arbitrary."""
 
 
 @compiled
@@ -32,15 +37,54 @@ def rest_ends(
         a = acceleration(t + high, x, 0.0, mode, memory, hammer, drive)
         if lowest <= a <= highest:
             return False, pause
+    return True, moment_of_end(t, x, low, high, lowest, highest, law)
+
+
+@compiled
+def moment_of_end(
+    t: float, x: float, low: float, high: float, lowest: float, highest: float, law: ForceLaw
+) -> float:
+    """Return the time [s] from `t`, between `low` and `high`, at which the acceleration leaves its range."""
+    mode, memory, hammer, drive = law
     while True:
         middle = 0.5 * (low + high)
         if not (t + low < t + middle < t + high):
-            return True, high
+            return high
         a = acceleration(t + middle, x, 0.0, mode, memory, hammer, drive)
         if lowest <= a <= highest:
             low = middle
         else:
             high = middle
+
+
+@compiled
+def friction_ends(
+    t: float, x: float, pause: float, lowest: float, highest: float, law: ForceLaw
+) -> tuple[bool, float]:
+    """Decide as `rest_ends`, without missing an acceleration that leaves its range between two samples.
+
+    The pause is halved until a parabola through three samples describes the acceleration; its vertex is a
+    fourth sample. The returned time is then shorter than `pause`.
+    """
+    mode, memory, hammer, drive = law
+    size = highest if math.isinf(lowest) else highest - lowest
+    start = acceleration(t, x, 0.0, mode, memory, hammer, drive)
+    while True:
+        half = acceleration(t + 0.5 * pause, x, 0.0, mode, memory, hammer, drive)
+        end = acceleration(t + pause, x, 0.0, mode, memory, hammer, drive)
+        quarter = acceleration(t + 0.25 * pause, x, 0.0, mode, memory, hammer, drive)
+        bent = abs(quarter - 0.375 * start - 0.75 * half + 0.125 * end)
+        if bent <= BENT * size or not t + 0.25 * pause > t:
+            break
+        pause *= 0.5
+    curvature, slope = start - 2.0 * half + end, 4.0 * half - 3.0 * start - end
+    vertex = -0.25 * slope / curvature if curvature != 0.0 else 0.0
+    for share in (vertex, 1.0):
+        if 0.0 < share <= 1.0:
+            a = acceleration(t + share * pause, x, 0.0, mode, memory, hammer, drive)
+            if not lowest <= a <= highest:
+                return True, moment_of_end(t, x, 0.0, share * pause, lowest, highest, law)
+    return False, pause
 
 
 @compiled

@@ -16,7 +16,7 @@ from printhammer.kernel.single.carry import Setup
 if TYPE_CHECKING:
     from printhammer.kernel.model.circuit import driven, enter_piece
     from printhammer.kernel.model.forces import acceleration
-    from printhammer.kernel.model.laws import HAS_CIRCUIT, pack_memory
+    from printhammer.kernel.model.laws import FRICTION, HAS_CIRCUIT, pack_memory
     from printhammer.kernel.model.pulses import pass_edges
     from printhammer.kernel.single.around import failure, first_mode, out_of_bounds
     from printhammer.kernel.single.phases import (
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         accelerate,
         electric_at_start,
         electric_of,
+        hold_limit,
         keep_electric,
         keep_path,
         note_path,
@@ -61,6 +62,8 @@ def begin(state: State, setup: Setup, contacts: Any) -> None:
         mode, peak = int(state[C.MODE]), state[C.PEAK]
     if mode in (M.UNLOADING, M.RELOADING):
         memory = pack_memory(hammer[PACK:BACKSTOP_PART], peak)
+    elif FRICTION and v != 0.0:
+        memory = math.copysign(1.0, v)
     state[C.MODE], state[C.PEAK], state[C.MEMORY_NOW] = mode, peak, memory
     state[C.FREE_STEP], state[C.PACK_STEP] = 0.02 * time_scale, 0.005 * time_scale
     state[C.CONTACT_STEP] = 0.05
@@ -120,7 +123,7 @@ def run(posed: Any, t_end: float, nodes: Any, contacts: Any, state: Any) -> tupl
         the lengths of the arrays.
     """
     setup = Setup(Train(*posed[0]), posed[1], posed[2], posed[3], posed[4])
-    live = setup.train.live
+    live, hammer = setup.train.live, setup.hammer
     state[C.USED], state[C.TOUCHED] = 0.0, 0.0
     keep_electric(electric_at_start(state[C.POSITION_NOW], setup.hammer, state, live), state)
     if state[C.STATE] == C.GOES_ON:
@@ -150,7 +153,8 @@ def run(posed: Any, t_end: float, nodes: Any, contacts: Any, state: Any) -> tupl
             accelerate(state, setup)
             state[C.ENTERED] = 1.0
             continue
-        if mode == M.RESTING and state[C.ACCELERATION] > 0.0:
+        held = hold_limit(hammer) if FRICTION else 0.0
+        if mode == M.RESTING and state[C.ACCELERATION] > held:
             close_contact(contacts, int(state[C.TOUCHED]), state[C.TIME], 0.0)
             state[C.MODE] = M.FREE
             relabel_node(nodes, int(state[C.USED]), M.FREE)

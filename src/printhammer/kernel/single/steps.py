@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.methods.contact import advance_contact
     from printhammer.kernel.methods.landing import advance
     from printhammer.kernel.model.circuit import driven, electric_rates, is_quiet, moved
-    from printhammer.kernel.model.laws import HAS_CIRCUIT
+    from printhammer.kernel.model.laws import FRICTION, HAS_CIRCUIT, MEMORY
     from printhammer.kernel.single.around import (
         contact_unit,
         kick_into_backstop,
@@ -27,13 +27,17 @@ if TYPE_CHECKING:
     from printhammer.kernel.single.carry import Setup
     from printhammer.kernel.single.phases import (
         State,
+        accelerate,
+        accelerate_at_rest,
         acceleration_in,
         electric_of,
+        hold_limit,
         keep_electric,
+        mode_at_rest,
         rate_in_backstop,
     )
-    from printhammer.kernel.single.record import relabel_node
-    from printhammer.kernel.single.rest import goes_on_in, rest_ends
+    from printhammer.kernel.single.record import relabel_node, renew_node
+    from printhammer.kernel.single.rest import friction_ends, goes_on_in, rest_ends
 
 BRANCHES = (M.UNLOADING, M.LOADING, M.RELOADING)
 """Modes inside the pack in which an armature can come to rest."""
@@ -56,6 +60,11 @@ def take_step(state: State, setup: Setup, t_next: float, nodes: Any) -> tuple[in
     rests = mode == M.RESTING or (
         state[C.VELOCITY] == 0.0 and abs(state[C.ACCELERATION]) <= still and mode in BRANCHES
     )
+    if FRICTION and state[C.VELOCITY] == 0.0:
+        accelerate_at_rest(state, setup)
+        rests = mode == M.RESTING or abs(state[C.ACCELERATION]) <= hold_limit(setup.hammer)
+        if not rests:
+            set_off(state, setup, nodes)
     if mode == M.BACKSTOP:
         return backstop_step(state, setup, t_next, still, nodes), M.OK
     if rests and not (HAS_CIRCUIT and not circuit_is_quiet(state, setup)):
@@ -147,6 +156,22 @@ def reverse(state: State, setup: Setup) -> None:
 
 
 @inlined
+def set_off(state: State, setup: Setup, nodes: Any) -> None:
+    """Determine the direction in which an armature at rest begins to slide, against dry friction."""
+    mode, a = int(state[C.MODE]), state[C.ACCELERATION]
+    kept = 1.0 if a > 0.0 else -1.0
+    if MEMORY and mode in BRANCHES:
+        if not goes_on_in(a, mode):
+            reverse(state, setup)
+        if int(state[C.MODE]) != M.LOADING:
+            kept = state[C.PEAK]
+    else:
+        state[C.MEMORY_NOW] = kept
+    renew_node(nodes, int(state[C.USED]), int(state[C.MODE]), kept)
+    accelerate(state, setup)
+
+
+@inlined
 def wait(state: State, setup: Setup, t_next: float, still: float, nodes: Any) -> int:
     """Advance the time of an armature at rest; return the event that ends the rest, or `HOLDS`."""
     mode, t, x = int(state[C.MODE]), state[C.TIME], state[C.POSITION_NOW]
@@ -155,20 +180,29 @@ def wait(state: State, setup: Setup, t_next: float, still: float, nodes: Any) ->
     if state[C.FIRST] < state[C.LAST] and not HAS_CIRCUIT:
         pause = min(pause, state[C.WAIT])
     least, most = (-math.inf, 0.0) if mode == M.RESTING else (-still, still)
+    if FRICTION:
+        most = hold_limit(setup.hammer)
+        least = -math.inf if mode == M.RESTING else -most
     if mode != M.RESTING:
-        held = M.HELD_LOADING if mode == M.LOADING else M.HELD_UNLOADING
-        relabel_node(nodes, int(state[C.USED]), held)
-    law = ForceLaw(mode, state[C.MEMORY_NOW], setup.hammer, driven(setup.train.live, electric_of(state)))
-    ended, pause = rest_ends(t, x, pause, least, most, law)
-    state[C.WAIT] = (
-        C.SHORTEST_WAIT * time_scale if ended or mode == M.RESTING else min(2.0 * state[C.WAIT], time_scale)
-    )
+        relabel_node(nodes, int(state[C.USED]), mode_at_rest(mode))
+    branch = mode_at_rest(mode) if FRICTION else mode
+    law = ForceLaw(branch, state[C.MEMORY_NOW], setup.hammer, driven(setup.train.live, electric_of(state)))
+    if FRICTION:
+        ended, pause = friction_ends(t, x, pause, least, most, law)
+        state[C.WAIT] = C.SHORTEST_WAIT * time_scale if ended else min(2.0 * pause, time_scale)
+    else:
+        ended, pause = rest_ends(t, x, pause, least, most, law)
+        state[C.WAIT] = (
+            C.SHORTEST_WAIT * time_scale
+            if ended or mode == M.RESTING
+            else min(2.0 * state[C.WAIT], time_scale)
+        )
     switch = M.EDGE if pause == t_next - t else M.NO_SWITCH
     state[C.TIME] = t_next if switch == M.EDGE else t + pause
     state[C.ACCELERATION] = acceleration_in(mode, 0.0, state, setup)
     if not ended and switch == M.NO_SWITCH:
         return M.HOLDS
-    if ended and mode != M.RESTING and not goes_on_in(state[C.ACCELERATION], mode):
+    if ended and not FRICTION and mode != M.RESTING and not goes_on_in(state[C.ACCELERATION], mode):
         reverse(state, setup)
         state[C.ACCELERATION] = acceleration_in(int(state[C.MODE]), 0.0, state, setup)
     return switch
@@ -180,7 +214,7 @@ def step_at_rest(state: State, setup: Setup, t_next: float, nodes: Any) -> int:
     mode, x = int(state[C.MODE]), state[C.POSITION_NOW]
     held = mode
     if mode != M.RESTING:
-        held = M.HELD_LOADING if mode == M.LOADING else M.HELD_UNLOADING
+        held = mode_at_rest(mode)
         relabel_node(nodes, int(state[C.USED]), held)
     if int(state[C.STARTED]) != held:
         state[C.STEP] = state[C.FREE_STEP]
@@ -191,7 +225,8 @@ def step_at_rest(state: State, setup: Setup, t_next: float, nodes: Any) -> int:
     state[C.TIME], state[C.STEP] = end[0], h
     keep_electric(electric, state)
     state[C.ACCELERATION] = acceleration_in(mode, 0.0, state, setup)
-    if switch == M.REST_ENDED and mode != M.RESTING and not goes_on_in(state[C.ACCELERATION], mode):
+    ended = switch == M.REST_ENDED and mode != M.RESTING
+    if ended and not FRICTION and not goes_on_in(state[C.ACCELERATION], mode):
         reverse(state, setup)
     return switch
 

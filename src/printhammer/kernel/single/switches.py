@@ -13,13 +13,14 @@ from printhammer.kernel.single import carry as C
 
 if TYPE_CHECKING:
     from printhammer.kernel.model.circuit import next_path
-    from printhammer.kernel.model.laws import HAS_CIRCUIT, RIGID, backstop_rebound
+    from printhammer.kernel.model.laws import FRICTION, HAS_CIRCUIT, RIGID, backstop_rebound
     from printhammer.kernel.single.carry import Setup
     from printhammer.kernel.single.phases import (
         State,
         accelerate,
         acceleration_in,
         electric_of,
+        hold_limit,
         keep_electric,
         note_node,
         pass_edge,
@@ -51,11 +52,14 @@ def after_step(switch: int, state: State, setup: Setup, nodes: Any, contacts: An
             reach_backstop(state, setup, nodes, contacts)
         elif switch == M.REACHED_FRONT:
             reach_front(state, setup, contacts)
+        elif FRICTION and switch == M.REVERSAL and int(state[C.MODE]) in (M.FREE, M.PACK_RELEASED):
+            # The next step decides whether the armature is held, or slides back.
+            state[C.VELOCITY] = 0.0
         elif switch == M.REVERSAL:
             if state[C.POSITION_NOW] <= setup.hammer[FRONT]:
                 close_now(state, contacts)
                 state[C.MODE] = M.FREE
-            else:
+            elif not FRICTION:
                 reverse(state, setup)
         elif switch in (M.LEFT_FRONT, M.LEFT_BACKSTOP):
             leave(switch, state, setup, contacts)
@@ -99,10 +103,14 @@ def reach_backstop(state: State, setup: Setup, nodes: Any, contacts: Any) -> Non
     open_now(M.BACKSTOP_SURFACE, state, contacts)
     if RIGID:
         hammer = setup.hammer
-        note_node(M.FREE, 0.0, state, setup, nodes)
+        note_node(M.FREE, state[C.MEMORY_NOW] if FRICTION else 0.0, state, setup, nodes)
         v = backstop_rebound(hammer[BACKSTOP_PART:MAGNET], state[C.VELOCITY])
         state[C.VELOCITY] = v
+        if FRICTION:
+            state[C.MEMORY_NOW] = 1.0
         a = acceleration_in(M.FREE, v, state, setup)
+        if FRICTION and v == 0.0:
+            a = acceleration_in(M.RESTING, 0.0, state, setup) - hold_limit(hammer)
         if a < 0.0 and v * v <= -2.0 * a * 1e-12 * setup.control[0]:
             state[C.VELOCITY] = 0.0
             state[C.MODE] = M.RESTING
@@ -131,6 +139,8 @@ def leave(switch: int, state: State, setup: Setup, contacts: Any) -> None:
     close_now(state, contacts)
     state[C.POSITION_NOW] = hammer[POSITION] if switch == M.LEFT_BACKSTOP else hammer[FRONT]
     follow(switch, state)
+    if FRICTION and switch == M.LEFT_FRONT:
+        state[C.MEMORY_NOW] = -1.0
     if switch == M.LEFT_BACKSTOP and state[C.VELOCITY] <= 0.0:
         state[C.VELOCITY] = 0.0
         if acceleration_in(M.FREE, 0.0, state, setup) < 0.0:

@@ -20,9 +20,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, ClassVar, Final, Literal
+from typing import Any, ClassVar, Final, Literal, Self
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, model_validator
 
 from printhammer.errors import InputError
 from printhammer.parts.base import SpringPart
@@ -170,6 +170,26 @@ class CubicForce(Term):
         return (0.0, self.center, 0.0, -self.stiffness, -self.cubic)
 
 
+class Friction(Term):
+    """Dry friction of the armature in its guide; part of the damping, see `printhammer.parts.friction`."""
+
+    law: ClassVar[str] = "friction"
+
+    kinetic: float = quantity("N", "Fk", "friction force of the moving armature", gt=0)
+    static: float | None = quantity("N", "Fs", "largest friction force at rest (default: Fk)", default=None)
+
+    @model_validator(mode="after")
+    def _static_is_not_less(self) -> Self:
+        if self.static is not None and self.static < self.kinetic:
+            raise ValueError("static is less than kinetic: expected at least the kinetic friction")
+        return self
+
+    @property
+    def largest(self) -> float:
+        """Static friction, N."""
+        return self.kinetic if self.static is None else self.static
+
+
 class LinearContact(Term):
     """Linear spring that acts on one side of a position."""
 
@@ -201,7 +221,7 @@ class HertzContact(LinearContact):
 
 
 TERMS: Final[dict[str, dict[str, type[Term]]]] = {
-    "force": {term.law: term for term in (ConstantForce, CubicForce, Gravity, FurtherSpring)},
+    "force": {term.law: term for term in (ConstantForce, CubicForce, Friction, Gravity, FurtherSpring)},
     "contact": {term.law: term for term in (HertzContact, LinearContact)},
 }
 """Classes of forces and contacts, by the list of the hammer file, "force" or "contact", and by law."""

@@ -31,11 +31,11 @@ export function titleOf(name, described, short = false) {
   return (short ? SHORT : TITLES)[name];
 }
 
-/** Return the views that apply to a device, those that its file lists: without a pack nothing is printed, and a rigid stop has no loop. */
+/** Return the views that apply to a device, those that its file lists: without a pack nothing is printed, a rigid stop has no loop, and there are no derivatives under dry friction. */
 export function viewsOf(described) {
   if (!described) return VIEWS;
-  const { places: { front, backstop }, rigid, views } = described;
-  const lacks = { line: front === null, energy: front === null, loops: front === null && (backstop === null || rigid) };
+  const { places: { front, backstop }, rigid, dry, views } = described;
+  const lacks = { line: front === null, energy: front === null, loops: front === null && (backstop === null || rigid), strobe: dry };
   const possible = (name) => !lacks[name];
   return views?.some(possible) ? views.filter(possible) : VIEWS.filter(possible);
 }

@@ -1,0 +1,181 @@
+"""Dry friction against closed forms: sticking, release, decay, forced motion, and a coil at rest."""
+
+import math
+
+import numpy as np
+import pytest
+from tests.errors import refused
+from tests.oracle.den_hartog import DenHartog
+
+import printhammer as ph
+from printhammer.run.motion import Motion
+
+CLOSE = 1e-11
+G = 9.80665
+
+
+def block(mass: float, kinetic: float, static: float | None = None, **terms: dict[str, object]) -> ph.Hammer:
+    """Mass under dry friction and further forces, by name."""
+    friction: dict[str, object] = {"law": "friction", "kinetic": kinetic}
+    if static is not None:
+        friction["static"] = static
+    added = {f"force.{name}": term for name, term in {"guide": friction, **terms}.items()}
+    return ph.Hammer.build(mass, name="block").replace(added)
+
+
+def still(hammer: ph.Hammer, x: float, v: float, duration: float, **more: object) -> Motion:
+    """Run without a drive."""
+    drive = ph.SineForce(0.0, "1 Hz")
+    return ph.simulate(hammer, drive, duration=duration, state=(x, v), tolerance=1e-13, **more)
+
+
+def test_a_block_on_an_incline_is_released_at_the_angle_of_static_friction() -> None:
+    static, kinetic = 0.5, 0.3
+    for angle in (math.atan(static) * (1.0 + sign * 1e-14) for sign in (-1.0, 1.0)):
+        normal = G * math.cos(angle)
+        weight = {"law": "gravity", "angle": angle}
+        motion = still(block(1.0, kinetic * normal, static * normal, weight=weight), 1.0, 0.0, 1.0)
+        if angle < math.atan(static):
+            (held,) = motion.sticks
+            assert (held.t_in, held.t_out, held.x, held.initial) == (0.0, None, 1.0, True)
+            continue
+        assert len(motion.sticks) == 0
+        pull = G * math.sin(angle) - kinetic * normal
+        assert motion.state_at(1.0)[0] == pytest.approx(1.0 - 0.5 * pull, rel=CLOSE)
+        assert motion.energy.damping_loss == pytest.approx(kinetic * normal * 0.5 * pull, rel=CLOSE)
+
+
+@pytest.mark.parametrize("static", [1.0, 1.9, 2.4])
+def test_free_decay_ends_where_friction_holds(static: float) -> None:
+    """A half swing takes π/w and costs 2 Fk/k; the mass stays where k |x| <= Fs first (Lorenz 1924)."""
+    mass, k, kinetic, start = 0.5, 200.0, 1.0, 0.0631
+    spring = {"law": "spring", "stiffness": k, "position": 0.0}
+    motion = still(block(mass, kinetic, static, spring=spring), start, 0.0, 5.0)
+    swings, place = 0, start
+    while k * abs(place) > static:
+        place, swings = -math.copysign(abs(place) - 2.0 * kinetic / k, place), swings + 1
+    (held,) = motion.sticks
+    assert held.t_in == pytest.approx(swings * math.pi * math.sqrt(mass / k), rel=CLOSE)
+    assert held.x == pytest.approx(place, rel=CLOSE)
+    assert motion.state_at(4.9)[:2] == (held.x, 0.0)
+    travel = sum(2.0 * start - 2.0 * (2 * n + 1) * kinetic / k for n in range(swings))
+    assert motion.energy.damping_loss == pytest.approx(kinetic * travel, rel=CLOSE)
+    assert abs(motion.energy.residual) < 1e-10 * motion.energy.throughput
+    # While the mass is held, friction balances the spring.
+    forces = motion.curves_at(np.array([4.9]))[4]
+    assert forces["drag"][0] == pytest.approx(k * held.x, rel=1e-14)
+
+
+@pytest.mark.parametrize("beta", [0.42, 0.7, 1.4, 2.5])
+def test_forced_motion_under_friction(beta: float) -> None:
+    """Outside the boundary of Den Hartog the mass never stops; just inside it does."""
+    exact = DenHartog(beta, 0.3)
+    hammer = block(1.0, 0.3, spring={"law": "spring", "stiffness": 1.0, "position": 0.0})
+    cycle = 2.0 * math.pi / beta
+    for excess in (0.1, 1e-7, -1e-7):
+        a = exact.boundary * (1.0 + excess)
+        x0, phase = exact.motion(a)
+        drive = ph.SineForce(a, 1.0 / cycle, phase=phase + 0.5 * math.pi)
+        motion = ph.simulate(hammer, drive, duration=3.0 * cycle, state=(x0, 0.0), tolerance=1e-13)
+        assert (len(motion.sticks) > 0) == (excess < 0.0)
+        if excess == 0.1:
+            t = np.linspace(0.0, 0.5 * cycle, 9)
+            wave = 0.3 * (1.0 - np.cos(t) - beta * exact.big_u * np.sin(t))
+            wave += a * exact.big_v * np.cos(beta * t + phase)
+            places = motion.curves_at(t + 2.0 * cycle)[0]
+            np.testing.assert_allclose(places, wave, rtol=0.0, atol=10.0 * CLOSE * x0)
+
+
+@pytest.mark.parametrize("kinetic", [0.7, 1.0])
+def test_a_growing_force_releases_a_mass_at_its_static_force(kinetic: float) -> None:
+    """From A sin w s = Fs on: x = A (sin w s - sin w t + w (t - s) cos w s)/(m w²) - Fk (t - s)²/2m."""
+    mass, size, rate, static = 0.2, 3.0, 2.0 * math.pi, 1.0
+    motion = ph.simulate(
+        block(mass, kinetic, static),
+        ph.SineForce(size, "1 Hz"),
+        duration=0.2,
+        state=(0.0, 0.0),
+        tolerance=1e-13,
+    )
+    (held,) = motion.sticks
+    start = math.asin(static / size) / rate
+    assert held.t_out == pytest.approx(start, rel=CLOSE)
+    s = 0.2 - start
+    swing = size * (math.sin(rate * start) - math.sin(rate * 0.2)) / rate**2
+    expected = (swing + size * s * math.cos(rate * start) / rate - 0.5 * kinetic * s * s) / mass
+    assert motion.state_at(0.2)[0] == pytest.approx(expected, rel=1e-10)
+
+
+def test_a_coil_builds_up_its_current_before_friction_lets_go() -> None:
+    """A current U/R (1 - exp(-R t/L)) reaches Fs/k at -L/R ln(1 - Fs R/k U)."""
+    k, resistance, inductance, static, voltage = 4.0, 5.0, 0.02, 2.5, 24.0
+    hammer = block(0.05, 1.0, static).replace(
+        {
+            "magnet": {"law": "moving-coil", "constant": k},
+            "coil": {"law": "winding", "resistance": resistance, "inductance": inductance},
+            "waveform": {"shape": "rail", "voltage": f"{voltage} V", "width": "10 ms", "decay": "diode"},
+        }
+    )
+    assert hammer.waveform is not None
+    drive = ph.PulseTrain(hammer.waveform, at=[1e-3])
+    motion = ph.simulate(hammer, drive, duration=8e-3, state=(0.0, 0.0), tolerance=1e-12)
+    (held,) = motion.sticks
+    reached = -inductance / resistance * math.log(1.0 - static * resistance / (k * voltage))
+    assert held.t_out == pytest.approx(1e-3 + reached, rel=1e-11)
+    assert abs(motion.energy.residual) < 1e-10 * motion.energy.throughput
+    assert motion.state_at(8e-3)[0] > 1e-4
+
+
+@pytest.mark.parametrize("friction", [0.5, 1.5])
+def test_bounces_follow_a_geometric_series(friction: float) -> None:
+    """Up with (W + Fk)/m, down with (W - Fk)/m: speeds shrink by e sqrt(down/up) a flight."""
+    weight, mass, height, restitution = 4.0, 0.1, 2e-3, 0.6
+    up, down = (weight + friction) / mass, (weight - friction) / mass
+    hammer = block(mass, friction, load={"law": "constant", "force": -weight}).replace(
+        "backstop", {"law": "rigid", "position": 0.0, "restitution": restitution}
+    )
+    motion = still(hammer, height, 0.0, 1.0)
+    speed, ratio = math.sqrt(2.0 * down * height), restitution * math.sqrt(down / up)
+    for bounce, contact in enumerate(motion.contacts[:12]):
+        assert -contact.v_in == pytest.approx(speed * ratio**bounce, rel=1e-10)
+    # The last bounces, less than 1e-12 of a characteristic length high, are left out.
+    flights = restitution * speed * (1.0 / up + 1.0 / math.sqrt(up * down)) / (1.0 - ratio)
+    rest = motion.contacts[-1]
+    assert rest.t_out is None
+    assert rest.t_in == pytest.approx(math.sqrt(2.0 * height / down) + flights, abs=2e-6)
+    assert abs(motion.energy.residual) < 1e-10 * motion.energy.throughput
+    assert len(motion.sticks) == 0
+
+
+def test_a_pack_with_memory_holds_an_armature_under_friction() -> None:
+    """A blow that friction stops in the pack leaves the armature there; the ledger closes."""
+    hammer = ph.load("hendriks-1983").replace("backstop", None).replace("coil", None)
+    front = hammer.front
+    assert front is not None
+    dry = hammer.replace("force.guide", {"law": "friction", "kinetic": "1 N", "static": "200 N"})
+    motion = ph.simulate(
+        dry, ph.SineForce(0.0, "1 Hz"), duration=2e-3, state=(front - 1e-5, 1.0), tolerance=1e-12
+    )
+    (held,) = motion.sticks
+    assert held.t_out is None
+    assert held.x > front
+    assert abs(motion.energy.residual) < 1e-8 * motion.energy.throughput
+    loose = hammer.replace("force.guide", {"law": "friction", "kinetic": "1 N", "static": "1.5 N"})
+    motion = ph.simulate(
+        loose, ph.SineForce(0.0, "1 Hz"), duration=2e-3, state=(front - 1e-5, 1.0), tolerance=1e-12
+    )
+    assert motion.contacts[0].t_out is not None
+    assert abs(motion.energy.residual) < 1e-8 * motion.energy.throughput
+
+
+def test_what_friction_cannot_be() -> None:
+    hammer = block(1.0, 0.3)
+    with refused("force.guide"):
+        hammer.replace("force.guide.static", 0.2)
+    with refused("force.guide.kinetic", 0.0):
+        hammer.replace("force.guide.kinetic", 0.0)
+    with refused("backstop.law", "hertz"):
+        ph.load("hendriks-1983").replace("force.guide", {"law": "friction", "kinetic": 0.3})
+    wave = {"shape": "half-sine", "amplitude": "1 N", "width": "1 ms"}
+    with refused("force.guide"):
+        ph.lyapunov(hammer.replace("waveform", wave), rate=100.0, state=(0.0, 0.0))
