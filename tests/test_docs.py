@@ -34,6 +34,8 @@ FEWER = {
     "bifurcation": {"1.35e-3, 60)": "1.35e-3, 8)", "5e10, 20)": "5e10, 4)"},
     "continuation": {"most=60": "most=10", "grid=(8, 4), most=10": "grid=(3, 2), most=4"},
     "orbits": {"longest=2": "longest=1"},
+    "quality": {"safe_rate(hammer)": "safe_rate(hammer, first=700.0, step=50.0)"},
+    "strobe": {"arange(1400, 1300, -5)": "arange(1400, 1385, -5)"},
 }
 
 

@@ -14,13 +14,21 @@ EXAMPLES = ROOT / "examples"
 PARTS = {"cubic_spring"}
 SCRIPTS = sorted(path for path in EXAMPLES.glob("*.py") if path.stem not in PARTS)
 # Scripts that compute what another test computes; `make docs` runs them.
-ELSEWHERE = {"feedback": "the example in the help of the verb, in tests/cli/test_registry.py"}
+ELSEWHERE = {
+    "feedback": "the example in the help of the verb, in tests/cli/test_registry.py",
+    "least_work": "the code on docs/howto/energy.md, in tests/test_docs.py",
+}
 # What takes a minute as printed runs on fewer values; `make docs` runs all.
 FEWER = {
     "orbits": {
         "longest=2, starts=100": "longest=1, starts=30",
         "longest=6, starts=100": "longest=3, starts=30",
-    }
+    },
+    "tung_shaw": {
+        "1.6e-3, 121)": "1.6e-3, 13)",
+        "1.468e-3, 97)": "1.468e-3, 9)",
+        "1.407e-3, 79)": "1.407e-3, 9)",
+    },
 }
 # What a part from outside the package is made of.
 FOR_PARTS = {"printhammer.support.constants", "printhammer.parts"}
