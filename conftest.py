@@ -30,6 +30,7 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 # Long files, and those that compile laws of their own, begin first: the workers then end together. Two that
 # compile the same laws stand far apart, so that the second one finds the machine code.
 FIRST = [
+    "test_units",
     "test_recovery",
     "test_states",
     "test_learn",
@@ -39,12 +40,14 @@ FIRST = [
     "test_results",
     "test_continuation",
     "test_strobe",
-    "test_units",
     "test_kill",
     "test_program",
     "test_motion",
     "test_examples",
     "test_docs",
+    "test_page_commands",
+    "test_docs_commands",
+    "test_paper",
     "test_fits",
     "test_ensemble",
     "test_orbits_closed_forms",
