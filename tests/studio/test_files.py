@@ -2,6 +2,7 @@
 
 import math
 import re
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -360,8 +361,42 @@ def columns_said(export: exports.Export, headings: list[dict[str, Any]]) -> list
     return answers
 
 
+HEADED = "time [ms],probe [mV],u\n0.0,10,1\n0.5,20,2\n1.0,15,3\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "answers", "declared"),
+    [
+        (HEADED, [["time", "ms"], ["current", "10 A/V"], ["", ""]], {"time": "1", "current": "2*10 A/V"}),
+        (HEADED, [["time", "us"], ["current", "-2e-3 A"], ["displacement", "um"]], None),
+        (HEADED, [["time", "ms"], ["current", "A"], ["voltage", "V"]], None),
+        (HEADED, [["time", "ms"], ["voltage", "mV"], ["current", "0,25 A"]], None),
+        (HEADED, [["time", "ms"], ["", ""], ["force", "2*3 N/V"]], None),
+        (HEADED, [["time", "2 ms"], ["displacement", "50 um/V"], ["current", ".5mA"]], None),
+        ("0,1,2\n1,3,4\n2,5,6\n", [["time", "10 us"], ["displacement", "um"], ["current", "-3"]], None),
+        ("TIME,CURRENT [MA]\n0,1\n1,3\n2,5\n", [["time", "ms"], ["current", "mA"]], None),
+    ],
+)
+def test_answered_columns_are_declared_in_the_file_beside_the_table(
+    ask: Any, tmp_path: Path, text: str, answers: list[list[str]], declared: dict[str, str] | None
+) -> None:
+    found = ask("table", text, answers)["found"]
+    path, beside = tmp_path / "a.csv", tmp_path / "a.csv.toml"
+    path.write_text(text, encoding="utf-8")
+    beside.write_text(found["beside"], encoding="utf-8")
+    assert declared is None or tomllib.loads(found["beside"]) == {"columns": declared}
+    read = read_table(path, {"time": "s"}, optional=CURVES).values
+    assert {name.replace("time", "t") for name in read} == set(found["data"])
+    for name, values in read.items():
+        np.testing.assert_allclose(found["data"][name.replace("time", "t")], values, rtol=1e-12)
+
+
+def test_a_table_with_a_heading_needs_no_file_beside(ask: Any) -> None:
+    assert "beside" not in ask("table", "time [us],current [A]\n0,1\n1,2\n", None)["found"]
+
+
 @pytest.mark.parametrize("name", exports.EXPORTS)
-def test_the_layout_of_an_export_is_that_of_python(ask: Any, name: str) -> None:
+def test_the_layout_of_an_export_is_that_of_python(ask: Any, name: str, tmp_path: Path) -> None:
     """Separator, headings, units, numbers, and the times that metadata state."""
     export = exports.EXPORTS[name]()
     text = decoded(export.content, "a.csv")
@@ -377,9 +412,16 @@ def test_the_layout_of_an_export_is_that_of_python(ask: Any, name: str) -> None:
     # What the heading leaves open is answered.
     answers = columns_said(export, found["headings"])
     if name not in ("sigrok", "start and step"):
-        data = ask("table", text, answers)["found"]["data"]
+        record = ask("table", text, answers)["found"]
+        data = record["data"]
         if name == "Saleae, edges":
             return
+        if answers:
+            path = tmp_path / "a.csv"
+            path.write_bytes(export.content)
+            path.with_name("a.csv.toml").write_text(record["beside"], encoding="utf-8")
+            for quantity, values in read_table(path, {"time": "s"}, optional=CURVES).values.items():
+                np.testing.assert_allclose(data[quantity.replace("time", "t")], values, rtol=1e-9, atol=1e-15)
         np.testing.assert_allclose(data["t"], exports.TIMES, rtol=1e-6, atol=1e-15)
         if "current" in data:
             np.testing.assert_allclose(data["current"], exports.CURRENT, atol=1e-5)

@@ -4,7 +4,7 @@ import { shown } from "./units.js";
 
 const FIRST = { time: "us", displacement: "um", current: "A", force: "N" };
 
-/** Ask; the promise gives a list of quantity and unit for each column, or null where it is left. */
+/** Ask; the promise gives quantity and unit of each column and whether they are to be saved as a file, or null where it is left. */
 export function askColumns(dialog, { name, columns, quantities, clock }) {
   return new Promise((done) => {
     const rows = columns.map((column, place) => {
@@ -20,10 +20,10 @@ export function askColumns(dialog, { name, columns, quantities, clock }) {
     const times = clock ? `Without a column of time the samples begin at ${shown(clock.start, "s")} and follow each other by ${shown(clock.step, "s")}, as the file states.` : "";
     const form = element("form", { method: "dialog", class: "asking" }, element("p", { hidden: !clock }, times),
       element("table", {}, element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows.map(({ row }) => row))),
-      element("button", { value: "use" }, "Use"), element("button", { value: "" }, "Leave it"));
+      element("button", { value: "use" }, "Use"), element("button", { value: "save", title: "File beside the table, from which the command line reads the columns" }, `Use and save ${name}.toml`), element("button", { value: "" }, "Leave it"));
     dialog.replaceChildren(element("h2", {}, `What do the columns of ${name} hold?`), form);
     dialog.returnValue = "";
-    dialog.addEventListener("close", () => done(dialog.returnValue === "use" ? rows.map(({ what, unit }) => [what.value, unit.value.trim()]) : null), { once: true });
+    dialog.addEventListener("close", () => done(dialog.returnValue ? { columns: rows.map(({ what, unit }) => [what.value, unit.value.trim()]), isSaved: dialog.returnValue === "save" } : null), { once: true });
     dialog.showModal();
   });
 }

@@ -5,6 +5,7 @@ import { buildControls } from "./controls.js";
 import { forcesView, motionView } from "./curves.js";
 import { element as make } from "./dom.js";
 import { thinned } from "./engine/table.js";
+import { save } from "./exports.js";
 import { bindKeys } from "./keys.js";
 import { mapView } from "./map.js";
 import { marksFor } from "./marks.js";
@@ -216,9 +217,10 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     const ask = (columns) => studio.ask("drop", { name: file.name, text, columns });
     let frame = await ask(null);
     if (frame.what === "columns") {
-      const columns = await askColumns(studio.parts.dialog, frame);
-      if (!columns) return;
-      frame = await ask(columns);
+      const answer = await askColumns(studio.parts.dialog, frame);
+      if (!answer) return;
+      frame = await ask(answer.columns);
+      if (answer.isSaved && frame.beside) save(`${file.name}.toml`, frame.beside, "text/plain");
     }
     if (frame.kind === "refusal") studio.say(frame.reason, true);
     else if (frame.what === "state") await take(frame);

@@ -7,6 +7,7 @@ const COLUMNS = { time: "s", displacement: "m", current: "A", force: "N", voltag
 const BY_UNIT = { time: "s", current: "A", force: "N" }; // what a unit identifies without a name
 const LARGEST = 1e9; // of a measured value, SI
 const CAPITALS = ["MA", "MV", "MN"]; // headings in capital letters write these for mA, mV and mN
+const PLAIN_AMOUNT = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?\s*[a-z\u00b5\u03bc][^\d+=,*()-]*$/i; // a number and a unit, as the command line reads them
 const BEFORE = 0.1; // of the peak, that a drive may have before time 0
 
 /** The quantity of each column by its name, or by a unit that occurs once. */
@@ -35,6 +36,21 @@ function valuesOf({ where, headings, rows }, place, what, unit) {
     if (Math.abs(value) > LARGEST) throw new Refusal(`${where}: line ${line}, column '${what}': ${cell}: expected a measured value of at most ${LARGEST} ${si}`);
     return value;
   });
+}
+
+/** The TOML file beside a table that declares the answered columns for the command line (printhammer/support/tables/columns.py). */
+function declarationOf({ headings }, told) {
+  const lines = told.flatMap(([what, unit], k) => {
+    if (!what) return [];
+    const own = headings[k].unit;
+    if (own && unit === own) return [`${what} = "${k + 1}"`];
+    const per = /\/\s*V$/.test(unit) ? `${COLUMNS[what]}/V` : COLUMNS[what];
+    const amount = factorOf(unit, per) === null ? unit : `1 ${unit}`;
+    const factor = PLAIN_AMOUNT.test(amount) ? amount : `${readQuantity(amount, per, { factor: 1, name: per }).value} ${per}`;
+    // An answer without "/V" is stated for the number in the table, whatever the unit of its heading.
+    return [`${what} = ${JSON.stringify(`${k + 1}*${factor}${own && !per.endsWith("/V") ? `/${own}` : ""}`)}`];
+  });
+  return `[columns]\n${lines.join("\n")}\n`;
 }
 
 /** Whether the heading leaves open what a column holds: an unknown name, no unit, no times or no curve. */
@@ -69,7 +85,7 @@ export function recordOf(text, where, told, limits) {
   const most = Math.min(time.length, limits.MOST_SAMPLES);
   const kept = [...new Set(Array.from({ length: most }, (_each, k) => Math.floor((k * (time.length - 1)) / Math.max(most - 1, 1))))];
   const thin = (values) => Float64Array.from(kept, (k) => values[k]);
-  return { what: "curves", name: where, data: { t: thin(time), ...Object.fromEntries(Object.entries(curves).map(([what, values]) => [what, thin(values)])) } };
+  return { what: "curves", name: where, ...(told ? { beside: declarationOf(table, told) } : {}), data: { t: thin(time), ...Object.fromEntries(Object.entries(curves).map(([what, values]) => [what, thin(values)])) } };
 }
 
 /** Check that a drive can be fired: it begins at time 0, ends soon enough and is no larger than a page sets. */
