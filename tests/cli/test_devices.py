@@ -13,6 +13,7 @@ from tests import hammers
 from tests.errors import refused
 
 import printhammer as ph
+from printhammer.control.learning.preparation import default_rate
 from printhammer.control.least_work.burst import least_work
 from printhammer.control.pulses import LARGEST_CURRENT, current_bound
 from printhammer.drive.waveforms.drivers import Rail
@@ -49,6 +50,17 @@ def test_default_rates_go_by_the_flight_time(scale: float, monkeypatch: pytest.M
         350.0,
         400.0,
     ]
+
+
+def test_pulses_at_the_default_rate_of_learning_interact() -> None:
+    relay, paper = ph.load("relay-5v"), ph.load("hendriks-1983-1")
+    rate = default_rate(relay, "own", current_bound(relay))
+    # `tune` refuses rates at which the relay is at rest before the next pulse, and names the lowest rate.
+    with pytest.raises(ph.InputError) as refusal:
+        ph.tune(relay, rate=0.79 * rate)
+    lowest = float(refusal.value.expected.removeprefix("a rate above ").removesuffix(" Hz"))
+    assert rate == pytest.approx(1.25 * lowest, rel=1e-3)
+    assert default_rate(paper, "switch", current_bound(paper)) == 1275.0
 
 
 def test_a_long_pulse_makes_a_device_slow(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -186,7 +186,11 @@ _PANEL: Final = "The sensor"
     "learn",
     "printhammer learn hendriks-1983 --rate 1.275kHz --force-noise 0.03 --serial A17 --table learned.json",
     {
-        "rate": opt.text("RATE", "Dot slots per second (default: 1.275 kHz; lower for a slow device)."),
+        "rate": opt.text(
+            "RATE",
+            "Dot slots per second (default: 1.275 kHz; lower for a slow device, but high enough that its"
+            " pulses interact).",
+        ),
         "driver": opt.choice(
             "own|switch",
             "Driver of the coil: the hammer's own pulse (own) or a fast unipolar driver (switch); default:"
@@ -276,6 +280,7 @@ def learn(
     import numpy as np
 
     from printhammer.control.learning.learn import learn as learned
+    from printhammer.control.learning.preparation import default_rate
     from printhammer.control.learning.sensor import ImpactSensor
     from printhammer.control.pulses import current_bound
     from printhammer.hammer.hammer import load
@@ -298,9 +303,10 @@ def learn(
     else:
         opt.check_unset({"signal-noise": signal_noise}, "--signal as well")
     driven = None if unit is None else load(unit)
-    passed.setdefault("rate", rate_text(hammer, 1275.0))
-    passed.setdefault("largest_current", current_bound(hammer))
-    passed.setdefault("driver", "switch" if pulse_of(hammer).quantity == "current" else "own")
+    largest = passed["largest_current"] = current_bound(hammer, passed.get("largest_current"))
+    driver = passed.setdefault("driver", "switch" if pulse_of(hammer).quantity == "current" else "own")
+    if "rate" not in passed:
+        passed["rate"] = f"{default_rate(hammer, driver, largest):.4g} Hz"
     with job.progress_bar("learning") as tell:
         result = learned(hammer, driven, sensor=ImpactSensor(**readings), progress=tell, **passed)
     likely = 100.0 * result.certainty[-1]

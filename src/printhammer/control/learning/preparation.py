@@ -23,6 +23,7 @@ from printhammer.printing.dots.nominal import nominal
 from printhammer.printing.rates.variability import Variability
 from printhammer.run.effort import Effort
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
+from printhammer.run.window import scaled_rate
 from printhammer.support.arrays import FloatArray
 from printhammer.support.threads import together
 
@@ -31,6 +32,21 @@ DOUBT: Final = 0.0  # Default of `doubt`: no posterior sample may print fewer do
 MEMBERS: Final = 400
 """Default number of simulated hammers on which the sequence of test pulses is chosen."""
 _FEW: Final = 24  # Number of simulated hammers on which the open loops are compared
+_RATE: Final = 1275.0  # Default slot rate for the paper's hammer, Hz
+# Smallest default slot rate, relative to the lowest rate at which successive pulses interact; arbitrary
+_ABOVE: Final = 1.25
+
+
+def default_rate(hammer: Hammer, driver: str, largest_current: float) -> float:
+    """Compute the default slot rate of learning, Hz, at which successive pulses of the device interact.
+
+    The rate is 1275 Hz divided by the time scale of the device, but at least 1.25 times the rate whose period
+    is the settling time of a single pulse.
+    """
+    driven = driven_by(hammer, driver, largest_current)
+    pulse, _widest = print_pulse(driven, largest_current)
+    settled = single_of(driven, pulse, DISPLAY_TOLERANCE).settled
+    return max(scaled_rate(hammer, _RATE), _ABOVE / settled)
 
 
 def law_for(
