@@ -81,7 +81,10 @@ class Report(Declared):
         if not ratios:
             return "There is no other solver to compare with."
         nearest = min(ratios, key=ratios.__getitem__)
-        return f'The closest other solver is "{nearest}", with a speed ratio of {ratios[nearest]:.3g}.'
+        return (
+            "At the same error, the fastest other solver is the one in the row"
+            f' "{nearest}"; printhammer is {ratios[nearest]:.3g} times as fast.'
+        )
 
     def frames(self) -> Rows:
         """Return the table rows of the timings of Figure 9."""

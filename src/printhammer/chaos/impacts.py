@@ -165,12 +165,12 @@ def sections(
     effort: Effort = DEFAULT,
     **_keywords: Unpack[Keywords],
 ) -> list[Section]:
-    """Compute the sections of many trains from rest in parallel; see `section`.
+    """Compute Poincaré sections of many trains from rest, in parallel; see `section`.
 
     Parameters
     ----------
     hammers, periods, waveform, overlap
-        Hammers or regimes, and the firing of hammers; see `printhammer.run.regime.regimes_of`.
+        Hammers with firing periods, or regimes alone; see `printhammer.run.regime.regimes_of`.
     surface, touches, transient, firings
         As for `section`, for all trains.
 

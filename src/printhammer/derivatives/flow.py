@@ -277,7 +277,7 @@ def pack_push_changes(
 
 
 def pack_push_rate(problem: Problem, record: Record, t: float) -> float:
-    """Return the rate of change of the pack force at a time, s, in N/s; NaN off the loading branch."""
+    """Return the rate of change of the pack force, N/s, at a time, s; NaN off the loading branch."""
     row = problem.resample(record, np.array([t]))[0]
     if int(row[9]) != M.LOADING:
         return math.nan

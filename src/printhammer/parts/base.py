@@ -172,12 +172,13 @@ _P = TypeVar("_P", bound=type[Part])
 def register(part: _P) -> _P:
     """Class decorator that registers a part class under its role and law.
 
-    A class of a notebook cell, from which no hammer can be built, is replaced by a class of a file.
+    A registered class that was defined in a notebook cell may be replaced by a class with the same role and
+    law, since no hammer can be built from a class without a source file.
 
     Raises
     ------
     ValueError
-        If the role is unknown or another class has the same law name.
+        If the role is unknown, or another class from a file has the same role and law.
     """
     if part.role not in ROLES:
         known = ", ".join(ROLES)

@@ -388,7 +388,7 @@ def _read_csv(source: Path) -> pd.DataFrame:
 
 
 def _parse_column(cells: list[str]) -> Any:
-    """Convert a column of text cells to exact numbers, Booleans or text."""
+    """Convert a column of text cells to Booleans, integers or floats; leave other columns as text."""
     if set(cells) <= {"True", "False"}:
         return np.array([cell == "True" for cell in cells])
     for kind in (int, float):

@@ -42,7 +42,7 @@ class Beyond(NamedTuple):
 
 AT_REST: Final = Beyond()
 FORMS: Final = {2: (), 3: (2,), 4: (0, 1), 5: (2, 3, 4), 7: (0, 1, 2, 3, 4)}
-"""Valid lengths of a state, and the fields of `Beyond` that follow displacement and velocity in each."""
+"""Indices of the `Beyond` fields that follow displacement and velocity, by length of the state."""
 
 STATE: Final = (
     "displacement in m and velocity in m/s; in the pack with branch and memory in m; under a voltage then"
@@ -54,7 +54,7 @@ HELD_BRANCHES: Final = {HELD_LOADING: LOADING, HELD_UNLOADING: UNLOADING}
 
 _UNITS: Final = ("m", "m/s")
 _UNITS_BEYOND: Final = ("1", "m", "A", "A", "V")
-"""Units of the state components: displacement, velocity, and the fields of `Beyond`."""
+"""Units of the state components: displacement and velocity, then the further components in `Beyond`."""
 
 _BRANCHES = {LOADING: "loading", UNLOADING: "unloading", RELOADING: "reloading"}
 

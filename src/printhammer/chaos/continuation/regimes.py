@@ -326,7 +326,7 @@ def _is_on(branch: Branch, orbit: Orbit) -> bool:
 
 
 def _is_at_section(branch: Branch, orbit: Orbit, phase: float) -> bool:
-    """Whether an orbit lies on the segments of a branch whose section has the given phase."""
+    """Whether an orbit lies on a branch, tested on the segments at the section with the phase `phase`."""
     value, state = orbit.regime.value(branch.parameter), _state_at(orbit, phase)
     half_widths = branch.regime.window.half_widths
     values = branch.values

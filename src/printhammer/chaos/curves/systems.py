@@ -283,7 +283,7 @@ class ImpactSystem:
         return _IN_TRACE[self.kind]
 
     def _miss(self, flight: Flight, speed: float) -> FloatArray:
-        """Compute the scaled residuals: displacement and velocity of the next impact, test function."""
+        """Compute the scaled residuals of displacement and velocity at impact, and of the test function."""
         matrix, e, w = flight.jacobian, flight.rebound, float(flight.end[1])
         determinant = e * e * float(np.linalg.det(matrix))
         trace, rest = self._sign, determinant + (1.0 if self._sign else -1.0)

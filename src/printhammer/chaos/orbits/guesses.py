@@ -37,7 +37,7 @@ _EARLY: Final = 2
 _LEAST: Final = 16
 """Smallest number of firings over which a motion is recorded."""
 _ROOM: Final = 1.2  # Extent of the initial states beyond the strobe window, in half-widths of the window
-# Extent of the initial states without a bound: a ball that bounces once a period rises 5 half-widths
+# Extent of the initial states without a bound: a ball with one bounce per period rises to 5 half-widths
 _SCALES: Final = 6.0
 _PLASTIC: Final = 1.324717957244746
 """Real root of x^3 = x + 1, whose inverse powers spread points evenly over a square."""
@@ -96,11 +96,12 @@ def record(
 
 
 def spread(regime: Regime, count: int, visited: FloatArray) -> FloatArray:
-    """Distribute initial states evenly: half over the strobe window, half over the states `visited`.
+    """Distribute initial states evenly: half over the strobe window, half over a larger rectangle.
 
-    If backstop and pack do not both bound the displacement, the region extends over at least six half-widths
-    of the window on either side: a ball that bounces once per period rises to five half-widths. A row is
-    displacement, m, and velocity, m/s.
+    The rectangle contains the window, the states `visited` and the range up to the pack. If backstop and pack
+    do not both bound the displacement, the rectangle extends over at least six half-widths of the window on
+    either side: in the bouncing-ball model, an orbit with one impact per period rises to five half-widths.
+    A row is displacement, m, and velocity, m/s.
     """
     window = regime.window
     low, high = np.array([window.x[0], window.v[0]]), np.array([window.x[1], window.v[1]])

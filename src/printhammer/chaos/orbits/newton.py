@@ -144,7 +144,7 @@ class _Search:
         self.open &= np.isfinite(self.residual)
 
     def step(self, goal: float, enough: float) -> IntArray:
-        """Try one damped Newton step for every open orbit; return the indices of these orbits."""
+        """Try one damped Newton step for every unfinished orbit; return the indices of these orbits."""
         self._end(self.open & (self.residual <= goal), CLOSED)
         rows = np.flatnonzero(self.open)
         if not rows.size:

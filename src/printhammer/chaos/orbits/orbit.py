@@ -242,7 +242,7 @@ class Orbit(Result):
         return orbits_table([self], self.attributes)
 
     def motion(self) -> Motion:
-        """Integrate one period of the orbit again, from its section, as a `Motion`.
+        """Integrate one period of the orbit from its state at the section; return the `Motion`.
 
         The motion begins `phase` periods after a firing of an ongoing train; its start time is therefore not
         0.
@@ -250,7 +250,7 @@ class Orbit(Result):
         Raises
         ------
         ValueError
-            The orbit does not exist.
+            The search found no orbit.
         """
         if not self.ok:
             raise ValueError(f"there is no such orbit: {self.status}")

@@ -32,7 +32,7 @@ from printhammer.run.effort import DEFAULT, Effort, Keywords, computation
 from printhammer.run.regime import Regime
 
 STAGES: Final = (32, 128)
-"""Numbers of firings after which trains are tested for an early period."""
+"""Numbers of firings after which a still unclassified train is tested for a stable periodic motion."""
 
 CLOSER: Final = 1e-2
 """Tolerance of the early test: largest distance of repeated states, as a fraction of `AGREEMENT`."""

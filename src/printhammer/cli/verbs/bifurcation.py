@@ -171,7 +171,7 @@ _count = partial(opt.whole, panel=_BASINS)
         ),
         "tail": opt.text(
             "TIME",
-            "Time after the second firing within which its dot has to strike the pack"
+            "Time after the second firing within which the armature must strike the pack"
             " (default: 1 ms; longer for a slow device).",
             panel=_QUENCH,
         ),

@@ -191,7 +191,7 @@ def duty(
     ),
     **passed: Any,
 ) -> Answer:
-    """Compute the highest continuous rate of a coil by ambient temperature, and the limits of bursts."""
+    """Compute the highest continuous dot rate at each ambient temperature, and the longest allowed bursts."""
     if rates is not None:
         from printhammer.control.thermal_limit import read_rates, thermal_limit
         from printhammer.errors import located

@@ -30,7 +30,7 @@ _MOST_RATES: Final = 200  # Largest number of rates; each takes seconds to minut
         ),
         "largest": opt.text(
             "CURRENT",
-            "Limit on the magnitude of the current (default: 2 A, or the peak of the hammer's own pulse).",
+            "Limit on the magnitude of the current (default: the hammer's peak current, but at least 2 A).",
         ),
         "slew": opt.number(
             "Limit on the slope of the current, A/s (default: steepest rise of the hammer's waveform).",
@@ -117,7 +117,7 @@ def energy(
     {
         "current": opt.text(
             "CURRENT",
-            "Limit on the magnitude of the current (default: 2 A, or the peak of the hammer's own pulse).",
+            "Limit on the magnitude of the current (default: the hammer's peak current, but at least 2 A).",
         ),
         "edge": opt.text(
             "TIME", "Time constant of the driver (default: decay time of the hammer's waveform)."

@@ -119,10 +119,10 @@ def solenoid(
     strict: bool = _STRICT,
     **passed: Any,
 ) -> Answer:
-    """Fit the magnetic circuit of a solenoid or pot magnet: gap, fringe, core, leakage.
+    """Fit the magnetic circuit of a solenoid or pot magnet: gap, fringing, core and leakage.
 
-    Force and inductance at one current reveal the saturation of the core. The constants are those of the
-    magnet law `reluctance`, except the displacement at which its gap closes.
+    Force and inductance measured at the same current determine the saturation of the core. The
+    constants are those of the magnet law `reluctance`, except the displacement at which its gap closes.
     """
     if example:
         table = files("printhammer").joinpath("identify", "static", "pot-magnet.csv")
@@ -196,7 +196,7 @@ def backstop(
     file: Path | None = _measured("Table of rebounds: columns impact speed, rebound speed."),
     radius: list[str] | None = opt.text(
         "LENGTH",
-        "Radius of the armature's contact surface; repeat the option for a round backstop.",
+        "Radius of the armature's contact surface; repeat the option for the radius of a round backstop.",
         many=True,
     ),
     modulus: list[str] | None = opt.text(
@@ -322,8 +322,8 @@ def coil(
 ) -> Answer:
     """Fit resistance and inductance of the coil, optionally a shorted turn or saturation, to current records.
 
-    The hammer's driver, or the voltage column of the table, drives the coil. The hammer supplies the initial
-    guesses.
+    The coil voltage is the voltage column of the table or, without that column, the output of the hammer's
+    driver. The hammer supplies the initial guesses.
     """
 
     def made(known: Hammer | None) -> Fit:
@@ -338,7 +338,7 @@ def coil(
         keys = None if free is None else _keys(free)
         return fit_coil(files, known, free=keys, also=_keys(also or ""), **passed)
 
-    zero = "time 0 of a record is switch-on; a column 'voltage' drives the coil from its first row on"
+    zero = "time 0 of a record is switch-on; a column 'voltage' is the coil voltage from its first row on"
     return _run_fit(job, hammer, strict, made, zero)
 
 

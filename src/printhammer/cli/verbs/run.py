@@ -39,7 +39,12 @@ _record = partial(opt.file, panel=_FILES)
         ),
         "points": opt.whole("Number of time points of the saved motion."),
     },
-    out=opt.results("the motion or, with .json, its dots, contacts and energies", panel=_FILES),
+    out=opt.files(
+        "Output file: the motion (.nc, .zarr, .csv, .parquet; SI), its dots, contacts and energies (.json),"
+        " or a picture (.svg, .png, .pdf); repeatable.",
+        *opt.DATA,
+        panel=_FILES,
+    ),
     dots=_record("Output file for the table of dots (.csv, .parquet).", ".csv", ".parquet"),
     contacts=_record("Output file for the table of contacts (.csv, .parquet).", ".csv", ".parquet"),
     closings=_record("Output file for the closings of contacts (.csv, .parquet).", ".csv", ".parquet"),

@@ -109,14 +109,14 @@ _trains = partial(opt.text, panel=_TRAINS)
 def lyapunov(
     job: Job,
     hammer: Hammer = opt.HAMMER,
-    period: str | None = _trains("TIMES", "Times between firings, e.g. '1.15 ms, 1.30 ms'."),
+    period: str | None = _trains("TIMES", "Firing periods, e.g. '1.15 ms, 1.30 ms'."),
     rate: str | None = _trains("RATES", "Firings per second, e.g. '952 Hz'."),
     lowest: str | None = _trains(
-        "TIME", "Lower end of a range of times between firings, e.g. '0.8 ms'.", flag="--from"
+        "TIME", "Lower end of a range of firing periods, e.g. '0.8 ms'.", flag="--from"
     ),
-    highest: str | None = _trains("TIME", "Upper end of the range of times between firings.", flag="--to"),
+    highest: str | None = _trains("TIME", "Upper end of the range of firing periods.", flag="--to"),
     steps: int | None = opt.whole(
-        f"Number of times between firings in the range (default: {_STEPS}).", panel=_TRAINS
+        f"Number of firing periods in the range (default: {_STEPS}).", panel=_TRAINS
     ),
     threads: int | None = opt.THREADS,
     **passed: Any,

@@ -83,11 +83,11 @@ _MOST_RATES: Final = 2000  # Largest number of rates of a table; arbitrary
         ),
         "driver": opt.choice(
             "own|switch",
-            "Driver of the coil: the hammer's own pulse (own) or a fast unipolar driver (switch).",
+            "Driver of the coil: the hammer's pulse (own) or a fast unipolar driver (switch).",
             default="own",
         ),
         "largest_current": opt.text(
-            "CURRENT", "Limit on the current (default: 2 A, or the peak of the hammer's own pulse)."
+            "CURRENT", "Limit on the current (default: the hammer's peak current, but at least 2 A)."
         ),
     },
     out=opt.results("the compensation table", ".h"),
@@ -193,7 +193,7 @@ _PANEL: Final = "The sensor"
         ),
         "driver": opt.choice(
             "own|switch",
-            "Driver of the coil: the hammer's own pulse (own) or a fast unipolar driver (switch); default:"
+            "Driver of the coil: the hammer's pulse (own) or a fast unipolar driver (switch); default:"
             " own if the hammer has a voltage driver, else switch.",
         ),
         "history": opt.whole("Number of preceding gaps that select a table entry, 1 to 4.", default=2),
@@ -213,7 +213,7 @@ _PANEL: Final = "The sensor"
             "Seed for the simulated hammers, and for the test unit if --unit is not given.", default=1983
         ),
         "largest_current": opt.text(
-            "CURRENT", "Limit on the current (default: 2 A, or the peak of the hammer's own pulse)."
+            "CURRENT", "Limit on the current (default: the hammer's peak current, but at least 2 A)."
         ),
         "threads": opt.THREADS,
     },

@@ -91,7 +91,7 @@ class Driver(Declared):
         return Switched(at=tuple(at), levels=tuple(levels), edge=self.edge, initial=initial)
 
     def push(self, width: float) -> Switched:
-        """Return a rectangular current pulse of a width, s, at the driver's current limit."""
+        """Return a rectangular current pulse of the given width, s, at the driver's current limit."""
         return self.switched((0.0, width), (self.current, 0.0))
 
     def drive(self, pulses: Sequence[Switched], at: Sequence[float] = (0.0,)) -> BoundedSequence:
@@ -100,7 +100,7 @@ class Driver(Declared):
 
 
 class BoundedSequence(PulseSequence):
-    """Sequence of driver pulses; the declared largest value is the driver's current limit."""
+    """Sequence of driver pulses whose declared peak current is the driver's current limit."""
 
     bounded = True
 
@@ -118,8 +118,8 @@ def driver_of(hammer: Hammer, current: float = LARGEST_CURRENT, edge: float | No
     """Return a driver for a current-driven hammer, with a current limit, A.
 
     The time constant `edge`, s, applies to rise and decay; by default it is the decay time constant of the
-    hammer's own waveform. The hammer's waveform rises more slowly; the faster rise needs a higher supply
-    voltage.
+    hammer's waveform. The current of the hammer's waveform rises more slowly; the faster rise of the driver
+    needs a higher supply voltage.
     """
     pulse = pulse_of(hammer)
     if pulse.quantity != "current":

@@ -113,7 +113,8 @@ def front_force(farther: Plant, table: ImpactMap) -> FloatArray:
 def between_fronts(front: FloatArray) -> tuple[IntArray, FloatArray]:
     """Locate M pack distances: index of the map below, and weight of the map above.
 
-    A front is the distance beyond nominal as a fraction of the stroke; values outside the maps are clipped.
+    `front` is the pack distance beyond nominal, as a fraction of the stroke; values outside the maps are
+    clipped.
     """
     return place_of(np.clip(front, OFFSETS[0], OFFSETS[-1]), np.array(OFFSETS))
 
@@ -297,7 +298,7 @@ class Policy:
 
 
 class Choice:
-    """Outcomes of all actions from M touches, interpolated in speed and in the distance of the front."""
+    """Outcomes of all switching actions after M touches, interpolated in touch speed and pack distance."""
 
     def __init__(self, fronts: Fronts, kind: IntArray, speed: FloatArray, front: FloatArray) -> None:
         self._fronts = fronts

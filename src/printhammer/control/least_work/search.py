@@ -213,10 +213,10 @@ _INSIDE: Final = 1.0 - 1e-9  # Factor on current and slope limits: rounding erro
 
 
 class NodePlan:
-    """Plan of a burst with piecewise linear current: nodal currents so far, and the state they lead to.
+    """Partial plan of a burst with piecewise-linear current: planned nodal currents and resulting state.
 
-    `period`, `past` (from a touch to the end of its slot), `spacing` (between nodes) and `flight` (of the
-    single pulse) are times, s.
+    Arguments are times, s: the slot `period`, the time `past` from a pack contact to the end of its slot, the
+    node `spacing`, and the `flight` time of the single pulse.
     """
 
     def __init__(self, task: Task, period: float, past: float, spacing: float, flight: float) -> None:

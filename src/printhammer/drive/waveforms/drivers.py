@@ -257,7 +257,7 @@ def _has_text(entries: object) -> bool:
 
 
 def _number(entry: object, unit: str, name: str) -> Any:
-    """Parse an entry of a column; pydantic validates entries that are not text."""
+    """Parse a list entry that is text; return any other entry unchanged, for pydantic to validate."""
     return read_number(entry, unit, name) if isinstance(entry, str) else entry
 
 

@@ -107,10 +107,11 @@ def panel(
     named: bool = True,
     printed: str = "",
 ) -> None:
-    """Draw the strobe points of a train into axes limited by a window, with the count of points outside.
+    """Draw the strobe points of a train inside a window; write the number of points outside the window.
 
-    `size` is the diameter of a mark, points. `named` writes strobe time and classification into the panel;
-    `printed`, the classification in the paper, is added if it differs.
+    `size` is the diameter of a marker, in points. If `named`, strobe time and classification are written into
+    the panel; `printed` is the classification in the paper, which is added if it differs from the computed
+    classification.
     """
     ax.set_xlim(*(float(way.shown(end)) for end in window.x))
     ax.set_ylim(*(float(speed.shown(end)) for end in window.v))

@@ -1,4 +1,4 @@
-"""Figures of a coil: dead time and pulses of equal impact speed, against rail voltage and temperature.
+"""Plots for a coil: dead time and width of the pulse, against rail voltage and temperature.
 
 `plot_duty` draws the highest continuous rate of a coil against the ambient temperature.
 
@@ -28,7 +28,7 @@ from printhammer.figures.elements.style import new_figure, new_panel, sign, styl
 def plot_dead_time(table: DeadTime) -> Figure:
     """Draw dead time and pulse width against the rail voltage, one line per temperature.
 
-    Thin dashed lines: nominal pulse. Bold lines: pulses of equal impact speed.
+    Thin dashed lines: nominal pulse. Bold lines: pulses that give the same impact speed.
     """
     figure = new_figure(5.2)
     grid = figure.add_gridspec(2, 1)

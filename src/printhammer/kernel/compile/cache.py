@@ -77,7 +77,7 @@ def _folders() -> Iterator[Path]:
 
 
 def _is_safe(folder: Path) -> bool:
-    """Whether no other user can write code to the folder; checked for the temporary folder only."""
+    """Whether only the user can write to a cache folder; every folder but the temporary folder is trusted."""
     if folder != _temporary_folder():
         return True
     try:

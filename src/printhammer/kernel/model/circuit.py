@@ -74,7 +74,7 @@ current), and decay of a negative current."""
 
 PATH = 1
 UNTIL = 2
-"""Indices in `live`, counted from its end, of the current path and of the end of the chopper's off-time."""
+"""Indices in `live`, counted from its end: path of the coil current, and end of the chopper's off-time."""
 
 STILL_SHARE = 1e-12
 """Largest change of the electric state in one characteristic time that counts as zero, as a fraction of the
@@ -127,7 +127,7 @@ def linkage_at(x: float, current: float, hammer: Hammer) -> float:
 
 @inlined
 def coil_current(x: float, electric: Electric, hammer: Hammer, live: Any) -> float:
-    """Return the coil current [A]; zero while the current path is blocked."""
+    """Return the coil current [A]; zero while the path of the current is blocked."""
     if path_of(live) == BLOCKED:
         return 0.0
     if hammer[TURN_RESISTANCE] > 0.0:
@@ -260,7 +260,7 @@ def path_may_change(live: Any) -> bool:
 
 @compiled
 def path_gap(x: float, v: float, electric: Electric, hammer: Hammer, live: Any) -> float:
-    """Return the event function of the current path: of order one, positive until the path changes."""
+    """Return the event function of the coil current's path: of order one, positive until a change of path."""
     kind, path = kind_of(live), path_of(live)
     scale = hammer[CURRENT_SCALE]
     if kind == SWITCHED_PIECE:
@@ -284,7 +284,7 @@ def path_gap(x: float, v: float, electric: Electric, hammer: Hammer, live: Any) 
 
 @compiled
 def next_path(t: float, x: float, electric: Electric, hammer: Hammer, live: Any) -> Electric:
-    """Select the next current path once `path_gap` has reached zero; return the electric state there."""
+    """Select the next path of the coil current when `path_gap` reaches zero; return the electric state."""
     path = path_of(live)
     if kind_of(live) == DECAY_PIECE:
         if path == BLOCKED:
@@ -306,7 +306,7 @@ def next_path(t: float, x: float, electric: Electric, hammer: Hammer, live: Any)
 
 @compiled
 def enter_piece(t: float, x: float, electric: Electric, hammer: Hammer, live: Any) -> Electric:
-    """Select the current path when a piece begins or an off-time ends; return the electric state."""
+    """Select the coil current's path when a piece begins or an off-time ends; return the electric state."""
     current = coil_current(x, electric, hammer, live)
     kind = kind_of(live)
     if kind == SWITCHED_PIECE and current >= live[6]:

@@ -16,7 +16,8 @@ from printhammer.kernel.model.modes import PACK_SURFACE
 from printhammer.kernel.readout.sums import pairwise_sum
 
 SURFACE, TIME_IN, SPEED_IN, TIME_OUT, SPEED_OUT = range(5)
-"""Columns of a contact: surface, time [s] and velocity [m/s] at touch and at leaving, NaN while open."""
+"""Columns of a contact record: surface, time [s] and velocity [m/s] at touch, and time and velocity at
+leaving, NaN while the contact is open."""
 PEAK_TIME, DEPTH, FORCE = range(5, 8)
 """Columns of the time of the largest indentation [s], that indentation [m], and the largest force [N], NaN
 on a rigid backstop."""
@@ -26,16 +27,16 @@ the pack contacts of its firing (-1 for a contact of no firing), and 1 if open a
 BEGIN, END = range(12, 14)
 """Columns of the first step within the contact and the step after the last step within."""
 CONTACT_WIDTH = 14
-"""Number of columns of a contact."""
+"""Number of columns of a contact record."""
 
 FIRED_AT, STRUCK, FLIGHT_TIME, IMPACT_SPEED, PEAK_FORCE, INDENTATION = range(6)
-"""Columns of a dot: time of the firing [s], 1 if it made a dot, flight time [s], speed at touch [m/s],
+"""Columns of a dot record: firing time [s], 1 if a dot is made, flight time [s], speed at touch [m/s],
 largest force [N] and indentation [m]. For a lost dot, the columns from the flight time on are NaN."""
 CONTACT_TIME, LOADING_WORK, NET_LOSS, EXTRA_CONTACTS = range(6, 10)
 """Columns of the contact time [s] (NaN while open), the work up to the largest indentation [J], the energy
 dissipated in the pack [J], and the number of extra contacts."""
 DOT_WIDTH = 10
-"""Number of columns of a dot."""
+"""Number of columns of a dot record."""
 
 
 def nodes_before(t: float, nodes: Any, included: bool) -> int:

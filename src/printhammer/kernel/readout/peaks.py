@@ -1,7 +1,7 @@
-"""Peaks of the pack contacts of a run, for its dots; computed faster than the peaks of all contacts.
+"""Largest indentation and peak force of each pack contact of a run; backstop contacts are skipped.
 
-Against a pack whose law has memory, the armature turns back at a node, which is the peak of the contact. Only
-other packs need the search of :func:`printhammer.kernel.single.resample.peaks`.
+If the pack law has memory, the integrator ends a step where the armature turns back, so that the indentation
+is largest at a node. Only other packs need the search of :func:`printhammer.kernel.single.resample.peaks`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def write_pack_peaks(contacts: Any, nodes: Any, train: Any, hammer: Any, out: Any) -> None:
-    """Write time of largest depth, largest depth and peak force of m contacts to `out`, shape (m, 3).
+    """Write time and value of the largest indentation, and peak force, of m contacts to `out`, (m, 3).
 
     The row of a backstop contact holds the touch time and two zeros. Arguments as for
     :func:`printhammer.kernel.single.resample.peaks`.

@@ -49,7 +49,7 @@ def keep_electric(electric: Electric, state: State) -> None:
 
 @inlined
 def electric_at_start(x: float, hammer: Hammer, state: State, live: Any) -> Electric:
-    """Return the electric state at the start or continuation of a run, and restore the current path."""
+    """Return the electric state where a run starts or continues; restore the path of the coil current."""
     if HAS_CIRCUIT:
         if state[C.STATE] == C.GOES_ON:
             take_path(live, state[C.PATH], state[C.UNTIL])
@@ -115,7 +115,7 @@ def rate_in_backstop(state: State, setup: Setup) -> None:
 
 @inlined
 def pass_edge(state: State, setup: Setup) -> None:
-    """Start and end the waveform pieces whose edge is at the present time; update the current path."""
+    """Start and end waveform pieces with an edge at the present time; update the coil current's path."""
     train = setup.train
     first, last, edge = pass_edges(state[C.TIME], train, int(state[C.FIRST]), int(state[C.LAST]))
     state[C.FIRST], state[C.LAST], state[C.EDGE] = first, last, edge
@@ -127,7 +127,7 @@ def pass_edge(state: State, setup: Setup) -> None:
 
 @inlined
 def note_path(state: State, setup: Setup, nodes: Any) -> None:
-    """Write the electric state and the current path to the latest node of the record."""
+    """Write the electric state and the path of the coil current to the latest node of the record."""
     if HAS_CIRCUIT:
         note_circuit(nodes, int(state[C.USED]), electric_of(state), path_of(setup.train.live))
 

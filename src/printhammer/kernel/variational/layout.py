@@ -43,13 +43,13 @@ GROWN = 2
 SPACING = 1e-3
 """Step of difference quotients with respect to a constant, as a fraction of the constant or its scale."""
 MIDDLE = 4
-"""Row of `varied` that holds the unchanged constants."""
+"""Row of `varied` that holds the unchanged parameters."""
 VARIED = 9
-"""Number of rows of `varied`: row 4 + j holds the constants shifted by j times `SPACING` of the change."""
+"""Number of rows of `varied`: row 4 + j holds the parameters shifted by j * `SPACING` * `moves`."""
 FIELD_MOVES, PACK_MOVES, BACKSTOP_MOVES, DAMPING_MOVES, CIRCUIT_MOVES = 1, 2, 4, 8, 16
-"""Bits of `of_hammer` for the laws that a constant changes; mass and backstop position belong to no law."""
+"""Bits of `of_hammer`, one per law that depends on a constant; mass and backstop position have no bit."""
 DELAYED = 5
-"""Number of values per active pulse: changes of the waveform piece's start and of coefficients p0 to p3."""
+"""Number of values per active pulse: derivatives of the piece's start and of coefficients p0 to p3."""
 
 
 class Forcing(NamedTuple):
@@ -58,12 +58,12 @@ class Forcing(NamedTuple):
     Attributes
     ----------
     varied, moves : float64 arrays, shapes (n, 9, h) and (n, h)
-        Parameter arrays shifted by -4 to 4 times `SPACING` of their changes, and the changes per unit of each
-        constant.
+        Parameter arrays p + j * `SPACING` * `moves` for j from -4 to 4, where p is the array of the hammer;
+        and the derivatives of p with respect to each constant.
     of_hammer : int64 array, shape (n,)
-        Laws that each constant changes, as a sum of bits.
+        Bit mask of the laws that depend on each constant; the bits are `FIELD_MOVES` and so on.
     fire_moves, piece_moves : float64 arrays, shapes (n, f) and (n, m, 6)
-        Changes of the firing times [s] and of the waveform tables, per unit of each constant.
+        Derivatives of the firing times [s] and of the waveform tables with respect to each constant.
     live_moves, memories : float64 arrays, shapes (n, 5 f) and (n, 9)
         Working space.
     value_spacing : float

@@ -110,7 +110,7 @@ class Term(BaseModel):
     law: ClassVar[str]
 
     def row(self, mass: float) -> Row:
-        """Return the packed constants; `mass` is the mass of the armature, kg."""
+        """Return the row of packed constants of the entry; `mass` is the mass of the armature, kg."""
         raise NotImplementedError
 
 
@@ -122,7 +122,7 @@ class ConstantForce(Term):
     force: float = quantity("N", "F", "constant force, positive toward the paper")
 
     def row(self, mass: float) -> Row:
-        """Return the packed constants."""
+        """Return the row of packed constants of the force."""
         return (0.0, 0.0, self.force, 0.0, 0.0)
 
 
@@ -137,7 +137,7 @@ class Gravity(Term):
     acceleration: float = quantity("m/s^2", "g", "acceleration of free fall", gt=0, default=GRAVITY)
 
     def row(self, mass: float) -> Row:
-        """Return the packed constants."""
+        """Return the row of packed constants of the force."""
         return (0.0, 0.0, -mass * self.acceleration * math.sin(self.angle), 0.0, 0.0)
 
 
@@ -151,7 +151,7 @@ class FurtherSpring(Term):
     position: float | None = quantity("m", "x0", "position of the preload", default=None)
 
     def row(self, mass: float) -> Row:
-        """Return the packed constants."""
+        """Return the row of packed constants of the force."""
         position = math.nan if self.position is None else self.position
         return (0.0, position, self.preload, -self.stiffness, 0.0)
 
@@ -166,7 +166,7 @@ class CubicForce(Term):
     center: float = quantity("m", "x0", "position at which the spring is relaxed")
 
     def row(self, mass: float) -> Row:
-        """Return the packed constants."""
+        """Return the row of packed constants of the force."""
         return (0.0, self.center, 0.0, -self.stiffness, -self.cubic)
 
 
@@ -203,7 +203,7 @@ class LinearContact(Term):
     stiffness: float = quantity("N/m", "K", "stiffness of the contact", gt=0)
 
     def row(self, mass: float) -> Row:
-        """Return the packed constants."""
+        """Return the row of packed constants of the contact."""
         return (FRONT if self.side == "front" else BACK, self.position, self.stiffness, self.power, 0.0)
 
     def force(self, depth: float) -> float:

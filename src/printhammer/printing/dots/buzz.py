@@ -191,9 +191,9 @@ def longest_run(motion: Motion, reference_force: float, forces: tuple[float, flo
 
 
 def delayed_train(hammer: Hammer, delay: float, pulses: int = _PULSES) -> tuple[float, ...]:
-    """Compute the firing times, s, of a train that fires a delay, s, after each pack departure.
+    """Compute the firing times, s, of a train that fires at a delay, s, after each pack contact ends.
 
-    The train has fewer than `pulses` firings if a firing makes no dot, since no departure follows.
+    The train has fewer than `pulses` firings if a firing makes no dot, since no contact then ends.
     """
     leaving = _departure(_run(hammer, [0.0], None))
     return (0.0,) if leaving is None else delayed_trains([hammer], [delay], [PATIENCE * leaving], pulses)[0]
@@ -209,15 +209,15 @@ def delayed_trains(
     hopeless: Callable[[DotTable, list[int]], BoolArray] | None = None,
     **options: Any,
 ) -> list[tuple[float, ...]]:
-    """Compute firing times of delayed trains for many hammers, in one ensemble per firing.
+    """Compute firing times, s, of many trains whose firings follow the pack contacts after a delay.
 
-    Each hammer has its own delay, s; see `delayed_train`.
+    Each hammer has its own delay, s; see `delayed_train`. One ensemble per firing simulates all trains.
 
-    `patience` is the time, s, to wait for a departure after each firing, and `pulses` the number of firings
-    of a complete train. The trains start from rest, or from `states`: displacement, m, and velocity, m/s.
-    `hopeless` is called with the dots of the unfinished trains and their indices, and returns a mask of the
-    trains to abandon. Further `options` are the `tolerance` of the simulations and `threads`, as for
-    `printhammer.Ensemble`.
+    `patience` is the longest time, s, to wait after each firing for the end of the pack contact, and `pulses`
+    the number of firings of a complete train. The trains start from rest, or from `states`: displacement, m,
+    and velocity, m/s. `hopeless` is called with the dots of the unfinished trains and their indices, and
+    returns a mask of the trains to abandon. Further `options` are the `tolerance` of the simulations and
+    `threads`, as for `printhammer.Ensemble`.
     """
     threads = options.pop("threads", None)
     trains = [[0.0] for _ in delays]

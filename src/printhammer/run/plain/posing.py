@@ -41,16 +41,16 @@ LAST: Final = 1.0
 
 
 PAPER_X: Final = (38.1e-6, 88.9e-6)
-"""Displacements of the window of Fig. 11 of Hendriks (1983), m: 0.0015 to 0.0035 in."""
+"""Displacement range of the window of Fig. 11 of Hendriks (1983), m (0.0015 to 0.0035 inch)."""
 
 PAPER_V: Final = (-0.635, 0.635)
-"""Velocities of the window of Hendriks' Fig. 11, m/s: -25 to +25 in/s."""
+"""Velocity range of the window of Fig. 11 of Hendriks (1983), m/s (-25 to +25 inch/s)."""
 
 PAPER_BACKSTOP: Final = 50.8e-6
-"""Position of the backstop in Hendriks (1983), m: 0.002 in."""
+"""Position of the backstop in Hendriks (1983), m (0.002 inch)."""
 
 PAPER_FRONT: Final = 203.2e-6
-"""Front of the pack in Hendriks (1983), m: 0.008 in."""
+"""Position of the pack front in Hendriks (1983), m (0.008 inch)."""
 
 SAME: Final = 1e-3
 """Relative tolerance within which positions count as the positions of the paper."""

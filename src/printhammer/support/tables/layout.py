@@ -181,7 +181,7 @@ class Table:
     lines: list[int]
     """Line number in the file of each row, counted from 1."""
     rows: list[list[str]]
-    """Cells of each row as text; numbers have a decimal point."""
+    """Cells of each row as text; numbers are written with a decimal point, not a decimal comma."""
     comments: dict[str, str]
     """Comments of the form ``# key: value``."""
     clock: Clock | None
