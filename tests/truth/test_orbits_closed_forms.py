@@ -10,7 +10,7 @@ from tests.hammers import MASS, interpreted, made_of, preload, rigid
 from tests.truth.impact_orbits import BouncingBall
 
 import printhammer as ph
-from printhammer.chaos import orbit
+from printhammer.chaos import Orbits, orbit
 from printhammer.chaos.orbits.collection import fewest_missing, index_sums
 from printhammer.chaos.orbits.newton import Images, close_orbits
 from printhammer.chaos.orbits.orbit import multipliers_of
@@ -229,31 +229,39 @@ def test_indices_never_ask_for_more_orbits_than_are_missing(
     assert fewest_missing({1: 1, 2: 1, 3: 10}) == 3
 
 
-@pytest.mark.slow
-def test_a_longer_search_finds_what_a_shorter_one_does() -> None:
+def orbits_of_a_ball(longest: int) -> Orbits:
+    """Search for orbits of up to some firings of a ball on a table that vibrates at 60 Hz."""
     ball = ph.load("tufillaro-1992")
     force = ph.SineForce(1.1705e-4 * (2.0 * math.pi * 60.0) ** 2 * ball.mass, 60.0)
-    one, two = (ph.orbits(ball, drive=force, longest=longest) for longest in (1, 2))
+    return ph.orbits(ball, drive=force, longest=longest)
+
+
+@pytest.fixture(scope="module")
+def up_to_three() -> Orbits:
+    return orbits_of_a_ball(3)
+
+
+@pytest.mark.slow
+def test_a_longer_search_finds_what_a_shorter_one_does(up_to_three: Orbits) -> None:
+    one = orbits_of_a_ball(1)
     assert len(one) == 7
     assert one.indices == {1: 1}
     assert one.incomplete == ()
     for own in one:
-        gaps = [abs(own.x[0] - o.x[0]) / 1e-4 + abs(own.v[0] - o.v[0]) for o in two if o.firings == 1]
+        gaps = [abs(own.x[0] - o.x[0]) / 1e-4 + abs(own.v[0] - o.v[0]) for o in up_to_three if o.firings == 1]
         assert min(gaps) < 1e-7
     # An independent search found this one.
-    assert any(orbit.multipliers[0].real == pytest.approx(-93.48, abs=0.01) for orbit in two)
+    assert any(orbit.multipliers[0].real == pytest.approx(-93.48, abs=0.01) for orbit in up_to_three)
 
 
 @pytest.mark.slow
-def test_orbits_near_chatter_are_found_near_others() -> None:
+def test_orbits_near_chatter_are_found_near_others(up_to_three: Orbits) -> None:
     """Newton's method from a fine grid of states, on the exact flights of the ball, finds these orbits."""
-    ball = ph.load("tufillaro-1992")
-    force = ph.SineForce(1.1705e-4 * (2.0 * math.pi * 60.0) ** 2 * ball.mass, 60.0)
-    every = ph.orbits(ball, drive=force, longest=3)
     exact = {509.707: (8.637200107e-06, 1.9766846923e-03), -1023.899: (8.365746153e-06, 5.8140712776e-03)}
     for multiplier, (x, v) in exact.items():
-        gaps = [(np.abs(own.x - x) / 1e-4 + np.abs(own.v - v)).min() for own in every if own.firings == 3]
-        near = [own for own in every if own.firings == 3][int(np.argmin(gaps))]
+        of_three = [own for own in up_to_three if own.firings == 3]
+        gaps = [(np.abs(own.x - x) / 1e-4 + np.abs(own.v - v)).min() for own in of_three]
+        near = of_three[int(np.argmin(gaps))]
         assert min(gaps) < 1e-7
         assert near.multipliers[0].real == pytest.approx(multiplier, rel=1e-5)
 
