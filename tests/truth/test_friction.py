@@ -168,6 +168,78 @@ def test_a_pack_with_memory_holds_an_armature_under_friction() -> None:
     assert abs(motion.energy.residual) < 1e-8 * motion.energy.throughput
 
 
+def test_random_plungers_stop_and_start_in_a_pack_with_memory() -> None:
+    """Coil, spring, friction and a pack with memory, half of them with equal static and kinetic force."""
+    rng = np.random.default_rng(38)
+
+    def log(low: float, high: float) -> float:
+        return float(low * (high / low) ** rng.random())
+
+    pack = {"law": "power", "thickness": 178e-6, "stiffness": 184.0}
+    sticks = 0
+    for _ in range(60):
+        kinetic = log(0.05, 1.0)
+        static = kinetic * (1.0 if rng.random() < 0.5 else float(rng.uniform(1.0, 2.5)))
+        spring = {"law": "preload", "preload": -log(0.05, 1.0), "stiffness": log(50.0, 1e3)}
+        coil = {"law": "winding", "resistance": log(2.0, 20.0), "inductance": log(1e-3, 5e-2)}
+        wave = {
+            "shape": "rail",
+            "voltage": f"{log(3.0, 30.0)!r} V",
+            "width": log(2e-3, 2e-2),
+            "decay": "diode",
+        }
+        reloading = "unloading-curve" if rng.random() < 0.5 else "loading-branch"
+        hammer = block(log(2e-3, 5e-2), kinetic, static).replace(
+            {
+                "spring": spring,
+                "magnet": {"law": "moving-coil", "constant": log(1.0, 10.0)},
+                "coil": coil,
+                "backstop": {"law": "rigid", "position": 0.0, "restitution": float(rng.uniform(0.0, 0.8))},
+                "pack": {**pack, "front": log(5e-4, 5e-3), "reloading": reloading},
+                "waveform": wave,
+            }
+        )
+        assert hammer.waveform is not None
+        drive = ph.PulseTrain(hammer.waveform, rate=float(rng.uniform(10.0, 60.0)), pulses=3)
+        motion = ph.simulate(hammer, drive, duration=0.12, tolerance=1e-10)
+        assert motion.ok
+        assert abs(motion.energy.residual) <= 1e-8 * motion.energy.throughput
+        sticks += len(motion.sticks)
+    assert sticks > 60
+
+
+def test_a_stop_in_the_pack_at_the_limit_of_friction() -> None:
+    """With equal static and kinetic force, rounding decides between rest and reloading; both must go on."""
+    friction = 0.3064143688906136
+    hammer = block(0.03766332309391442, friction, friction).replace(
+        {
+            "spring": {"law": "preload", "preload": -0.3652675404168696, "stiffness": 683.6313887945818},
+            "magnet": {"law": "moving-coil", "constant": 4.858806555919351},
+            "coil": {"law": "winding", "resistance": 2.0159338096857597, "inductance": 0.002982930650914256},
+            "backstop": {"law": "rigid", "position": 0.0, "restitution": 0.5104536748545296},
+            "pack": {
+                "law": "power",
+                "stiffness": 183.962,
+                "front": 0.0022170337338572573,
+                "thickness": 0.0001778,
+                "reloading": "loading-branch",
+            },
+            "waveform": {
+                "shape": "rail",
+                "voltage": "18.22442253914435 V",
+                "width": 0.017938284661937694,
+                "decay": "diode",
+            },
+        }
+    )
+    assert hammer.waveform is not None
+    drive = ph.PulseTrain(hammer.waveform, period=0.01963735079152686, pulses=3)
+    for tolerance in (1e-9, 1e-11, 1e-13):
+        motion = ph.simulate(hammer, drive, duration=0.12, tolerance=tolerance)
+        assert motion.ok
+        assert len(motion.sticks) > 20
+
+
 def test_what_friction_cannot_be() -> None:
     hammer = block(1.0, 0.3)
     with refused("force.guide"):

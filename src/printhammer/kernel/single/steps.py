@@ -64,7 +64,7 @@ def take_step(state: State, setup: Setup, t_next: float, nodes: Any) -> tuple[in
         accelerate_at_rest(state, setup)
         rests = mode == M.RESTING or abs(state[C.ACCELERATION]) <= hold_limit(setup.hammer)
         if not rests:
-            set_off(state, setup, nodes)
+            rests = set_off(state, setup, nodes)
     if mode == M.BACKSTOP:
         return backstop_step(state, setup, t_next, still, nodes), M.OK
     if rests and not (HAS_CIRCUIT and not circuit_is_quiet(state, setup)):
@@ -156,19 +156,31 @@ def reverse(state: State, setup: Setup) -> None:
 
 
 @inlined
-def set_off(state: State, setup: Setup, nodes: Any) -> None:
-    """Determine the direction in which an armature at rest begins to slide, against dry friction."""
+def set_off(state: State, setup: Setup, nodes: Any) -> bool:
+    """Determine the direction in which an armature at rest begins to slide, against dry friction.
+
+    Returns whether the armature stays at rest after all, on the unloading branch that begins at its place.
+    """
     mode, a = int(state[C.MODE]), state[C.ACCELERATION]
     kept = 1.0 if a > 0.0 else -1.0
+    stays = False
     if MEMORY and mode in BRANCHES:
         if not goes_on_in(a, mode):
             reverse(state, setup)
+            if a > 0.0 and int(state[C.MODE]) == M.UNLOADING:
+                accelerate_at_rest(state, setup)
+                limit = hold_limit(setup.hammer)
+                stays = abs(state[C.ACCELERATION]) <= limit
+                if state[C.ACCELERATION] > limit:
+                    state[C.MODE] = M.LOADING
         if int(state[C.MODE]) != M.LOADING:
             kept = state[C.PEAK]
     else:
         state[C.MEMORY_NOW] = kept
     renew_node(nodes, int(state[C.USED]), int(state[C.MODE]), kept)
-    accelerate(state, setup)
+    if not stays:
+        accelerate(state, setup)
+    return stays
 
 
 @inlined
