@@ -108,12 +108,13 @@ def carry_columns(
     renormalise : bool, optional
         Whether to orthonormalise the columns at each step and record the growth.
     """
-    if isinstance(problem.hammer.damping, DryFriction):
+    dry = isinstance(problem.hammer.damping, DryFriction)
+    if dry and (forcing is not None or problem.laws.circuit):
         key = next(key for key, law in problem.hammer.laws.items() if law == Friction.law)
         raise InputError(
-            f"{key}: there are no derivatives of a motion under dry friction",
+            f"{key}: derivatives under dry friction are those with respect to the state, without a circuit",
             key=key,
-            expected="no dry friction for exponents, orbits found by Newton's method and sensitivities",
+            expected="no dry friction, or a current or force as drive and no sensitivities",
         )
     forced, circuit, count = forcing is not None, problem.laws.circuit, initial.shape[1]
     rows = V.row_count(forced, circuit)

@@ -33,7 +33,7 @@ SIGNIFICANT: Final = 3.0
 SUPERSTABLE: Final = "superstable"
 """Classification of a motion that repeatedly comes to rest on its backstop, without a period up to 64."""
 
-FORGETS: Final = "no exponent: the motion comes to rest on the backstop and forgets its past"
+FORGETS: Final = "no exponent: the motion comes to rest and forgets its past"
 
 FIRST: Final = 1001
 """Default first firing used for the classification; the very first firing is number 1."""

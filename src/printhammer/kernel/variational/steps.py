@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.laws import (
         ELECTRIC_ROW,
         FORCED,
+        FRICTION,
         HAS_BACKSTOP,
         HAS_CIRCUIT,
         HAS_PACK,
@@ -167,6 +168,11 @@ def rest(t: float, t_to: float, node: Any, columns: Any, setting: Setting) -> fl
     Returns the logarithm of a factor that has been divided out of the columns.
     """
     grown = 0.0
+    if FRICTION and int(node[3]) > M.HELD:
+        # Dry friction holds the neighbouring motion at its own place.
+        for k in range(columns.shape[1]):
+            columns[1, k] = 0.0
+        return grown
     if int(node[3]) != M.HELD:
         for k in range(columns.shape[1]):
             place = 0.0
@@ -279,7 +285,7 @@ def carry_state(t_to: float, node: Any, after: Any, columns: Any, work: Any, set
     if t_to <= t:
         return 0.0
     mode, kept = int(node[3]), node[4]
-    if mode in (M.RESTING, M.HELD, M.HELD_LOADING, M.HELD_UNLOADING):
+    if mode >= M.RESTING:
         if HAS_CIRCUIT:
             grown = rest_with_current(t, t_to, node, columns, work, setting)
             work[START, TIME] = t_to

@@ -11,22 +11,36 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import compiled
 from printhammer.kernel.model import modes as M
-from printhammer.kernel.model.layout import BACKSTOP_PART, END, FRONT, INVERSE_MASS, MAGNET, POSITION, Train
+from printhammer.kernel.model.layout import (
+    BACKSTOP_PART,
+    DAMPING,
+    END,
+    FRONT,
+    INVERSE_MASS,
+    MAGNET,
+    POSITION,
+    SPRING,
+    Train,
+)
 from printhammer.kernel.model.transitions import AT_FRONT, AT_PEAK, JUMPS, NO_JUMP, TURN
 from printhammer.kernel.variational.layout import BACKSTOP_LOSS, COIL, DRIVE, ENERGIES, ENERGY, PEAK
+from printhammer.kernel.variational.slopes import CENTRAL, OFFSETS, WEIGHTS
 
 if TYPE_CHECKING:
     from printhammer.kernel.methods.quadrature import powers
     from printhammer.kernel.model.circuit import driven
-    from printhammer.kernel.model.forces import Hammer, acceleration, backstop_acceleration
+    from printhammer.kernel.model.forces import Hammer, acceleration, backstop_acceleration, value_at
     from printhammer.kernel.model.laws import (
         ELECTRIC_ROW,
         FORCE_DRIVE,
         FORCED,
+        FRICTION,
         HAS_CIRCUIT,
         HAS_DAMPING,
+        HAS_PACK,
         RIGID,
         backstop_rebound,
+        friction_force,
         magnet_force,
     )
     from printhammer.kernel.model.pulses import Drive, drive_value, piece_value
@@ -34,13 +48,18 @@ if TYPE_CHECKING:
     from printhammer.kernel.variational.circuit import electric_at_node
     from printhammer.kernel.variational.forcing import rebound_change
     from printhammer.kernel.variational.layout import Setting
-    from printhammer.kernel.variational.slopes import field_at
+    from printhammer.kernel.variational.slopes import field_at, field_slope, pack_slopes
 
 SPEED_SPACING = 1e-3
 """Step size of the impact speed for the derivative of the rebound velocity, as a fraction of the speed."""
 NEAR = 1e-9
 """Smallest distance of a reversal from the old local maximum, as a fraction of the indentation, at which the
 reversal is differentiable."""
+
+RELEASED = 1e-9
+"""Largest relative distance of the force from the static friction at a release that no edge caused."""
+RELEASE_SPACING = 1e-3
+"""Step size of the time for the rate of the force at a release, as a fraction of the rest."""
 
 
 @compiled
@@ -81,9 +100,10 @@ def pass_rebound(node: Any, after: Any, columns: Any, setting: Setting) -> None:
         8.0 * (backstop_rebound(c, v_in + spacing) - backstop_rebound(c, v_in - spacing))
         - (backstop_rebound(c, v_in + 2.0 * spacing) - backstop_rebound(c, v_in - 2.0 * spacing))
     ) / (12.0 * spacing)
-    a = acceleration(node[0], node[1], v_in, M.FREE, 0.0, hammer, drive)
+    before_it, behind_it = (node[4], after[4]) if FRICTION else (0.0, 0.0)
+    a = acceleration(node[0], node[1], v_in, M.FREE, before_it, hammer, drive)
     # Only a damping force makes the accelerations before and after the impact differ.
-    jump = acceleration(node[0], node[1], v_out, M.FREE, 0.0, hammer, drive) - a if HAS_DAMPING else 0.0
+    jump = acceleration(node[0], node[1], v_out, M.FREE, behind_it, hammer, drive) - a if HAS_DAMPING else 0.0
     for k in range(columns.shape[1]):
         if FORCED:
             columns[0, k] -= forcing.moves[k, POSITION]
@@ -154,11 +174,70 @@ def pass_level(
 
 
 @compiled
+def pass_release(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
+    """Propagate the columns through the end of a rest under dry friction; return whether differentiable.
+
+    The rest ends at a time that depends on the place of the armature, or at an edge of the drive.
+    """
+    hammer, drive = setting.hammer, driven(setting.drive, electric_at_node(after))
+    mode, t = int(node[3]), after[0]
+    limit = friction_force(hammer[DAMPING:SPRING], 1.0) * hammer[INVERSE_MASS]
+    held = acceleration_at(after, mode, node[4], 0.0, hammer, drive)
+    if abs(held) < (1.0 - RELEASED) * limit:
+        return True
+    spacing = RELEASE_SPACING * min(t - node[0], setting.scales[0] / setting.scales[1])
+    rate = 0.0
+    memory = memory_of(mode, node[4], hammer)
+    for i in range(4):
+        at = t + OFFSETS[CENTRAL, i] * spacing
+        rate += WEIGHTS[CENTRAL, i] * acceleration(at, after[1], 0.0, mode, memory, hammer, drive)
+    rate /= spacing
+    if rate * held <= 0.0:
+        return False
+    value = value_at(t, after[1], hammer, drive)
+    by_x = field_slope(after[1], value, setting.scales, setting.bounds, hammer)
+    if HAS_PACK and mode == M.HELD_LOADING:
+        by_x += pack_slopes(after[1], 0.0, M.LOADING, memory, node[4], setting.scales, hammer)[0]
+    behind = acceleration_at(after, branch_of(int(after[3])), after[4], 0.0, hammer, drive)
+    for k in range(columns.shape[1]):
+        columns[1, k] = behind * by_x * columns[0, k] * hammer[INVERSE_MASS] / rate
+        if int(after[3]) == M.UNLOADING:
+            columns[PEAK, k] = columns[0, k]
+    # On an unloading branch the force depends on the latest maximum, too.
+    return mode != M.HELD_UNLOADING
+
+
+@compiled
+def pass_friction(node: Any, after: Any, columns: Any, setting: Setting) -> tuple[bool, bool]:
+    """Propagate the columns through a stop, a release or a reversal under dry friction.
+
+    Returns
+    -------
+    tuple
+        Whether the node is one of these events, and whether the motion is differentiable there.
+    """
+    mode, following = int(node[3]), int(after[3])
+    if following > M.HELD:
+        for k in range(columns.shape[1]):
+            columns[1, k] = 0.0
+        return True, True
+    if mode > M.HELD:
+        return True, pass_release(node, after, columns, setting)
+    if mode == following and node[4] * after[4] < 0.0 and after[2] == 0.0:
+        return True, pass_reversal(node, after, mode, following, columns, setting)
+    return False, True
+
+
+@compiled
 def pass_node(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
     """Propagate the columns through any event at the node `after`; return whether differentiable."""
     if is_rebound(node, after):
         pass_rebound(node, after, columns, setting)
         return True
+    if FRICTION:
+        passed, smooth = pass_friction(node, after, columns, setting)
+        if passed:
+            return smooth
     mode, following = branch_of(int(node[3])), branch_of(int(after[3]))
     jump = JUMPS[mode, following]
     if jump == NO_JUMP or (mode == following and node[4] == after[4]):
@@ -189,7 +268,7 @@ def pass_edge(
             columns[ELECTRIC_ROW, k] -= change * later
         return new
     mode = int(node[3])
-    if change == 0.0 or mode in (M.RESTING, M.HELD, M.HELD_LOADING, M.HELD_UNLOADING):
+    if change == 0.0 or mode >= M.RESTING:
         return new
     x, v = node[1], node[2]
     force = field_at(x, new, hammer) - field_at(x, value, hammer) + (change if FORCE_DRIVE else 0.0)

@@ -14,7 +14,7 @@ const [ORBIT, IMAGE] = [10, 7]; // columns of an orbit and of an image
 const [TRY] = [0];
 const MAP_TOLERANCE = 1e-13;
 const STOPPED = "the run ended before firing";
-const FORGETS = "no exponent: the motion comes to rest on the backstop and forgets its past";
+const FORGETS = "no exponent: the motion comes to rest and forgets its past";
 const REASONS = {
   "-1": "the states still move, and Newton's method needs a derivative that does not exist",
   "-3": "no period, and the motion comes to rest on the backstop only once; more firings tell",

@@ -1,0 +1,88 @@
+"""Tangent maps under dry friction: stops, releases and reversals, against differences and a closed form."""
+
+import math
+
+import numpy as np
+import pytest
+from tests.errors import refused
+from tests.oracle.den_hartog import DenHartog
+from tests.tangents import SHARP, deviation
+
+import printhammer as ph
+from printhammer.derivatives.states import tangent_map
+
+
+def oscillator(kinetic: float, static: float | None = None) -> ph.Hammer:
+    """Oscillator of unit mass and stiffness under dry friction."""
+    friction: dict[str, object] = {"law": "friction", "kinetic": kinetic}
+    if static is not None:
+        friction["static"] = static
+    spring = {"law": "spring", "stiffness": 1.0, "position": 0.0}
+    return ph.Hammer.build(1.0, name="dry").replace({"force.guide": friction, "force.spring": spring})
+
+
+@pytest.mark.parametrize("beta", [0.7, 1.4, 2.5])
+def test_a_cycle_with_two_reversals(beta: float) -> None:
+    """The map of half a cycle is S R(π/β): a rotation, and at the turn the ratio of the accelerations.
+
+    At the turn the other forces are x0 β², so that S = diag(1, (x0 β² - f)/(x0 β² + f)).
+    """
+    exact = DenHartog(beta, 0.3)
+    a = 1.2 * exact.boundary
+    x0, phase = exact.motion(a)
+    drive = ph.SineForce(a, 0.5 * beta / math.pi, phase=phase + 0.5 * math.pi)
+    cycle = 2.0 * math.pi / beta
+    # Half a cycle later the motion is at its other turn; the ends lie between turns.
+    found = tangent_map(oscillator(0.3), drive, 0.25 * cycle, 1.25 * cycle, state=(x0, 0.0), tolerance=SHARP)
+    assert found.smooth
+
+    def rotation(angle: float) -> np.ndarray:
+        return np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+
+    turn = np.diag([1.0, (x0 * beta**2 - 0.3) / (x0 * beta**2 + 0.3)])
+    quarter = rotation(0.25 * cycle)
+    expected = quarter @ turn @ quarter @ quarter @ turn @ quarter
+    np.testing.assert_allclose(found.matrix, expected, rtol=0.0, atol=1e-9)
+
+
+def test_random_oscillators_that_stick() -> None:
+    rng = np.random.default_rng(38)
+
+    def log(low: float, high: float) -> float:
+        return float(low * (high / low) ** rng.random())
+
+    sticks = 0
+    for _ in range(24):
+        kinetic = log(0.1, 0.4)
+        hammer = oscillator(kinetic, kinetic * float(rng.choice([1.0, 1.3, 2.0])))
+        if rng.random() < 0.5:
+            leaf = {"law": "linear", "side": "front", "position": 0.4, "stiffness": 20.0}
+            hammer = hammer.replace("contact.leaf", leaf)
+        if rng.random() < 0.4:
+            stop = {"law": "rigid", "position": -0.5, "restitution": 0.6}
+            hammer = hammer.replace("backstop", stop)
+        drive = ph.SineForce(
+            log(0.3, 1.0), log(0.3, 2.0) / (2.0 * math.pi), phase=float(rng.uniform(0.0, 6.0))
+        )
+        state, end = (
+            (float(rng.uniform(-0.3, 0.3)), float(rng.uniform(-1.0, 1.0))),
+            float(rng.uniform(3.0, 9.0)),
+        )
+        motion = ph.simulate(hammer, drive, duration=end, state=state, tolerance=SHARP)
+        sticks += len(motion.sticks)
+        assert deviation(hammer, drive, 0.0, end, state=state, size=1e-5) < 1e-6
+    assert sticks > 12
+
+
+def test_exponents_of_a_periodic_motion_that_sticks() -> None:
+    """A motion that sticks once in a cycle forgets its velocity: one multiplier is 0."""
+    wave = {"shape": "half-sine", "amplitude": "3 N", "width": 1.5}
+    hammer = oscillator(0.3, 0.5).replace("waveform", wave)
+    found = ph.lyapunov(hammer, rate=0.05, state=(0.0, 0.0), firings=40, transient=10)
+    assert found.exponents[1] == -math.inf
+
+
+def test_what_has_no_derivatives() -> None:
+    hammer = oscillator(0.3).replace("waveform", {"shape": "half-sine", "amplitude": "3 N", "width": 1.5})
+    with refused("force.guide"):
+        ph.sensitivities(hammer, ph.PulseTrain(hammer.waveform, at=[0.0]))
