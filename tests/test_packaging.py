@@ -236,7 +236,7 @@ def test_the_readme_says_what_holds() -> None:
     failing = list(search.failing)
     readme = " ".join((ROOT / "README.md").read_text("utf-8").split())
     assert f"{len(claims()) - len(failing)} of the {len(claims())} claims" in readme
-    (sentence,) = re.findall(r"These fail: (.*?)\. The report", readme)
+    (sentence,) = re.findall(r"These claims fail: (.*?)\. The report", readme)
     assert re.findall(r"`(\w+)`", sentence) == failing
 
 
