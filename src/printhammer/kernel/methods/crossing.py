@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import called, compiled, inlined
 from printhammer.kernel.model import modes as M
-from printhammer.kernel.model.layout import DAMPING, INVERSE_MASS, POSITION, SPRING, Control, ForceLaw
+from printhammer.kernel.model.layout import POSITION, Control, ForceLaw
 
 if TYPE_CHECKING:
     from printhammer.kernel.methods.dop853 import whole_contact_step, whole_time_step
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
         path_gap,
         path_may_change,
     )
-    from printhammer.kernel.model.forces import Hammer, acceleration
-    from printhammer.kernel.model.laws import FRICTION, friction_force
+    from printhammer.kernel.model.forces import Hammer, acceleration, hold_limit
+    from printhammer.kernel.model.laws import FRICTION
     from printhammer.kernel.model.pulses import Drive
 
 STILL = 1e-12
@@ -73,8 +73,8 @@ def rest_gap(a: float, mode: int, hammer: Hammer, control: Control) -> float:
     """Return the event function of a rest: positive while an acceleration `a` keeps the armature at rest."""
     unit = control[1] * control[1] / control[0]
     if FRICTION:
-        limit = friction_force(hammer[DAMPING:SPRING], 1.0) * hammer[INVERSE_MASS]
-        return float((limit - a) / unit if mode == M.RESTING else 1.0 - (a / limit) * (a / limit))
+        limit = hold_limit(hammer)
+        return (limit - a) / unit if mode == M.RESTING else 1.0 - (a / limit) * (a / limit)
     if mode == M.RESTING:
         return -a / unit
     return 1.0 - abs(a) / (STILL * unit)

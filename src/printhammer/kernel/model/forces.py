@@ -96,6 +96,12 @@ def friction(mode: int, memory: float, hammer: Hammer) -> float:
 
 
 @inlined
+def hold_limit(hammer: Hammer) -> float:
+    """Return the largest acceleration [m/s^2] from which dry friction holds an armature at rest."""
+    return float(friction_force(hammer[DAMPING:SPRING], 1.0) * hammer[INVERSE_MASS])
+
+
+@inlined
 def pack_force(x: float, v: float, mode: int, memory: float, hammer: Hammer) -> float:
     """Return the pack force [N], equation (5) of the paper, on the loading or unloading branch of `mode`."""
     if mode == LOADING or (FRICTION and mode == HELD_LOADING):

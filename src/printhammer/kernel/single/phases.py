@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 from printhammer.kernel.compile.compiling import inlined
 from printhammer.kernel.model import modes as M
 from printhammer.kernel.model.circuit import BLOCKED, SOURCE, UNTIL
-from printhammer.kernel.model.layout import DAMPING, INVERSE_MASS, SPRING
 from printhammer.kernel.single import carry as C
 
 if TYPE_CHECKING:
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
         take_path,
     )
     from printhammer.kernel.model.forces import Hammer, acceleration
-    from printhammer.kernel.model.laws import FRICTION, HAS_CIRCUIT, friction_force
+    from printhammer.kernel.model.laws import FRICTION, HAS_CIRCUIT
     from printhammer.kernel.model.pulses import pass_edges
     from printhammer.kernel.single.carry import Setup
     from printhammer.kernel.single.record import add_node, note_circuit
@@ -85,14 +84,8 @@ def accelerate(state: State, setup: Setup) -> None:
 
 
 @inlined
-def hold_limit(hammer: Hammer) -> float:
-    """Return the largest acceleration [m/s^2] from which dry friction holds an armature at rest."""
-    return float(friction_force(hammer[DAMPING:SPRING], 1.0) * hammer[INVERSE_MASS])
-
-
-@inlined
 def mode_at_rest(mode: int) -> int:
-    """Return the mode of an armature that dry friction holds at the place where it moved in `mode`."""
+    """Return the mode of an armature that has come to rest in `mode`."""
     if mode == M.LOADING:
         return M.HELD_LOADING
     if mode in (M.UNLOADING, M.RELOADING):

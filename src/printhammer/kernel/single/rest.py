@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 BENT = 1e-3
 """Deviation of the acceleration from a parabola, as a fraction of the range that dry friction holds, above
 which a pause is halved; arbitrary."""
+SPACINGS = (0.05, 0.005, 0.0005)
+"""Spacings of the samples that locate an extremum of the acceleration, as fractions of a pause; arbitrary."""
 
 
 @compiled
@@ -63,8 +65,9 @@ def friction_ends(
 ) -> tuple[bool, float]:
     """Decide as `rest_ends`, without missing an acceleration that leaves its range between two samples.
 
-    The pause is halved until a parabola through three samples describes the acceleration; its vertex is a
-    fourth sample. The returned time is then shorter than `pause`.
+    The pause is halved until a parabola through three samples describes the acceleration; the returned time
+    is then shorter than `pause`. The extremum of the acceleration, located by parabolas through ever closer
+    samples, is another sample.
     """
     mode, memory, hammer, drive = law
     size = highest if math.isinf(lowest) else highest - lowest
@@ -79,6 +82,14 @@ def friction_ends(
         pause *= 0.5
     curvature, slope = start - 2.0 * half + end, 4.0 * half - 3.0 * start - end
     vertex = -0.25 * slope / curvature if curvature != 0.0 else 0.0
+    for spacing in SPACINGS:
+        if not -spacing < vertex < 1.0 + spacing:
+            break
+        before = acceleration(t + (vertex - spacing) * pause, x, 0.0, mode, memory, hammer, drive)
+        middle = acceleration(t + vertex * pause, x, 0.0, mode, memory, hammer, drive)
+        behind = acceleration(t + (vertex + spacing) * pause, x, 0.0, mode, memory, hammer, drive)
+        if before - 2.0 * middle + behind != 0.0:
+            vertex += 0.5 * spacing * (before - behind) / (before - 2.0 * middle + behind)
     for share in (vertex, 1.0):
         if 0.0 < share <= 1.0:
             a = acceleration(t + share * pause, x, 0.0, mode, memory, hammer, drive)

@@ -15,7 +15,7 @@ from printhammer.kernel.single.carry import Setup
 
 if TYPE_CHECKING:
     from printhammer.kernel.model.circuit import driven, enter_piece
-    from printhammer.kernel.model.forces import acceleration
+    from printhammer.kernel.model.forces import acceleration, hold_limit
     from printhammer.kernel.model.laws import FRICTION, HAS_CIRCUIT, pack_memory
     from printhammer.kernel.model.pulses import pass_edges
     from printhammer.kernel.single.around import failure, first_mode, out_of_bounds
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
         accelerate,
         electric_at_start,
         electric_of,
-        hold_limit,
         keep_electric,
         keep_path,
         note_path,

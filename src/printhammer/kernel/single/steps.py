@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.methods.contact import advance_contact
     from printhammer.kernel.methods.landing import advance
     from printhammer.kernel.model.circuit import driven, electric_rates, is_quiet, moved
+    from printhammer.kernel.model.forces import hold_limit
     from printhammer.kernel.model.laws import FRICTION, HAS_CIRCUIT, MEMORY
     from printhammer.kernel.single.around import (
         contact_unit,
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
         accelerate_at_rest,
         acceleration_in,
         electric_of,
-        hold_limit,
         keep_electric,
         mode_at_rest,
         rate_in_backstop,

@@ -13,6 +13,7 @@ from printhammer.kernel.single import carry as C
 
 if TYPE_CHECKING:
     from printhammer.kernel.model.circuit import next_path
+    from printhammer.kernel.model.forces import hold_limit
     from printhammer.kernel.model.laws import FRICTION, HAS_CIRCUIT, RIGID, backstop_rebound
     from printhammer.kernel.single.carry import Setup
     from printhammer.kernel.single.phases import (
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
         accelerate,
         acceleration_in,
         electric_of,
-        hold_limit,
         keep_electric,
         note_node,
         pass_edge,

@@ -13,13 +13,11 @@ from printhammer.kernel.compile.compiling import compiled
 from printhammer.kernel.model import modes as M
 from printhammer.kernel.model.layout import (
     BACKSTOP_PART,
-    DAMPING,
     END,
     FRONT,
     INVERSE_MASS,
     MAGNET,
     POSITION,
-    SPRING,
     Train,
 )
 from printhammer.kernel.model.transitions import AT_FRONT, AT_PEAK, JUMPS, NO_JUMP, TURN
@@ -29,7 +27,13 @@ from printhammer.kernel.variational.slopes import CENTRAL, OFFSETS, WEIGHTS
 if TYPE_CHECKING:
     from printhammer.kernel.methods.quadrature import powers
     from printhammer.kernel.model.circuit import driven
-    from printhammer.kernel.model.forces import Hammer, acceleration, backstop_acceleration, value_at
+    from printhammer.kernel.model.forces import (
+        Hammer,
+        acceleration,
+        backstop_acceleration,
+        hold_limit,
+        value_at,
+    )
     from printhammer.kernel.model.laws import (
         ELECTRIC_ROW,
         FORCE_DRIVE,
@@ -38,9 +42,9 @@ if TYPE_CHECKING:
         HAS_CIRCUIT,
         HAS_DAMPING,
         HAS_PACK,
+        MEMORY,
         RIGID,
         backstop_rebound,
-        friction_force,
         magnet_force,
     )
     from printhammer.kernel.model.pulses import Drive, drive_value, piece_value
@@ -181,7 +185,7 @@ def pass_release(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
     """
     hammer, drive = setting.hammer, driven(setting.drive, electric_at_node(after))
     mode, t = int(node[3]), after[0]
-    limit = friction_force(hammer[DAMPING:SPRING], 1.0) * hammer[INVERSE_MASS]
+    limit = hold_limit(hammer)
     held = acceleration_at(after, mode, node[4], 0.0, hammer, drive)
     if abs(held) < (1.0 - RELEASED) * limit:
         return True
@@ -201,8 +205,6 @@ def pass_release(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
     behind = acceleration_at(after, branch_of(int(after[3])), after[4], 0.0, hammer, drive)
     for k in range(columns.shape[1]):
         columns[1, k] = behind * by_x * columns[0, k] * hammer[INVERSE_MASS] / rate
-        if int(after[3]) == M.UNLOADING:
-            columns[PEAK, k] = columns[0, k]
     # On an unloading branch the force depends on the latest maximum, too.
     return mode != M.HELD_UNLOADING
 
@@ -217,6 +219,10 @@ def pass_friction(node: Any, after: Any, columns: Any, setting: Setting) -> tupl
         Whether the node is one of these events, and whether the motion is differentiable there.
     """
     mode, following = int(node[3]), int(after[3])
+    if MEMORY and max(mode, following) > M.HELD and branch_of(following) == M.UNLOADING:
+        # The armature stands at the maximum at which a new unloading branch begins.
+        for k in range(columns.shape[1]):
+            columns[PEAK, k] = columns[0, k] if after[4] == after[1] else columns[PEAK, k]
     if following > M.HELD:
         for k in range(columns.shape[1]):
             columns[1, k] = 0.0

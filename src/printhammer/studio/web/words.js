@@ -31,7 +31,7 @@ export function titleOf(name, described, short = false) {
   return (short ? SHORT : TITLES)[name];
 }
 
-/** Return the views that apply to a device, those that its file lists: without a pack nothing is printed, a rigid stop has no loop, and there are no derivatives under dry friction. */
+/** Return the views that apply to a device, those that its file lists: without a pack nothing is printed, a rigid stop has no loop, and exponents under dry friction lack the coil circuit. */
 export function viewsOf(described) {
   if (!described) return VIEWS;
   const { places: { front, backstop }, rigid, dry, views } = described;
