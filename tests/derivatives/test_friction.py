@@ -74,6 +74,39 @@ def test_random_oscillators_that_stick() -> None:
     assert sticks > 12
 
 
+def test_random_hammers_that_strike_a_pack_under_friction() -> None:
+    """A pack with memory; a rest on its unloading branch is not differentiated, and says so."""
+    rng = np.random.default_rng(7)
+    pack = {"law": "power", "stiffness": 184.0, "front": 1e-3, "thickness": 178e-6}
+    compared = sticks = 0
+    for _ in range(16):
+        kinetic = float(0.1 * 10.0 ** rng.random())
+        static = kinetic * float(rng.choice([1.0, 1.5, 3.0]))
+        hammer = ph.Hammer.build(5e-3, name="dry").replace(
+            {
+                "force.guide": {"law": "friction", "kinetic": kinetic, "static": static},
+                "spring": {"law": "preload", "preload": -0.3, "stiffness": 200.0},
+                "backstop": {"law": "rigid", "position": 0.0, "restitution": 0.5},
+                "pack": {**pack, "reloading": "unloading-curve"},
+            }
+        )
+        size, rate = float(0.5 * 8.0 ** rng.random()), float(20.0 * 10.0 ** rng.random())
+        drive = ph.SineForce(size, rate, phase=float(rng.uniform(0.0, 6.0)))
+        state, end = (
+            (float(rng.uniform(5e-4, 1.03e-3)), float(rng.uniform(0.2, 1.0))),
+            float(rng.uniform(2e-3, 1.2e-2)),
+        )
+        motion = ph.simulate(hammer, drive, duration=end, state=state, tolerance=SHARP)
+        found = tangent_map(hammer, drive, 0.0, end, state=state, tolerance=SHARP)
+        if not found.smooth:
+            assert any(held.x > 1e-3 for held in motion.sticks)
+            continue
+        assert deviation(hammer, drive, 0.0, end, state=state, found=found, size=1e-6) < 1e-6
+        compared, sticks = compared + 1, sticks + len(motion.sticks)
+    assert compared > 8
+    assert sticks > 3
+
+
 def test_exponents_of_a_periodic_motion_that_sticks() -> None:
     """A motion that sticks once in a cycle forgets its velocity: one multiplier is 0."""
     wave = {"shape": "half-sine", "amplitude": "3 N", "width": 1.5}
