@@ -180,6 +180,28 @@ def test_the_keyboard_reaches_everything(page: Page) -> None:
 
 
 @pytest.mark.slow
+def test_answered_columns_are_saved_as_the_file_beside_the_table(kept_page: Page) -> None:
+    page = kept_page
+    page.run(
+        "(() => { window.links = []; window.files = []; window.made = URL.createObjectURL;"
+        " URL.createObjectURL = (file) => { window.files.push(file); return window.made(file); };"
+        " HTMLAnchorElement.prototype.click = function () { window.links.push(this); };"
+        " window.studio.studio.drop(new File(['time [us],a\\n0,0\\n10,5\\n20,0\\n'], 'trace.csv')); })()"
+    )
+    page.wait("document.querySelector('dialog .asking')")
+    page.run(
+        "(() => { document.querySelector(\"[aria-label='what a is']\").value = 'current';"
+        " document.querySelector(\"[aria-label='unit of a']\").value = '100 mA';"
+        " document.querySelector('dialog .asking button[value=save]').click(); })()"
+    )
+    settled(page, "state.waveform !== null")
+    assert state(page)["waveform"]["values"] == pytest.approx([0.0, 0.5, 0.0])
+    assert page.run("links.map((link) => link.download)") == ["trace.csv.toml"]
+    assert page.run("files[0].text()") == ('[columns]\ntime = "1"\ncurrent = "2*100 mA"\n')
+    page.run("delete HTMLAnchorElement.prototype.click; URL.createObjectURL = window.made")
+
+
+@pytest.mark.slow
 def test_the_pulse_is_dragged_at_its_handles(kept_page: Page) -> None:
     page = kept_page
     before = page.run("window.studio.studio.described.waveform")
