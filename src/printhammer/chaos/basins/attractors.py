@@ -17,30 +17,30 @@ from printhammer.run.effort import Effort
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
-MATCH: Final = 1e-2
+MATCH: Final = 1e-2  # Arbitrary
 """Largest distance between two orbits that count as one attractor, in half-widths of the strobe window."""
 
 CLOUD: Final = 2000
-"""Number of points that represent a strange attractor."""
+"""Number of points that represent a strange attractor; arbitrary."""
 
 SETTLING: Final = 1000
 """Number of firings discarded before the points of a strange attractor; doubled until two successive sets of
-points agree."""
+points agree. Arbitrary."""
 
 LONGEST: Final = 16_000
 """Maximum number of discarded firings; a train that still drifts stays undecided. Arbitrary."""
 
 REACH: Final = 0.99
-"""Quantile of nearest-neighbour distances that is used as the reach of a strange attractor."""
+"""Quantile of nearest-neighbour distances that is used as the reach of a strange attractor; arbitrary."""
 
-INSIDE: Final = 0.95
+INSIDE: Final = 0.95  # Arbitrary
 """Fraction of a train's points that have to lie within reach of a strange attractor for a match."""
 
 ATTEMPTS: Final = 12
 """Maximum number of aperiodic trains followed in the search for strange attractors; arbitrary."""
 
 POLISHED: Final = 12
-"""Maximum number of unsettled trains per batch whose orbits are located by Newton's method."""
+"""Maximum number of unsettled trains per batch whose orbits are located by Newton's method; arbitrary."""
 
 
 class Attractor(Declared):

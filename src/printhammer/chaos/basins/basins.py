@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 BOX: Final = 4
-"""Default number of cells along the side of a box of the basin entropy."""
+"""Default number of cells along the side of a box of the basin entropy; arbitrary."""
 
 
 class BasinEntropy(Declared):
@@ -151,22 +151,23 @@ def uncertainty_exponent(labels: npt.ArrayLike) -> float:
     return float(np.polyfit(far, differing, 1)[0])
 
 
-_FEWEST_DISTANCES: Final = 3  # Smallest number of distances for a fit of the exponent
+_FEWEST_DISTANCES: Final = 3
+"""Smallest number of distances for a fit of the exponent: a line through two has no residual."""
 
-SAMPLE: Final = 256
+SAMPLE: Final = 256  # Arbitrary
 """Maximum number of cells recomputed at a tenth of the tolerance; never more than an eighth of all cells."""
 
 FIRINGS: Final = 200
-"""Default number of firings between two tests of a cell for an attractor."""
+"""Default number of firings between two tests of a cell for an attractor; arbitrary."""
 
-ROUNDS: Final = 20
+ROUNDS: Final = 20  # Arbitrary
 """Default maximum number of tests for an attractor; a cell that passes none of the tests is undecided."""
 
 CELLS: Final = 128
-"""Default number of cells along each side of the plane of initial states."""
+"""Default number of cells along each side of the plane of initial states; arbitrary."""
 
 MOST_CELLS: Final = 10_000_000
-"""Largest number of cells of a plane that `basins` and `printhammer.quench_map` accept."""
+"""Largest number of cells of a plane that `basins` and `printhammer.quench_map` accept; arbitrary."""
 
 UNDECIDED: Final = 0
 FAILED: Final = -1
@@ -175,9 +176,9 @@ NO_STATE: Final = -2
 
 NO_STATE_STATUS: Final = "no state"
 
-_PIECE: Final = 4096  # Number of trains integrated in one batch, which bounds the memory
+_PIECE: Final = 4096  # Number of trains integrated in one batch, which bounds the memory; arbitrary
 _GOLDEN: Final = 0.618033988749895  # Inverse golden ratio, whose multiples modulo 1 spread evenly
-_FEWEST: Final = 4  # Smallest number of firings between two tests for an attractor
+_FEWEST: Final = 4  # Smallest number of firings between two tests for an attractor; arbitrary
 
 Range = tuple[float | str, float | str, SupportsIndex]
 

@@ -45,12 +45,12 @@ from printhammer.run.window import time_scale
 from printhammer.support.arrays import BoolArray, FloatArray, TextArray
 
 TAIL: Final = 1e-3
-"""Default time after the second firing within which a pack contact counts as the second dot, s."""
+"""Default time after the second firing within which a pack contact counts as the second dot, s; arbitrary."""
 
-_PIECE: Final = 8192  # Number of cells integrated in one batch, which bounds the memory
-_SPACING: Final = 5e-6  # Spacing of the samples of the first run at the default tail, s
+_PIECE: Final = 8192  # Number of cells integrated in one batch, which bounds the memory; arbitrary
+_SPACING: Final = 5e-6  # Spacing of the samples of the first run at the default tail, s; arbitrary
 _FINE: Final = 8
-"""Number of samples of the refined run on either side of the highest sample of the first run."""
+"""Number of samples of the refined run on either side of the highest sample of the first run; arbitrary."""
 _PEAK_TOLERANCE: Final = 1e-8
 """Largest tolerance of the refined run; the display tolerance, 5e-7, misses peaks by 1e-4 of the stroke."""
 _FIRST, _SECOND = 2, 3  # Indices of the firings of the first and the second pulse

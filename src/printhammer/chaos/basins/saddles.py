@@ -12,8 +12,8 @@ from printhammer.chaos.orbits.orbit import SADDLE
 from printhammer.chaos.orbits.search import orbits
 from printhammer.support.threads import Progress
 
-_CROSSINGS: Final = 6  # Length of a manifold, in units of the longer side of the plane
-_PIECES: Final = 200  # Number of points of a manifold per longer side of the plane
+_CROSSINGS: Final = 6  # Length of a manifold, in units of the longer side of the plane; arbitrary
+_PIECES: Final = 200  # Number of points of a manifold per longer side of the plane; arbitrary
 
 
 def saddle_manifolds(

@@ -26,16 +26,16 @@ from printhammer.run.start import initial_state, state_beyond
 from printhammer.support.arrays import FloatArray
 
 FIRINGS: Final = 1000
-"""Default number of firings per train of a bifurcation diagram."""
+"""Default number of firings per train of a bifurcation diagram; arbitrary."""
 
 _JUDGED: Final = 200
-"""Default number of recorded firings per train, after the transient."""
+"""Default number of recorded firings per train, after the transient; arbitrary."""
 
 REFINE: Final = 2
-"""Default number of times to halve the parameter step where neighbouring trains differ."""
+"""Default number of times to halve the parameter step where neighbouring trains differ; arbitrary."""
 
 MOST_STATES: Final = 100_000_000
-"""Largest number of states in a diagram; a larger diagram raises `InputError`."""
+"""Largest number of states in a diagram; a larger diagram raises `InputError`. Arbitrary."""
 
 Direction = Literal["from rest", "up", "down", "both"]
 DIRECTIONS: Final = get_args(Direction)

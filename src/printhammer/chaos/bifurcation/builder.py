@@ -51,9 +51,9 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray
 
 STRAND: Final = 16
-"""Number of successive parameter values in a strand; strands are computed in parallel."""
+"""Number of successive parameter values in a strand; strands are computed in parallel. Arbitrary."""
 
-SAME: Final = 1e-3
+SAME: Final = 1e-3  # Arbitrary
 """Largest distance between two periodic orbits on the same attractor, in half-widths of the window."""
 
 _SHIFTED: Final = 0.5
@@ -161,7 +161,7 @@ def is_same_attractor(table: Trains, row: int, columns: Columns, place: int, cyc
     return bool((np.abs(one.mean(axis=0) - other.mean(axis=0)) <= _SHIFTED * spread).all())
 
 
-JUMP: Final = 0.2
+JUMP: Final = 0.2  # Arbitrary
 """Distance between neighbouring orbits, in half-widths of the strobe window, that requires a finer step."""
 
 

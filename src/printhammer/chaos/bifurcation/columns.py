@@ -36,7 +36,7 @@ NOT_RUN: Final = "not run"
 _STATUS: Final = "U16"
 
 MOST_STATES: Final = 1 << 19
-"""Maximum number of states computed in one batch, which bounds the memory."""
+"""Maximum number of states computed in one batch, which bounds the memory; arbitrary."""
 
 
 class Columns(Declared):

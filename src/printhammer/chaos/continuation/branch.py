@@ -162,7 +162,7 @@ def stable_ranges(
 
 
 MOST: Final = 1000
-"""Default maximum number of continuation steps in each direction."""
+"""Default maximum number of continuation steps in each direction; arbitrary."""
 
 _DIGITS: Final = ".9g"
 

@@ -49,30 +49,31 @@ BIRTH: Final = "period doubling"
 
 _ROUNDS: Final = 60  # Iteration limit of bisections and root searches; arbitrary
 _SHARE: Final = 1e-13
-"""Accuracy to which a special point is located, as a fraction of a continuation step."""
-_REAL: Final = 1e-9  # Imaginary part up to which a multiplier counts as real
+"""Accuracy to which a special point is located, as a fraction of a continuation step; arbitrary."""
+_REAL: Final = 1e-9  # Imaginary part up to which a multiplier counts as real; arbitrary
 _ROUNDING: Final = 1e-8
-"""Magnitude of a test function below which its sign change is rounding noise."""
+"""Magnitude of a test function below which its sign change is rounding noise; arbitrary."""
 _SHARE_OF_CHANGE: Final = 1e-10
-"""Final bracket of a change of the contact sequence, as a fraction of a continuation step."""
+"""Final bracket of a change of the contact sequence, as a fraction of a continuation step; arbitrary."""
 _SMALL_MARGIN: Final = 0.05
-"""Grazing margin below which the search for a contact change interpolates instead of bisecting."""
+"""Grazing margin below which the search for a contact change interpolates instead of bisecting; arbitrary."""
 _CLOSE_MARGIN: Final = 1e-7
-"""Grazing margin below which the interpolation of a contact change ends."""
+"""Grazing margin below which the interpolation of a contact change ends; arbitrary."""
 _NEAR: Final = 1e-4
-"""Distance, as a fraction of a step, within which a fold and a crossing are the same point."""
-_AMPLITUDE: Final = 1e-2  # First scaled distance from a period doubling at which to seek the doubled orbit
-_LEAST_AMPLITUDE: Final = 1e-6  # Smallest scaled distance from a period doubling to try
-_CLOSER: Final = 4.0
+"""Distance, as a fraction of a step, within which a fold and a crossing are the same point; arbitrary."""
+_AMPLITUDE: Final = 1e-2
+"""First scaled distance from a period doubling at which to seek the doubled orbit; arbitrary."""
+_LEAST_AMPLITUDE: Final = 1e-6  # Smallest scaled distance from a period doubling to try; arbitrary
+_CLOSER: Final = 4.0  # Arbitrary
 """Ratio of successive scaled distances from a period doubling at which the doubled orbit is sought."""
 _ASIDE: Final = 0.5
-"""Largest offset of a doubled orbit from the critical direction, relative to its distance."""
+"""Largest offset of a doubled orbit from the critical direction, relative to its distance; arbitrary."""
 _NEW_MULTIPLIER: Final = 0.3
-"""Largest distance of a multiplier of a doubled orbit from 1 near its period doubling."""
-_HALF_NEAR: Final = 0.05
+"""Largest distance of a multiplier of a doubled orbit from 1 near its period doubling; arbitrary."""
+_HALF_NEAR: Final = 0.05  # Arbitrary
 """Largest scaled distance between an orbit and one of half its period, for both to meet at a doubling."""
 _HALF_DOUBLES: Final = 0.5
-"""Largest distance of a multiplier from -1 at which a nearby period doubling is searched for."""
+"""Largest distance of a multiplier from -1 at which a nearby period doubling is searched for; arbitrary."""
 
 
 class BranchPoint(Declared):

@@ -30,19 +30,20 @@ Crossing = Literal["pitchfork", "transcritical", "branching"]
 CROSSINGS: Final[tuple[Crossing, ...]] = get_args(Crossing)
 
 _ROUNDS: Final = 60  # Iteration limit of the bracketing of a crossing; arbitrary
-_BRACKET: Final = 1e-5
+_BRACKET: Final = 1e-5  # Arbitrary
 """Smallest bracket of a crossing, as a fraction of a step; Newton's method fails at the crossing itself."""
 _DIFFERENCE: Final = 1e-3
 """Scaled step of the second differences; between 1e-4 and 1e-2 the kinds found in the tests are the same."""
-_FLAT: Final = 1e-6
+_FLAT: Final = 1e-6  # Arbitrary
 """Relative mixed second derivative below which the tangent of the crossing curve is undetermined."""
 _UPRIGHT: Final = 0.01
 """Largest component along the parameter of the tangent of a curve that turns back; arbitrary."""
-_AMPLITUDE: Final = 1e-2  # First scaled distance from a crossing at which to seek the crossing curve
-_LEAST_AMPLITUDE: Final = 1e-5  # Smallest scaled distance from a crossing to try
+_AMPLITUDE: Final = 1e-2
+"""First scaled distance from a crossing at which to seek the crossing curve; arbitrary."""
+_LEAST_AMPLITUDE: Final = 1e-5  # Smallest scaled distance from a crossing to try; arbitrary
 _CLOSER: Final = 4.0
-"""Ratio of successive scaled distances from a crossing at which the crossing curve is sought."""
-_ASIDE: Final = 0.5
+"""Ratio of successive scaled distances from a crossing at which the crossing curve is sought; arbitrary."""
+_ASIDE: Final = 0.5  # Arbitrary
 """Largest distance from the predicted point, relative to the step, of a point on the crossing curve."""
 
 

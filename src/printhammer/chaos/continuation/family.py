@@ -24,15 +24,16 @@ from printhammer.run.regime import Regime
 from printhammer.run.start import initial_state
 from printhammer.support.arrays import FloatArray
 
-_SPACING: Final = 1e-6
+_SPACING: Final = 1e-6  # Arbitrary
 """Relative step of the finite-difference derivative in the parameter, which only steers Newton's method."""
 _MUCH: Final = 1e3
-"""Multiplier above which the parameter step of the finite difference is reduced in proportion."""
-_BESIDE: Final = 1e-7  # Finite-difference step of the state at gentle touches, in the scales of the run
-_GENTLE: Final = 3e-4
+"""Multiplier above which the parameter step of the finite difference is reduced in proportion; arbitrary."""
+_BESIDE: Final = 1e-7
+"""Finite-difference step of the state at gentle touches, in the scales of the run; arbitrary."""
+_GENTLE: Final = 3e-4  # Arbitrary
 """Impact speed on the pack, relative to the speed scale, below which finite differences are used."""
 _IN_PACK: Final = f"{IN_PACK} at the section; another phase of the period can be chosen"
-_MOST_TOUCHES: Final = 100  # Number of contacts in a period above which the map has no value
+_MOST_TOUCHES: Final = 100  # Number of contacts in a period above which the map has no value; arbitrary
 _MANY: Final = f"more than {_MOST_TOUCHES} contacts"
 
 Surface = Literal["pack", "backstop"]

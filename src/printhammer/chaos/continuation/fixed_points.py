@@ -20,7 +20,7 @@ from printhammer.results import Declared, part
 from printhammer.support.arrays import FloatArray
 
 _MOST_CORRECTIONS: Final = 12  # Iteration limit of Newton's method; arbitrary
-_STAGNANT: Final = 1e3
+_STAGNANT: Final = 1e3  # Arbitrary
 """Multiple of the precision below which a correction that no longer shrinks counts as converged."""
 
 

@@ -33,15 +33,16 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray
 
 _CURRENT: Final = "with a voltage drive, the current at a touch belongs to the state"
-_CLOSE: Final = 0.01
+_CLOSE: Final = 0.01  # Arbitrary
 """Time before and after an impact during which the surface is removed, as a fraction of the period."""
-_STILL: Final = 1e-9  # Speed, relative to the speed scale, below which an orbit turns at its section
-_SPACING: Final = 1e-6  # Finite-difference step of Newton's method, in scaled variables
+_STILL: Final = 1e-9
+"""Speed, relative to the speed scale, below which an orbit turns at its section; arbitrary."""
+_SPACING: Final = 1e-6  # Finite-difference step of Newton's method, in scaled variables; arbitrary
 _ROUNDS: Final = 20  # Iteration limit of Newton's method; arbitrary
-_PRECISION: Final = 1e-12  # Scaled correction below which Newton's method has converged
-_STAGNANT: Final = 1e3  # Multiple of the precision below which stagnation counts as convergence
+_PRECISION: Final = 1e-12  # Scaled correction below which Newton's method has converged; arbitrary
+_STAGNANT: Final = 1e3  # Multiple of the precision below which stagnation counts as convergence; arbitrary
 _SLOWER: Final = (0.98, 0.9, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.02, 0.005)
-"""Impact speeds, relative to the first, at which the last orbits before a grazing are computed."""
+"""Impact speeds, relative to the first, at which the last orbits before a grazing are computed; arbitrary."""
 
 
 class Flight(Declared):
@@ -246,16 +247,16 @@ def fading(
     return way
 
 
-_GENTLE: Final = 1e-2
+_GENTLE: Final = 1e-2  # Arbitrary
 """Largest distance of a touch from a grazing, in half-widths, for a branch to end in that grazing."""
-_NEAR: Final = 1e-2
+_NEAR: Final = 1e-2  # Arbitrary
 """Largest distance from the last orbit to the grazing that ends its branch, in parameter scales."""
-_STEEP: Final = 10.0
+_STEEP: Final = 10.0  # Arbitrary
 """Multiplier above which an orbit is close enough to its grazing to exclude a bifurcation before it."""
 _CLOSER: Final = 0.7
-"""Ratio of the impact speed to that of the last attempt, below which a grazing is sought again."""
+"""Ratio of the impact speed to that of the last attempt, below which a grazing is sought again; arbitrary."""
 _ON_CURVE: Final = 1e-5
-"""Largest scaled closing error of an orbit that is appended to a branch before its grazing."""
+"""Largest scaled closing error of an orbit that is appended to a branch before its grazing; arbitrary."""
 
 
 def grazing_end(

@@ -43,12 +43,12 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SEEDS: Final = 6
-"""Default number of rates at which periodic orbits are searched for."""
+"""Default number of rates at which periodic orbits are searched for; arbitrary."""
 
-_TOGETHER: Final = 4
+_TOGETHER: Final = 4  # Arbitrary
 """Number of branches followed in parallel; fixed, so that the result does not depend on threads."""
 _SAME: Final = 1e-4
-"""Distance, in half-widths of the strobe window, within which an orbit lies on a branch."""
+"""Distance, in half-widths of the strobe window, within which an orbit lies on a branch; arbitrary."""
 
 
 class Branches(Result):

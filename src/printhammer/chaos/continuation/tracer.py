@@ -32,23 +32,23 @@ from printhammer.support.arrays import FloatArray
 from printhammer.support.threads import Progress, mapped
 
 PRECISION: Final = 1e-10
-"""Scaled correction of Newton's method below which an orbit has converged; see `arclength`."""
+"""Scaled correction of Newton's method below which an orbit has converged; see `arclength`. Arbitrary."""
 
 _PARTS: Final = 5.0
 """Ratio of the parameter range to the parameter scale; arbitrary."""
 _LOST: Final = ("lost", "jump", "no value")
 GRAZING: Final = "grazing"
 _AT_GRAZING: Final = "it grazes the rigid backstop, where the strobe map has no derivative"
-_SHORTER: Final = 1e-6
+_SHORTER: Final = 1e-6  # Arbitrary
 """Scaled closing error after a fraction of the firings below which an orbit has the shorter period."""
 _DIGITS: Final = ".9g"
 _MOST_SECTIONS: Final = 8  # Maximum number of segments of a branch at different sections; arbitrary
-_SAME_PHASE: Final = 1e-3
+_SAME_PHASE: Final = 1e-3  # Arbitrary
 """Difference of section phases, as a fraction of the period, below which two phases are the same."""
-_CLEAR: Final = 1e-3
+_CLEAR: Final = 1e-3  # Arbitrary
 """Scaled distance from the end of a segment within which orbits are dropped at a section change."""
 _LEAST_CHORD: Final = 1e-5
-"""Smallest scaled distance between two orbits whose chord gives the direction of the branch."""
+"""Smallest scaled distance between two orbits whose chord gives the direction of the branch; arbitrary."""
 _NO_STOP: Final = Stop("section", math.nan, np.zeros(0), "the section moves")
 
 

@@ -38,7 +38,7 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 SAME: Final = 1e-3
-"""Distance from the unit circle within which a multiplier counts as critical."""
+"""Distance from the unit circle within which a multiplier counts as critical; arbitrary."""
 
 
 class BifurcationCurve(Result, rows="point"):
@@ -223,10 +223,10 @@ class BifurcationCurve(Result, rows="point"):
 
 
 GRID_TOLERANCE: Final = 1e-9
-"""Integration tolerance of the trains from rest on the grid of both parameters."""
+"""Integration tolerance of the trains from rest on the grid of both parameters; arbitrary."""
 
-_FIRINGS: Final = 300  # Number of firings of a train from rest
-_JUDGED: Final = 64  # Number of last firings that are classified
+_FIRINGS: Final = 300  # Number of firings of a train from rest; arbitrary
+_JUDGED: Final = 64  # Number of last firings that are classified; arbitrary
 
 
 def settled_plane(
@@ -266,7 +266,7 @@ def _period(states: States, train: Train) -> int:
 
 
 MOST: Final = 200
-"""Default maximum number of continuation steps of a curve in each direction."""
+"""Default maximum number of continuation steps of a curve in each direction; arbitrary."""
 
 
 def bifurcation_curve(

@@ -34,17 +34,17 @@ from printhammer.errors import InputError
 from printhammer.results import Declared, part
 from printhammer.support.arrays import FloatArray
 
-RESONANCES: Final = 3
+RESONANCES: Final = 3  # Arbitrary
 """Largest number n of orbit periods per touch for which a grazing orbit is tested for a resonance."""
 
-_LEVEL: Final = 1e-3
+_LEVEL: Final = 1e-3  # Arbitrary
 """Component of a unit tangent along a parameter below which a curve is stationary in this parameter."""
-_VANISHES: Final = 0.1
+_VANISHES: Final = 0.1  # Arbitrary
 """Tangent component at a cusp, relative to the components at neighbouring nodes, that counts as zero."""
 _ROUNDS: Final = 20  # Iteration limit of Newton's method; arbitrary
-_MOVE: Final = 1e-6  # Finite-difference step of Newton's method, in scaled variables
-_PRECISION: Final = 1e-11  # Scaled residual below which Newton's method has converged
-_NOISE: Final = 1e-8  # Magnitude below which a test function or a tangent component is noise
+_MOVE: Final = 1e-6  # Finite-difference step of Newton's method, in scaled variables; arbitrary
+_PRECISION: Final = 1e-11  # Scaled residual below which Newton's method has converged; arbitrary
+_NOISE: Final = 1e-8  # Magnitude below which a test function or a tangent component is noise; arbitrary
 
 
 class CodimensionTwo(Declared):

@@ -29,14 +29,15 @@ from printhammer.errors import InputError
 from printhammer.support.arrays import FloatArray
 
 MOST_PERIODS: Final = 4
-"""Largest number of orbit periods per touch for which orbits near a grazing are tested."""
+"""Largest number of orbit periods per touch for which orbits near a grazing are tested; arbitrary."""
 
-_SPACINGS: Final = (2e-3, 2e-4, 5e-5)  # Finite-difference steps tried, the largest first, in half-widths
-_AGREE: Final = 0.05
+_SPACINGS: Final = (2e-3, 2e-4, 5e-5)
+"""Finite-difference steps tried, the largest first, in half-widths; arbitrary."""
+_AGREE: Final = 0.05  # Arbitrary
 """Relative difference of coefficients at a step and at half the step, below which they are accepted."""
 _DOUBLES: Final = 1e-4
-"""Largest distance of a multiplier from -1 at which a normal-form coefficient is computed."""
-_FEW: Final = 1e-9  # Relative magnitude below which a denominator is singular
+"""Largest distance of a multiplier from -1 at which a normal-form coefficient is computed; arbitrary."""
+_FEW: Final = 1e-9  # Relative magnitude below which a denominator is singular; arbitrary
 
 
 def doubling_coefficient(plane: Plane, place: CurvePoint) -> float:

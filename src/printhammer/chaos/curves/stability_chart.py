@@ -43,9 +43,9 @@ from printhammer.run.regime import FiredAtFixedTolerance, Firing, Regime
 from printhammer.support.arrays import FloatArray, IntArray
 
 GRID: Final = (48, 32)
-"""Default numbers of values of the two parameters at which trains from rest are classified."""
+"""Default numbers of values of the two parameters at which trains from rest are classified; arbitrary."""
 
-_ACROSS: Final = (0.02, 0.98)
+_ACROSS: Final = (0.02, 0.98)  # Arbitrary
 """Fractions of the range of the first parameter at which branches in the second parameter start."""
 
 

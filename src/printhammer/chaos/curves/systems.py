@@ -63,9 +63,9 @@ GRAZING: Final = "grazing"
 KINDS: Final = (*TESTS, GRAZING)
 """Kinds of bifurcation that can be followed."""
 
-SPACING: Final = 1e-6
+SPACING: Final = 1e-6  # Arbitrary
 """Scaled step size of finite differences, whose errors affect only the convergence of Newton's method."""
-_PARTS: Final = 5.0
+_PARTS: Final = 5.0  # Arbitrary
 """Ratio of a parameter's range to its scale; the state is scaled by half-widths of the strobe window."""
 
 
@@ -178,7 +178,7 @@ def curve_point_of(node: Node) -> CurvePoint:
 
 
 _PHASES: Final = 0.2
-"""Scale of the phase of a touch, as a fraction of the period."""
+"""Scale of the phase of a touch, as a fraction of the period; arbitrary."""
 _IN_TRACE: Final = {"fold": -1.0, "period doubling": 1.0, "Neimark-Sacker": 0.0}
 """Coefficient c of the test function f = 1 + det J + c tr J; Neimark-Sacker: f = det J - 1."""
 

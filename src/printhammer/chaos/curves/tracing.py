@@ -38,15 +38,15 @@ from printhammer.support.arrays import FloatArray
 from printhammer.support.threads import mapped
 
 PRECISION: Final = 1e-12
-"""Scaled correction of Newton's method below which a point lies on the curve."""
+"""Scaled correction of Newton's method below which a point lies on the curve; arbitrary."""
 
 _NOISY: Final = 1e-9
-"""Scaled closing error above which a point that Newton's method accepts is rejected."""
-_GENTLE: Final = 1e-6  # Impact speed, in scales, at which a curve ends in a grazing
-_SLOW: Final = 0.05
+"""Scaled closing error above which a point that Newton's method accepts is rejected; arbitrary."""
+_GENTLE: Final = 1e-6  # Impact speed, in scales, at which a curve ends in a grazing; arbitrary
+_SLOW: Final = 0.05  # Arbitrary
 """Impact speed, in half-widths of the window, below which a curve may end in a resonant grazing."""
 _FAR: Final = 0.02
-"""Distance in the scaled plane within which a point of codimension two is the end of a curve."""
+"""Distance in the scaled plane within which a point of codimension two is the end of a curve; arbitrary."""
 _TURNS: Final = 8
 """Maximum number of section changes along a curve; arbitrary."""
 

@@ -199,10 +199,10 @@ def _chart(
 
 
 LENGTHS: Final = (1, 2, 5, 10, 20, 50)
-"""Default lengths of the stretches of finite-time exponents, in firings."""
+"""Default lengths of the stretches of finite-time exponents, in firings; arbitrary."""
 FEWEST: Final = 10
-"""Smallest number of stretches from which a distribution of exponents is computed."""
-LEVELS: Final = (0.05, 0.25, 0.5, 0.75, 0.95)  # Quantile levels of the distribution
+"""Smallest number of stretches from which a distribution of exponents is computed; arbitrary."""
+LEVELS: Final = (0.05, 0.25, 0.5, 0.75, 0.95)  # Quantile levels of the distribution; conventional
 
 
 class FiniteTime(Result, rows="length"):

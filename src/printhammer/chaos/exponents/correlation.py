@@ -30,20 +30,20 @@ from printhammer.support.arrays import FloatArray
 MOST: Final = 50_000
 """Largest number of states for the correlation dimension; arbitrary."""
 FEWEST: Final = 200
-"""Smallest number of states for the correlation dimension."""
-THEILER: Final = 10  # Default of the Theiler window, in steps
+"""Smallest number of states for the correlation dimension; arbitrary."""
+THEILER: Final = 10  # Default of the Theiler window, in steps; arbitrary
 FLAT: Final = 0.1
-"""Default for the largest range of local slopes on a plateau."""
+"""Default for the largest range of local slopes on a plateau; arbitrary."""
 
-_PER_OCTAVE: Final = 2  # Number of radii per factor of 2
+_PER_OCTAVE: Final = 2  # Number of radii per factor of 2; arbitrary
 _PIECE: Final = 4
-"""Width of the fit of a local slope, in steps of the radius."""
+"""Width of the fit of a local slope, in steps of the radius; arbitrary."""
 _SHORTEST: Final = 3 * _PER_OCTAVE
 """Smallest length of a plateau, in steps of the radius; corresponds to a factor of 8."""
-_FEW_PAIRS: Final = 200  # Number of pairs below which a correlation sum is discarded
-_LARGEST: Final = 0.25
+_FEW_PAIRS: Final = 200  # Number of pairs below which a correlation sum is discarded; arbitrary
+_LARGEST: Final = 0.25  # Arbitrary
 """Correlation sum above which radii are not used: the finite size of the attractor biases the slope."""
-_PARTS: Final = 5  # Number of sections of the series whose scatter gives the error
+_PARTS: Final = 5  # Number of sections of the series whose scatter gives the error; arbitrary
 
 
 class CorrelationDimension(Result, rows="radius"):

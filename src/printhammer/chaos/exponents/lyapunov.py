@@ -40,10 +40,10 @@ from printhammer.support.arguments import checked
 from printhammer.support.arrays import FloatArray, IntArray
 
 FIRINGS: Final = 1000
-"""Default number of firings over which the growth of perturbations is averaged."""
+"""Default number of firings over which the growth of perturbations is averaged; arbitrary."""
 
 TRANSIENT: Final = 1000
-"""Default number of firings to discard before growth is averaged."""
+"""Default number of firings to discard before growth is averaged; arbitrary."""
 
 PER_FIRING: Final = "1/firing"
 """Unit of Lyapunov exponents, for columns and scalars."""
@@ -56,9 +56,9 @@ EXPONENT: Final = (
 
 _GROWTH: Final = ("firing", "exponent")
 _RUNNING: Final = ("count", "exponent")
-_COUNTS: Final = 100  # Default number of running estimates
+_COUNTS: Final = 100  # Default number of running estimates; arbitrary
 _CYCLES: Final = 8
-"""Smallest number of whole cycles from which a standard error is computed."""
+"""Smallest number of whole cycles from which a standard error is computed; arbitrary."""
 
 
 def dimension_text(value: float, error: float) -> str:

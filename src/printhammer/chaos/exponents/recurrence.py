@@ -26,12 +26,12 @@ MOST: Final = 4096
 """Largest number of states of a recurrence plot, whose matrix then has 16 million points; arbitrary."""
 
 RATE: Final = 0.05
-"""Default recurrence rate, used if neither a threshold nor a rate is given."""
+"""Default recurrence rate, used if neither a threshold nor a rate is given; arbitrary."""
 
 SHORTEST: Final = 2
-"""Default for the length of the shortest line, in points."""
+"""Default length of the shortest line, in points: the smallest length of a line."""
 
-_ROWS: Final = 256  # Rows of the distance matrix computed at once, which bounds the memory
+_ROWS: Final = 256  # Rows of the distance matrix computed at once, which bounds the memory; arbitrary
 
 
 class Recurrence(Result):

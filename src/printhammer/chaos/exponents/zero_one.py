@@ -30,13 +30,13 @@ from printhammer.run.regime import Firing, Regime
 from printhammer.support.arrays import FloatArray
 
 ANGLES: Final = 100
-"""Default number of random angles c of the 0-1 test."""
+"""Default number of random angles c of the 0-1 test, as in Gottwald and Melbourne (2009)."""
 
 RANGE: Final = (math.pi / 5.0, 4.0 * math.pi / 5.0)
 """Range of the angles c, rad; closer to 0 or pi, short cycles resonate."""
 
 SEED: Final = 1983
-"""Default seed of the random generator of the angles."""
+"""Default seed of the random number generator of the angles: the year of the paper."""
 
 REGULAR: Final = 0.2
 CHAOTIC: Final = 0.8
@@ -46,23 +46,23 @@ K^2 is the fraction of the variance of M_c(n) that a straight line explains: at 
 series, about two thirds or more for a chaotic series.
 """
 
-FEWEST: Final = 100
+FEWEST: Final = 100  # Arbitrary
 """Smallest length of a series; its mean square displacement is computed up to a tenth of the length."""
 
-SETTLING: Final = 0.5
+SETTLING: Final = 0.5  # Arbitrary
 """Ratio of standard deviations, last to first quarter of a series, below which the series is a transient."""
 
 LONGEST_CYCLE: Final = 64
-"""Largest cycle length of a series that is tested; at most a quarter of its length."""
+"""Largest cycle length of a series that is tested; at most a quarter of its length. Arbitrary."""
 
-CYCLES: Final = 5
+CYCLES: Final = 5  # Arbitrary
 """Number of cycles over which a path has to grow to count as chaos; within one cycle, any path may grow."""
 
-FOLLOWS: Final = 0.7
+FOLLOWS: Final = 0.7  # Arbitrary
 """Distance of the images of neighbours, relative to random pairs, below which a series is deterministic."""
 
 _CUT: Final = 10  # Ratio of the series length to the largest lag of the displacement (Gottwald and Melbourne)
-_PASSES: Final = 4  # Smallest number of cycles in a series for a cycle to be considered
+_PASSES: Final = 4  # Smallest number of cycles in a series for a cycle to be considered; arbitrary
 _TOGETHER: Final = 1 << 20
 """Number of complex numbers processed in one batch; arbitrary."""
 

@@ -23,21 +23,23 @@ from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray
 
-PHASES: Final = (0.0, 0.5)
+PHASES: Final = (0.0, 0.5)  # Arbitrary
 """Section phases of the search; orbits inside the pack at the first phase are found at the second."""
 
 _ALIKE: Final = 0.02
-"""Distance, in half-widths of the strobe window, below which two guesses are duplicates."""
-_EARLY_ALIKE: Final = 0.1
+"""Distance, in half-widths of the strobe window, below which two guesses are duplicates; arbitrary."""
+_EARLY_ALIKE: Final = 0.1  # Arbitrary
 """Distance, in half-widths, below which two guesses from the first firings of motions are duplicates."""
 _LOOKED_AT: Final = 4000
 """Maximum number of close returns, closest first, that are tested for duplicates; arbitrary."""
 _EARLY: Final = 2
-"""Number of firings from the start of a motion within which close returns count as early."""
+"""Number of firings from the start of a motion within which close returns count as early; arbitrary."""
 _LEAST: Final = 16
-"""Smallest number of firings over which a motion is recorded."""
-_ROOM: Final = 1.2  # Extent of the initial states beyond the strobe window, in half-widths of the window
-# Extent of the initial states without a bound: a ball with one bounce per period rises to 5 half-widths
+"""Smallest number of firings over which a motion is recorded; arbitrary."""
+_ROOM: Final = 1.2
+"""Extent of the initial states beyond the strobe window, in half-widths of the window; arbitrary."""
+# Extent of the initial states without a bound: a ball with one bounce per period rises to 5 half-widths;
+# arbitrary
 _SCALES: Final = 6.0
 _PLASTIC: Final = 1.324717957244746
 """Real root of x^3 = x + 1, whose inverse powers spread points evenly over a square."""

@@ -33,25 +33,25 @@ from printhammer.support.arrays import FloatArray, IntArray
 
 KINDS: Final = ("stable", "unstable")
 LENGTH: Final = 10.0
-"""Default arc length of each manifold curve, in half-widths of the strobe window."""
+"""Default arc length of each manifold curve, in half-widths of the strobe window; arbitrary."""
 POINTS: Final = 4000
-"""Default maximum number of points of each manifold curve."""
+"""Default maximum number of points of each manifold curve; arbitrary."""
 SPACING: Final = 0.02
-"""Default target distance between neighbouring points, in half-widths of the strobe window."""
+"""Default target distance between neighbouring points, in half-widths of the strobe window; arbitrary."""
 BEND: Final = 0.2
-"""Angle between neighbouring segments, rad, above which a point is inserted."""
+"""Angle between neighbouring segments, rad, above which a point is inserted; arbitrary."""
 
 _NEAR: Final = 1e-5
-"""Distance from the saddle, in half-widths, within which a manifold is treated as straight."""
+"""Distance from the saddle, in half-widths, within which a manifold is treated as straight; arbitrary."""
 _FINEST: Final = 1e-3
-"""Distance of points, as a fraction of the spacing, below which no point is inserted at a bend."""
-_TIGHT: Final = 1e-12
+"""Distance of points, as a fraction of the spacing, below which no point is inserted at a bend; arbitrary."""
+_TIGHT: Final = 1e-12  # Arbitrary
 """Smallest step along a fundamental segment; a gap of the images at this step is a jump of the map."""
-_SETTLED: Final = 0.1
+_SETTLED: Final = 0.1  # Arbitrary
 """Extent of an image of a fundamental segment, relative to the spacing, below which a sink is sought."""
-_CLOSE: Final = 1e-10  # Relative residual at which Newton's method has converged
+_CLOSE: Final = 1e-10  # Relative residual at which Newton's method has converged; arbitrary
 _NEWTON: Final = 8  # Iteration limit of Newton's method; arbitrary
-_FEW: Final = 4  # Number of points from which the prediction is a cubic
+_FEW: Final = 4  # Number of points from which the prediction is a cubic; a cubic has four coefficients
 
 
 class Manifolds(Result, rows="point"):

@@ -44,9 +44,9 @@ TOO_LONG: Final = "too many iterations"
 SINGULAR: Final = "singular derivative"
 
 _LONGEST_STEP: Final = 1.0
-"""Largest Newton step, in half-widths of the strobe window."""
+"""Largest Newton step, in half-widths of the strobe window; arbitrary."""
 _LEAST_SHARE: Final = 2.0**-7
-"""Smallest damping factor of a Newton step."""
+"""Smallest damping factor of a Newton step; arbitrary."""
 
 
 @dataclass(frozen=True)
@@ -238,9 +238,9 @@ class _Search:
 
 
 _SPACING: Final = 1e-5
-"""Finite-difference step of a state, in half-widths of the strobe window."""
+"""Finite-difference step of a state, in half-widths of the strobe window; arbitrary."""
 _PIECE: Final = 30_000
-"""Maximum number of states integrated in one batch, which bounds the memory."""
+"""Maximum number of states integrated in one batch, which bounds the memory; arbitrary."""
 
 
 class ExactMaps:

@@ -34,12 +34,13 @@ UNDECIDED: Final = "undecided"
 KINDS: Final = (STABLE, SADDLE, UNSTABLE, UNDECIDED)
 
 NEUTRAL: Final = 1e-6
-"""Distance of the absolute value of a multiplier from 1 within which stability is undecided."""
+"""Distance of the absolute value of a multiplier from 1 within which stability is undecided; arbitrary."""
 
 CLOSES: Final = 1e-6
 """Largest closing error of a valid orbit over a whole period, in half-widths of the strobe window.
 
 If the larger multiplier exceeds 1 in absolute value, the limit is multiplied by that absolute value.
+Arbitrary.
 """
 
 _OK: Final = "ok"
@@ -57,7 +58,7 @@ _SECTION: Final = (
     ("section_x", "m", "displacement at the section"),
     ("section_v", "m/s", "velocity at the section"),
 )
-_POINTS: Final = 2001  # Number of points of the motion's time grid
+_POINTS: Final = 2001  # Number of points of the motion's time grid; arbitrary
 
 
 class Orbit(Result):

@@ -19,15 +19,15 @@ from printhammer.run.effort import Effort, InThreads, computation
 from printhammer.run.regime import Fired, Regime
 
 LONGEST: Final = 8
-"""Default largest orbit period to search for, in firings."""
+"""Default largest orbit period to search for, in firings; arbitrary."""
 
-MOST_FIRINGS: Final = 64  # Largest orbit period that can be searched for, in firings
+MOST_FIRINGS: Final = 64  # Largest orbit period that can be searched for, in firings; arbitrary
 STARTS: Final = 1024
-"""Default number of initial states of a search, in addition to the rest state."""
+"""Default number of initial states of a search, in addition to the rest state; arbitrary."""
 GUESSES: Final = 48
-"""Default number of initial guesses per number of firings and block of starts."""
+"""Default number of initial guesses per number of firings and block of starts; arbitrary."""
 FOLLOW: Final = 2
-"""Default largest period, in firings, of the orbits whose branches are followed."""
+"""Default largest period, in firings, of the orbits whose branches are followed; arbitrary."""
 
 
 @computation

@@ -28,24 +28,24 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray
 
 AGREES: Final = 1e-8
-"""Distance, in half-widths of the strobe window, up to which two states are considered equal."""
+"""Distance, in half-widths of the strobe window, up to which two states are considered equal; arbitrary."""
 
-DISTINCT: Final = 1e-3
+DISTINCT: Final = 1e-3  # Arbitrary
 """Distance, in half-widths of the strobe window, above which two states differ by more than noise."""
 
-LIES_ON: Final = 1e-6
+LIES_ON: Final = 1e-6  # Arbitrary
 """Distance from a stable orbit, in half-widths, within which a state lies on the orbit up to noise."""
 
 NEAR: Final = 0.1
-"""Distance from the states, in half-widths, within which an orbit of fewer firings is sought."""
+"""Distance from the states, in half-widths, within which an orbit of fewer firings is sought; arbitrary."""
 
 _SHRINKS: Final = 1e-5
-"""Smallest relative decrease of a distance that counts as shrinking."""
-_NOISE: Final = 1e-9
+"""Smallest relative decrease of a distance that counts as shrinking; arbitrary."""
+_NOISE: Final = 1e-9  # Arbitrary
 """Smallest decrease of a distance that counts as shrinking, in half-widths of the strobe window."""
 _GOAL: Final = 1e-13
-"""Residual at which Newton's method stops, in half-widths of the strobe window."""
-_ENOUGH: Final = 1e-9
+"""Residual at which Newton's method stops, in half-widths of the strobe window; arbitrary."""
+_ENOUGH: Final = 1e-9  # Arbitrary
 """Residual that Newton's method accepts if it stops decreasing, in half-widths of the strobe window."""
 _ITERATIONS: Final = 20  # Iteration limit of Newton's method; arbitrary
 

@@ -41,7 +41,7 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray
 
 SHARE: Final = 0.05
-"""Half-range of drive periods over which a branch is followed, as a fraction of the period."""
+"""Half-range of drive periods over which a branch is followed, as a fraction of the period; arbitrary."""
 
 _PARTS: Final = 5.0  # Ratio of parameter range to parameter scale, as in `continuation.tracer`
 _STEPS: Final = Steps(most=150, precision=1e-10)
@@ -71,21 +71,22 @@ def crossings(orbit: Orbit) -> list[FloatArray]:
     return states
 
 
-_LONG: Final = 400
+_LONG: Final = 400  # Arbitrary
 """Number of firings of the long record, the train from rest, that is searched for close returns."""
-_BLOCKS: Final = (128, 1024)  # Numbers of starts, ascending; requests are rounded up, as for `_BATCHES`
-_BATCHES: Final = (8, 48)
+_BLOCKS: Final = (128, 1024)
+"""Numbers of starts, ascending; requests are rounded up, as for `_BATCHES`; arbitrary."""
+_BATCHES: Final = (8, 48)  # Arbitrary
 """Numbers of guesses, ascending; requests are rounded up to an entry or a repeated doubling of the last."""
 _EVEN: Final = 8
-"""Orbit period, in firings, below which the number of guesses is raised in inverse proportion."""
+"""Orbit period, in firings, below which the number of guesses is raised in inverse proportion; arbitrary."""
 _JOINED: Final = 48
-"""Maximum number of guesses per stage and period that are concatenations of two shorter orbits."""
-_TOUCHES: Final = 4
+"""Maximum number of guesses per stage and period that are concatenations of two shorter orbits; arbitrary."""
+_TOUCHES: Final = 4  # Arbitrary
 """Ratio, among the starts, of evenly spread states to states just after a touch of a rigid backstop."""
-_COMPLETED: Final = 6
+_COMPLETED: Final = 6  # Arbitrary
 """Largest period, in firings, that is searched again if its fixed-point indices do not sum to 1."""
 _MORE: Final = 512
-"""Number of additional guesses for a period whose fixed-point indices do not sum to 1."""
+"""Number of additional guesses for a period whose fixed-point indices do not sum to 1; arbitrary."""
 _NEAR: Final = 64  # Number of guesses near each known orbit of a period whose index sum is not 1; arbitrary
 _ROUNDS: Final = 3  # Largest number of rounds of further guesses; arbitrary
 _SIZES: Final = (-6.0, -1.5)
@@ -93,10 +94,13 @@ _SIZES: Final = (-6.0, -1.5)
 
 Near chatter, orbits that differ by one bounce lie close together. Tuned on the ball of Tufillaro at 60 Hz."""
 _SAME: Final = 1e-6
-"""Distance, in half-widths of the strobe window, below which two orbits share a state."""
+"""Distance, in half-widths of the strobe window, below which two orbits share a state; arbitrary."""
 _FAST: Final[dict[str, Any]] = {"goal": 1e-9, "enough": 1e-7, "iterations": 30}
+"""Settings of Newton's method for all guesses; residuals in half-widths of the strobe window; arbitrary."""
 _EXACT: Final[dict[str, Any]] = {"goal": 1e-13, "enough": 1e-9, "iterations": 8}
+"""Settings of Newton's method for the orbits found with `_FAST`; arbitrary."""
 LONE: Final[dict[str, Any]] = {"goal": 1e-13, "enough": 1e-9, "iterations": 60}
+"""Settings of Newton's method for a single initial guess; arbitrary."""
 
 
 def shortest(closing: Closing, scales: FloatArray) -> Closing:

@@ -39,7 +39,7 @@ from printhammer.run.supply import emf, linkage
 from printhammer.support.arrays import FloatArray
 
 MAP_TOLERANCE: Final = 1e-13
-"""Integration tolerance of the strobe map, which limits the accuracy of a fixed point."""
+"""Integration tolerance of the strobe map, which limits the accuracy of a fixed point; arbitrary."""
 
 MAP_EFFORT: Final = Effort(MAP_TOLERANCE)
 
@@ -57,9 +57,9 @@ RANGE_LEFT: Final = "range left"
 """Status of an image whose initial displacement is inaccessible, e.g. behind a rigid backstop."""
 
 _TURN_STEPS: Final = 60  # Iteration limit of the root search for an extremum; arbitrary
-_STILL: Final = 1e-9
+_STILL: Final = 1e-9  # Arbitrary
 """Relative speed at which the root search for an extremum stops; the displacement error is quadratic."""
-STILL_COIL: Final = 1e-9
+STILL_COIL: Final = 1e-9  # Arbitrary
 """Current or flux linkage, relative to a typical value, below which the coil counts as currentless."""
 
 
@@ -226,8 +226,9 @@ def turns(problem: Problem, record: Record) -> tuple[FloatArray, FloatArray, Flo
     return time, table[:, 0], sign
 
 
-_BEYOND: Final = 0.01  # Time by which a run extends beyond the last section, as a fraction of the period
-# Time between an impact and a section, as a fraction of the period, below which the two coincide
+_BEYOND: Final = 0.01
+"""Time by which a run extends beyond the last section, as a fraction of the period; arbitrary."""
+# Time between an impact and a section, as a fraction of the period, below which the two coincide; arbitrary
 _ON_IMPACT: Final = 1e-3
 
 

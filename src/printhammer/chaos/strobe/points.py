@@ -54,7 +54,7 @@ from printhammer.support.threads import Progress
 POINTS = 200
 """Default number of strobe points, as in Fig. 11."""
 
-_SETTLED = 1000
+_SETTLED = 1000  # Arbitrary
 """Default number of points of a settled series, and of the firings discarded before the first point."""
 
 

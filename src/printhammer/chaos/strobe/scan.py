@@ -31,19 +31,19 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.run.effort import DEFAULT, Effort, Keywords, computation
 from printhammer.run.regime import Regime
 
-STAGES: Final = (32, 128)
+STAGES: Final = (32, 128)  # Arbitrary
 """Numbers of firings after which a still unclassified train is tested for a stable periodic motion."""
 
 CLOSER: Final = 1e-2
-"""Tolerance of the early test: largest distance of repeated states, as a fraction of `AGREEMENT`."""
+"""Largest distance of repeated states in the early test, over `AGREEMENT`: 1 - `LARGEST_MULTIPLIER`."""
 
 LARGEST_MULTIPLIER: Final = 0.99
-"""Largest absolute Floquet multiplier with which the early test accepts a period."""
+"""Largest absolute Floquet multiplier with which the early test accepts a period; arbitrary."""
 
 _SHORT: Final = 301
-"""Number of firings over which the first estimate of the exponent is averaged."""
+"""Number of firings over which the first estimate of the exponent is averaged; arbitrary."""
 _SURE: Final = 5.0
-"""Number of standard errors above which the first estimate of the exponent is decisive."""
+"""Number of standard errors above which the first estimate of the exponent is decisive; arbitrary."""
 
 
 @computation

@@ -102,7 +102,7 @@ def is_memoryless(regime: Regime) -> bool:
 
 
 _BEFORE: Final = 100
-"""Number of firings discarded before the exponent of a continued train is averaged."""
+"""Number of firings discarded before the exponent of a continued train is averaged; arbitrary."""
 
 
 class Train(Declared):
@@ -269,7 +269,7 @@ def run_trains(
 
 
 FINER: Final = (0.1, 0.01)
-"""Factors on the tolerance for recomputed periods of motions that come to rest on the backstop."""
+"""Factors on the tolerance for recomputed periods of motions that come to rest on the backstop; arbitrary."""
 
 
 def _at_finer(

@@ -22,13 +22,13 @@ from printhammer.results import Declared, part
 from printhammer.support.arrays import FloatArray, IntArray
 
 LARGEST_PERIOD: Final = 64
-"""Largest orbit period that is searched for, in firings."""
+"""Largest orbit period that is searched for, in firings; arbitrary."""
 
 AGREEMENT: Final = 1e-6
-"""Distance, in half-widths of the strobe window, within which two states agree."""
+"""Distance, in half-widths of the strobe window, within which two states agree; arbitrary."""
 
 SIGNIFICANT: Final = 3.0
-"""Number of standard errors by which the exponent of a strange train has to exceed zero."""
+"""Number of standard errors by which the exponent of a strange train has to exceed zero; arbitrary."""
 
 SUPERSTABLE: Final = "superstable"
 """Classification of a motion that repeatedly comes to rest on its backstop, without a period up to 64."""
@@ -36,10 +36,10 @@ SUPERSTABLE: Final = "superstable"
 FORGETS: Final = "no exponent: the motion comes to rest and forgets its past"
 
 FIRST: Final = 1001
-"""Default first firing used for the classification; the very first firing is number 1."""
+"""Default first firing used for the classification; the very first firing is number 1. Arbitrary."""
 
 LAST: Final = 2000
-"""Default last firing used for the classification."""
+"""Default last firing used for the classification; arbitrary."""
 
 _STOPPED: Final = "the run ended before firing"
 
