@@ -41,9 +41,9 @@ Surface = Literal["pack", "backstop"]
 SURFACES: Final = get_args(Surface)
 
 TOUCHES: Final = 1000
-"""Default number of impacts in a Poincaré section."""
+"""Default number of impacts in a Poincaré section; arbitrary."""
 
-_FIRINGS_A_TOUCH: Final = 10  # Default maximum number of firings per requested touch
+_FIRINGS_A_TOUCH: Final = 10  # Default maximum number of firings per requested touch; arbitrary
 
 
 class Section(Result):
@@ -241,12 +241,12 @@ def _section(train: Train, surface: Surface, counts: tuple[int, int, int], toler
 
 
 BINS: Final = 60
-"""Default number of bins of the histogram of intervals."""
+"""Default number of bins of the histogram of intervals; arbitrary."""
 
-LAGS: Final = 40
+LAGS: Final = 40  # Arbitrary
 """Default for the largest lag of the autocorrelation; at most a quarter of the number of intervals."""
 
-_FEWEST: Final = 8  # Smallest number of intervals for the statistics of a train
+_FEWEST: Final = 8  # Smallest number of intervals for the statistics of a train; arbitrary
 _SAME: Final = 1e-9
 """Relative difference below which all intervals are equal, so that their autocorrelation is undefined."""
 

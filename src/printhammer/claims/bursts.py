@@ -258,7 +258,7 @@ def flight_time_spread(context: Context, claim: Claim) -> Measured:
 
 
 _SPACING: Final = 10e-6
-"""Sampling interval of a displacement record in the sensitivity test, s."""
+"""Sampling interval of a displacement record in the sensitivity test, s; arbitrary."""
 
 
 def sensitivity(context: Context, band: tuple[float, float], grid: float, step: float, pulses: int) -> float:

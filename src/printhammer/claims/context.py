@@ -18,10 +18,10 @@ from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import Scheme, simulate
 
 CYCLE: Final = 20e-3
-"""Duration of the single-pulse cycle, s: from rest until long after the armature has settled."""
+"""Duration of the single-pulse cycle, s: from rest until long after the armature has settled; arbitrary."""
 
 TAIL: Final = 4e-3
-"""Time simulated after the last firing of a train, s, so that its dot is included."""
+"""Time simulated after the last firing of a train, s, so that its dot is included; arbitrary."""
 
 _IDLE: Final = 1e-3  # Firing time of the pulse that ends the simulated rest, s; arbitrary
 

@@ -13,8 +13,10 @@ from printhammer.drive.trains import PulseTrain
 from printhammer.hammer.equilibrium import equilibria
 from printhammer.run.motion import Motion
 
-REFERENCE_TOLERANCE: Final = 1e-13  # Tolerance of the reference motion, well below the errors of 1983
-_CYCLE: Final = 10e-3  # Duration of the simulated single-pulse cycle, s; the motion has settled by then
+REFERENCE_TOLERANCE: Final = 1e-13
+"""Tolerance of the reference motion, well below the errors of 1983; arbitrary."""
+_CYCLE: Final = 10e-3
+"""Duration of the simulated single-pulse cycle, s; the motion has settled by then; arbitrary."""
 _SETTLED: Final = 0.01  # Largest final error of a scheme that works, as a fraction of the stroke; arbitrary
 _RATIO: Final = 2.0**0.25  # Ratio of successive step scales tried; arbitrary
 _LARGEST: Final = 32.0  # Largest step scale tried; arbitrary

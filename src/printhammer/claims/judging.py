@@ -31,7 +31,8 @@ KINDS: Final = get_args(Kind)
 TEXTS: Final = ("kind", "source", "says", "reading", "note")
 SIDES: Final = {"above": operator.gt, "at_least": operator.ge, "below": operator.lt, "at_most": operator.le}
 
-_PRINTED_DIGITS: Final = 1e-9  # Relative difference up to which two numbers are equal; covers rounding
+_PRINTED_DIGITS: Final = 1e-9
+"""Relative difference up to which two numbers are equal; covers rounding; arbitrary."""
 
 
 class Claim(Declared):

@@ -123,7 +123,7 @@ def current_range(context: Context, _claim: Claim) -> Measured:
 
 
 _NEVER: Final = 1.0
-"""Firing time later than the end of every run, s, so that no current flows in the run."""
+"""Firing time later than the end of every run, s, so that no current flows in the run; arbitrary."""
 
 
 @measures("elastomer_backstop", *WHOLE)

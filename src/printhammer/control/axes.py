@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-_MILLIONTH: Final = 1e-6  # Resolution of axis values other than lengths in a C header
+_MILLIONTH: Final = 1e-6  # Resolution of axis values other than lengths in a C header; arbitrary
 
 
 @dataclass(frozen=True)

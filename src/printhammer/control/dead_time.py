@@ -122,14 +122,14 @@ MOST: Final = 10_000
 """Largest number of pairs of rail voltage and coil temperature in a grid; arbitrary."""
 
 LONGEST: Final = 8.0
-"""Width of the longest pulse, and length of a simulation, in flight times at the nominal rail."""
+"""Width of the longest pulse, and length of a simulation, in flight times at the nominal rail; arbitrary."""
 
 SHORTEST: Final = 1.0 / 64.0
-"""Width of the shortest pulse, as a fraction of the flight time with the longest pulse."""
+"""Width of the shortest pulse, as a fraction of the flight time with the longest pulse; arbitrary."""
 
 _DOUBLINGS: Final = 6  # Iteration limit of the doublings that bracket the width; arbitrary
-_WIDTH_ERROR: Final = 1e-9  # Tolerance of the width, in flight times
-_SAME: Final = 1e-9  # Relative tolerance of the impact speed
+_WIDTH_ERROR: Final = 1e-9  # Tolerance of the width, in flight times; arbitrary
+_SAME: Final = 1e-9  # Relative tolerance of the impact speed; arbitrary
 
 
 class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):

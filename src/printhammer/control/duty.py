@@ -115,9 +115,9 @@ def _share(feed: str, temperature: float) -> float:
 
 
 HOTTEST: Final = 1500.0
-"""Upper bound of the search for a steady temperature, degC; above the melting point of copper."""
+"""Upper bound of the search for a steady temperature, degC; above the melting point of copper. Arbitrary."""
 
-_TOLERANCE: Final = 1e-9  # Relative and absolute tolerance of the temperatures
+_TOLERANCE: Final = 1e-9  # Relative and absolute tolerance of the temperatures; arbitrary
 
 
 @dataclass(frozen=True)
@@ -359,10 +359,11 @@ def _rate(value: float | str, heat: DotHeat) -> float:
 
 
 TEMPERATURES: Final = (20.0, 40.0, 60.0, 80.0, 100.0, 120.0, 140.0)
-"""Winding temperatures at which a hammer with a driver is simulated, degC."""
+"""Winding temperatures at which a hammer with a driver is simulated, degC; arbitrary."""
 
-_LEFT: Final = 1e-3  # Residual current at which a pulse counts as ended, as a fraction of its peak
-_DECAYED: Final = 0.01  # Residual fraction of the current that adds at most 2 % to the heat of the next dot
+_LEFT: Final = 1e-3  # Residual current at which a pulse counts as ended, as a fraction of its peak; arbitrary
+_DECAYED: Final = 0.01
+"""Residual fraction of the current whose heat is neglected: at most 2 % of the next dot's; arbitrary."""
 _DOUBLINGS: Final = 8  # Iteration limit of the doublings of the simulated time; arbitrary
 
 

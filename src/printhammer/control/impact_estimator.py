@@ -44,23 +44,24 @@ from printhammer.run.motion import Motion
 from printhammer.run.simulate import simulate
 from printhammer.support.arrays import BoolArray, FloatArray
 
-PHASES: Final = 8  # Number of trial shifts per sampling interval
-BEFORE: Final = 1.0  # Length of the window before the touch, in contact times
-AFTER: Final = 0.6  # Length of the window after the touch, in contact times
-REACH: Final = 0.15  # Half-width of the search range about the nominal impact, in flight times
-FAINTEST: Final = 5.0  # Detection threshold, in standard deviations
-_DEGREE: Final = 1  # Degree of the nuisance polynomial
-_LEAST: Final = 8  # Smallest number of samples in the window
+PHASES: Final = 8  # Number of trial shifts per sampling interval; arbitrary
+BEFORE: Final = 1.0  # Length of the window before the touch, in contact times; arbitrary
+AFTER: Final = 0.6  # Length of the window after the touch, in contact times; arbitrary
+REACH: Final = 0.15  # Half-width of the search range about the nominal impact, in flight times; arbitrary
+FAINTEST: Final = 5.0  # Detection threshold, in standard deviations; arbitrary
+_DEGREE: Final = 1  # Degree of the nuisance polynomial; arbitrary
+_LEAST: Final = 8  # Smallest number of samples in the window; arbitrary
 _MOST: Final = 200_000  # Largest number of samples in a record; arbitrary
-_SPAN: Final = 1.5  # Range of the converter, relative to the largest value around the touch
-_FLOWING: Final = 0.02  # Current at the touch, over the largest current, that counts as decayed
-_MOST_BEFORE: Final = 0.5  # Upper bound on the length of the window before the touch, in flight times
-_AROUND: Final = 0.2  # Largest trial shift of the touch within a window, in contact times
-_STEADY: Final = 1e-9  # Relative change of the coil voltage below which no driver switches
-_FINEST: Final = 400  # Largest number of trial shifts per contact time
-_MOVES: Final = 3  # Iteration limit: the window is re-centred on the estimate
+_SPAN: Final = 1.5  # Range of the converter, relative to the largest value around the touch; arbitrary
+_FLOWING: Final = 0.02  # Current at the touch, over the largest current, that counts as decayed; arbitrary
+_MOST_BEFORE: Final = 0.5
+"""Upper bound on the length of the window before the touch, in flight times; arbitrary."""
+_AROUND: Final = 0.2  # Largest trial shift of the touch within a window, in contact times; arbitrary
+_STEADY: Final = 1e-9  # Relative change of the coil voltage below which no driver switches; arbitrary
+_FINEST: Final = 400  # Largest number of trial shifts per contact time; arbitrary
+_MOVES: Final = 3  # Iteration limit: the window is re-centred on the estimate; arbitrary
 _FIRM: Final = ("pack.stiffness", "pack.damping")
-_SOFT: Final = 1e-9  # Factor on the pack's constants that makes its force negligible
+_SOFT: Final = 1e-9  # Factor on the pack's constants that makes its force negligible; arbitrary
 
 
 _UNLIKE: Final = 0.5
@@ -70,7 +71,7 @@ Units of the hammer `impact-wire` reach a ratio of 0.4, with impact-time errors 
 delay of 5 us gives 1.5, with errors of 30 us.
 """
 
-_TOO_LARGE: Final = 2.5
+_TOO_LARGE: Final = 2.5  # Arbitrary
 """Amplitude, relative to nominal, above which an estimate is flagged; units of `impact-wire` reach 1.3."""
 
 UNSEEN, EDGE, UNLIKE, END = "unseen", "edge", "unlike", "end"

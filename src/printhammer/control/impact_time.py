@@ -30,12 +30,12 @@ from printhammer.support.arguments import checked
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 LEVELS: Final = (0.001, 0.003, 0.01)
-"""Default standard deviations of a sample, as fractions of the peak current or of 10 V."""
+"""Default standard deviations of a sample, as fractions of the peak current or of 10 V; arbitrary."""
 
 MOST: Final = 2000
 """Largest number of sampling settings in a study; arbitrary."""
 
-_MOST_MISSED: Final = 0.99  # Largest fraction of missed impacts of a sensor
+_MOST_MISSED: Final = 0.99  # Largest fraction of missed impacts of a sensor; arbitrary
 _MOST_DOTS: Final = 10_000  # Largest number of dots; arbitrary, to refuse typing errors
 _CELLS: Final = "noise sampling_rate bits"
 

@@ -22,12 +22,12 @@ from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.run.simulate import simulate
 from printhammer.support.arrays import FloatArray
 
-LARGEST_CURRENT: Final = 2.0  # Default current limit of a print hammer, A
-WIDEST: Final = 2.0  # Largest width of a pulse, as a multiple of the hammer's own
-# Fraction of the current limit reserved for the tail of a brake pulse
+LARGEST_CURRENT: Final = 2.0  # Default current limit of a print hammer, A: the range of the paper's Fig. 2
+WIDEST: Final = 2.0  # Largest width of a pulse, as a multiple of the hammer's own; arbitrary
+# Fraction of the current limit reserved for the tail of a brake pulse; arbitrary
 MARGIN: Final = 1e-3
-_SAMPLES: Final = 4001  # Number of samples of a simulated current
-_SPAN: Final = 2.0  # Length of the first simulation, in pulse widths
+_SAMPLES: Final = 4001  # Number of samples of a simulated current; arbitrary
+_SPAN: Final = 2.0  # Length of the first simulation, in pulse widths; arbitrary
 _DOUBLINGS: Final = 6  # Iteration limit of the doublings of the simulated time; arbitrary
 
 

@@ -32,10 +32,10 @@ VAGUE: Final = "vague"
 """Flag of an estimate that is at least as uncertain as the nominal flight time."""
 
 _QUIET: Final = 1e-4
-"""Smallest noise of a sample, as a fraction of the record's largest value."""
+"""Smallest noise of a sample, as a fraction of the record's largest value; arbitrary."""
 
 _UNEVEN: Final = 0.01
-"""Largest spread of the time steps of a record, as a fraction of their median."""
+"""Largest spread of the time steps of a record, as a fraction of their median; arbitrary."""
 
 
 class RecordedImpacts(Result, rows="record"):

@@ -47,7 +47,7 @@ RUN_QUANTITIES: Final = {
 _ENERGY: Final = 3  # First row of the energies in a tangent column
 _PACK_LOSS: Final = 5  # Row of the pack loss in a tangent column
 _SAMPLES: Final = 65  # Samples of a contact for the bracket of its largest force; arbitrary
-# Relative difference below which two times are the same maximum; the accuracy of the minimisation
+# Relative difference below which two times are the same maximum; the accuracy of the minimisation; arbitrary
 _NEAR: Final = 1e-6
 
 

@@ -45,7 +45,7 @@ from printhammer.run.problem import Problem, Record, Stretch
 from printhammer.support.arrays import FloatArray
 
 _VALUE_SPACING: Final = 1e-3
-"""Drive step of the finite difference d(force)/d(drive), as a fraction of the largest pulse."""
+"""Drive step of the finite difference d(force)/d(drive), as a fraction of the largest pulse; arbitrary."""
 
 
 class Flow(Declared):

@@ -30,7 +30,7 @@ from printhammer.run.supply import inductance, typical_current
 from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import quantities
 
-_SPACING: Final = 2e-4
+_SPACING: Final = 2e-4  # Arbitrary
 """Step of the finite differences, as a fraction of the constant's value or, if that is zero, of its scale."""
 _STENCILS: Final = (
     ((-2, -1, 1, 2), (1.0, -8.0, 8.0, -1.0)),

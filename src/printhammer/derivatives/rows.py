@@ -26,21 +26,23 @@ from printhammer.run.ensemble import Ensemble, Strobes
 from printhammer.run.start import initial_state
 from printhammer.support.arrays import BoolArray, FloatArray
 
-FIRING: Final = 12
+FIRING: Final = 12  # Arbitrary
 """Default index of the firing where the map starts; by then a row from rest is near the fixed point."""
 
-MORE: Final = 4
+MORE: Final = 4  # Arbitrary
 """Number of dots after the firing where the map starts, so that the end of the row has no effect."""
 
 DOTS: Final = FIRING + MORE
 """Shortest row for the default `FIRING`, in dots."""
 
-_SPACING: Final = 1e-5  # Finite-difference step of the state, in its scales
+_SPACING: Final = 1e-5  # Finite-difference step of the state, in its scales; arbitrary
 # Largest tolerance of a run. A derivative's error is the run's error divided by the step; in velocity the
 # error scales with the flight speed, but the step with travel / period, 150 times smaller for a relay.
+# Arbitrary.
 _TOLERANCE: Final = 1e-9
-_CLOSED: Final = 1e-6  # Distance from state to image below which an orbit is closed, in scales of the state
-_LONGEST_STEP: Final = 0.1  # Longest Newton step, in scales of the state
+_CLOSED: Final = 1e-6
+"""Distance from state to image below which an orbit is closed, in scales of the state; arbitrary."""
+_LONGEST_STEP: Final = 0.1  # Longest Newton step, in scales of the state; arbitrary
 # Norm of the derivative below which the map is contracting and steps are not clipped; arbitrary, well below 1
 _CONTRACTING: Final = 0.3
 _ITERATIONS: Final = 12  # Iteration limit; arbitrary

@@ -37,7 +37,7 @@ _INDEPENDENT: Final = "standard deviation for independent constants"
 _WORST: Final = "worst-case deviation, with all constants at their limits"
 
 TOLERANCE: Final = 1e-12
-"""Default integration tolerance of the run."""
+"""Default integration tolerance of the run; arbitrary."""
 
 
 class Sensitivities(Result):

@@ -27,10 +27,10 @@ from printhammer.run.start import initial_state, state_beyond
 from printhammer.support.arrays import FloatArray
 
 _NODES: Final = 4096  # Number of nodes of a record processed at once, which bounds the memory; arbitrary
-_WARM_UP: Final = 100
+_WARM_UP: Final = 100  # Arbitrary
 """Number of firings during which perturbations align with the growth directions before averaging."""
 _FEWEST: Final = 8
-"""Smallest number of growth factors from which a standard error is estimated."""
+"""Smallest number of growth factors from which a standard error is estimated; arbitrary."""
 
 
 class TangentMap(Declared):

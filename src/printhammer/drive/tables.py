@@ -23,7 +23,7 @@ ROWS: Final = 4
 """Largest number of rows of the table of a shape, including the end."""
 
 DECAY_TIMES: Final = 27.6310211159
-"""Number of time constants after which a decaying current is cut off, at 1e-12 of its initial value."""
+"""Number of time constants after which a decaying current is cut off: -ln 1e-12; arbitrary."""
 
 DIODE: Final = 0.7
 """Forward voltage of a silicon diode, V; the usual textbook value."""

@@ -28,13 +28,13 @@ from printhammer.support.arrays import FloatArray
 
 PAPER: Final = (252, 250, 243)
 INK: Final = (24, 24, 38)
-"""RGB colours of the paper (`PAPER`) and of fully opaque ink."""
+"""RGB colours of the paper (`PAPER`) and of fully opaque ink; arbitrary."""
 
 MOST_PIXELS: Final = 24_000_000
 """Number of pixels above which a sheet is rendered more coarsely; arbitrary."""
 
 _SOFT: Final = 0.1  # Width of the soft rim of a dot, as a fraction of its diameter; arbitrary
-_PIXELS: Final = 1.5  # Smallest width of the soft rim, pixels
+_PIXELS: Final = 1.5  # Smallest width of the soft rim, pixels; arbitrary
 _TOGETHER: Final = 1_000_000  # Pixels computed at once, which bounds the memory; arbitrary
 
 
@@ -109,19 +109,19 @@ VIEWS: Final = get_args(View)
 """Views of a page: the full page, the region of largest error, or the paper alone at true size."""
 
 ZOOM_SHAPE: Final = 3.5
-"""Width of the region of largest error, in units of the height of the column of wires."""
+"""Width of the region of largest error, in units of the height of the column of wires; arbitrary."""
 
-_WIDTH: Final = 7.6  # Width of the figure, inches
+_WIDTH: Final = 7.6  # Width of the figure, inches; arbitrary
 _SIDE: Final = 0.2  # Margin at either side, inches; arbitrary
 _LABEL: Final = 0.24  # Height of a heading, inches; arbitrary
-_GAP: Final = 0.1  # Gap between panels, inches
-_BESIDE: Final = 0.15  # Gap between panels side by side, inches
+_GAP: Final = 0.1  # Gap between panels, inches; arbitrary
+_BESIDE: Final = 0.15  # Gap between panels side by side, inches; arbitrary
 _UPRIGHT: Final = 0.5  # Ratio of height to width above which panels are side by side; arbitrary
 _BAR: Final = 1.5  # Length of the colour bar, inches; arbitrary
 _LEAST_MARK: Final = 1.8  # Smallest size of a mark, points; arbitrary
 _NEUTRAL: Final = "#c6ccd1"
 _TALLEST: Final = 4.5  # Largest height of a panel, inches; arbitrary
-_LARGEST: Final = 0.1  # Largest distance between slots in the figure, inches
+_LARGEST: Final = 0.1  # Largest distance between slots in the figure, inches; arbitrary
 _FOOT: Final = 0.62  # Height of the text at the foot, inches; arbitrary
 _INCH: Final = 25.4e-3  # An inch, m
 _FINENESS: Final = 10  # Pixels per slot of a page; arbitrary

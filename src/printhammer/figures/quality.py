@@ -154,7 +154,7 @@ def _window(quality: Quality) -> int:
 COLOURS: Final = {"as it is": style.INK, "hard": style.BLUE, "elastomer": style.GREEN, "pack": style.ORANGE}
 """Colour of the bars and labels, by kind of material."""
 
-_ROW: Final = 0.2  # Height of a row, inches
+_ROW: Final = 0.2  # Height of a row, inches; arbitrary
 _BAR: Final = 0.66  # Height of a bar, as a fraction of the spacing; arbitrary
 
 

@@ -28,7 +28,7 @@ ENTRIES: Final = {
     "records": "fingerprints of the records of motion to which the constants were fitted",
 }
 _NEGATIVE: Final = -1e-9
-"""Smallest eigenvalue accepted for a correlation matrix, to allow for rounding errors."""
+"""Smallest eigenvalue accepted for a correlation matrix, to allow for rounding errors; arbitrary."""
 
 
 @dataclass(frozen=True, eq=False)

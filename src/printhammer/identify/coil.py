@@ -45,24 +45,24 @@ FREE: Final = ("coil.resistance", "coil.inductance")
 """Constants fitted by default; only the resistance if the magnet's law includes an inductance."""
 
 _STEP: Final = 1e-4
-"""Relative step size of the finite differences: well above the integration error."""
+"""Relative step size of the finite differences: well above the integration error; arbitrary."""
 
 _SHORT: Final = 0.05
-"""Finite-difference step of a parameter that is a time, in sampling intervals."""
+"""Finite-difference step of a parameter that is a time, in sampling intervals; arbitrary."""
 
 _REACH: Final = 1e3
 """Largest factor between a fitted constant and its initial guess; arbitrary."""
 
-_TOLERANCE: Final = 1e-10
+_TOLERANCE: Final = 1e-10  # Arbitrary
 """Relative tolerance of the least-squares iterations: no smaller than the error of the finite differences."""
 
 _SPARE: Final = 4
 """Smallest number of rows in excess of parameters for which standard errors are computed; arbitrary."""
 
-_EXACT: Final = 1e-6
+_EXACT: Final = 1e-6  # Arbitrary
 """Residual, as a fraction of the current, below which the test of the law would see integration errors."""
 
-_COARSE: Final = 1.5
+_COARSE: Final = 1.5  # Arbitrary
 """Ratio of resolution to residual standard deviation above which quantisation dominates the residuals."""
 
 

@@ -33,15 +33,15 @@ from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.tables.readings import Readings, read_table
 
 _FINEST: Final = 0.5e-6
-"""Largest time step of the current before low-pass filtering, s."""
+"""Largest time step of the current before low-pass filtering, s; arbitrary."""
 
 _MOST: Final = 2_000_000
 """Largest number of time steps in a record, to limit the memory use; arbitrary."""
 
 _LOCKED: Final = 1e9
-"""Mass that stands for a locked armature, kg; 100 N displace it by only 0.05 um in one second."""
+"""Mass that stands for a locked armature, kg; 100 N displace it by only 0.05 um in one second. Arbitrary."""
 
-_STEEP: Final = 0.3
+_STEEP: Final = 0.3  # Arbitrary
 """Voltage change between two rows, as a fraction of the voltage range, above which it counts as an edge."""
 
 _EDGES: Final = 8
@@ -50,7 +50,7 @@ _EDGES: Final = 8
 _FLOWS: Final = 0.05
 """Current at switch-on, as a fraction of the largest, above which the coil was already on; arbitrary."""
 
-_RAMP: Final = 1e-5
+_RAMP: Final = 1e-5  # Arbitrary
 """Half the duration of an edge of a recorded voltage, as a fraction of the time between its rows."""
 
 
@@ -201,7 +201,7 @@ FIT: Final = "fit"
 """Value of a probe-error option that requests a fit of the error."""
 
 NOMINAL: Final = {"offset": 0.0, "gain": 1.0, "delay": 0.0, "time constant": 0.0}
-"""Offset, gain, delay and time constant of an ideal probe, SI."""
+"""Offset, gain, delay and time constant of a probe without errors by definition, SI."""
 
 UNITS: Final = {"offset": "A", "gain": "1", "delay": "s", "time constant": "s"}
 
@@ -214,7 +214,7 @@ SIGNS: Final = {
 """Advice for each undeclared probe error that a record reveals, by name of the error."""
 
 _WIDEST: Final = 0.2
-"""Upper bound of a fitted time constant, as a fraction of the length of the longest record."""
+"""Upper bound of a fitted time constant, as a fraction of the length of the longest record; arbitrary."""
 
 
 class ProbeError(Declared):
@@ -300,7 +300,7 @@ def resolution_of(values: FloatArray) -> float:
     return step if float(np.abs(counts - np.rint(counts)).max()) < _WHOLE else 0.0
 
 
-_WHOLE: Final = 0.02
+_WHOLE: Final = 0.02  # Arbitrary
 """Largest deviation of readings from whole steps, as a fraction of the step; allows for rounding in files."""
 
 

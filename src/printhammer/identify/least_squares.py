@@ -24,33 +24,33 @@ from printhammer.results import Declared, part
 from printhammer.support.arrays import BoolArray, FloatArray
 
 _FALSE_OUTLIERS: Final = 0.01
-"""Expected number of rows without gross error that a fit excludes, for normal noise."""
+"""Expected number of rows without gross error that a fit excludes, for normal noise; arbitrary."""
 
 _EXACT: Final = 1e-11
-"""RMS residual, as a fraction of the largest datum, below which the data count as exact."""
+"""RMS residual, as a fraction of the largest datum, below which the data count as exact; arbitrary."""
 
 _ROUNDS: Final = 30  # Iteration limit of the fit; arbitrary
 
 _ALONE: Final = 0.9
-"""Leverage above which a row alone determines a parameter."""
+"""Leverage above which a row alone determines a parameter; arbitrary."""
 
 _HOLDING: Final = 4.0
 """Smallest factor by which omitting essential rows increases the variance of a parameter; arbitrary."""
 
-_AT_BOUND: Final = 1e-6
+_AT_BOUND: Final = 1e-6  # Arbitrary
 """Distance from a bound, as a fraction of the parameter, below which the parameter counts as at the bound."""
 
-_SINGULAR: Final = 1e-12
+_SINGULAR: Final = 1e-12  # Arbitrary
 """Smallest singular value of the column-normalised Jacobian at which all parameters count as determined."""
 
-_TIED: Final = 0.5
+_TIED: Final = 0.5  # Arbitrary
 """Component of the weakest direction, as a fraction of the largest, above which a parameter may be held."""
 
-_RESISTS: Final = 1.0
+_RESISTS: Final = 1.0  # Arbitrary
 """Largest increase of the weighted sum of squares (one standard error) that holding a parameter may cause."""
 
 _DIFFERENCES: Final = 1e-9
-"""Error of finite-difference derivatives, as a fraction of the largest datum magnitude."""
+"""Error of finite-difference derivatives, as a fraction of the largest datum magnitude; arbitrary."""
 
 
 class Law(Protocol):

@@ -26,7 +26,7 @@ from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 from printhammer.units import from_si
 
 CONFIDENCE: Final = 0.95
-"""Confidence level of the intervals."""
+"""Confidence level of the intervals; conventional."""
 
 LAWS: Final = {"magnet": "inverse-root", "spring": "linear", "pack": "power", "backstop": "hertz"}
 """Law assumed by each fit, by role; the fit "solenoid" assumes the magnet law `reluctance` instead."""

@@ -20,7 +20,7 @@ from printhammer.support.constants import invalid, options, quantities
 ROLES: tuple[str, ...] = ("magnet", "coil", "spring", "pack", "backstop", "damping")
 
 _ROOM: Final = 16
-"""Largest number of packed constants of a law that has a function to pack them."""
+"""Largest number of packed constants of a law that has a function to pack them; arbitrary."""
 
 
 class Part(BaseModel):

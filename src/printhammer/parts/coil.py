@@ -27,10 +27,10 @@ from printhammer.parts.base import CoilPart, register
 from printhammer.support.constants import quantity
 
 COPPER: Final = 3.93e-3
-"""Temperature coefficient of the resistance of copper at 20 degC, 1/K."""
+"""Temperature coefficient of the resistance of copper at 20 degC, 1/K: standard IEC 60028 (1925)."""
 
 REFERENCE: Final = 20.0
-"""Temperature at which the resistance of the winding is stated, degC."""
+"""Temperature at which the resistance of the winding is stated, degC, as in IEC 60028."""
 
 
 def warm_resistance(resistance: float, temperature: float) -> float:

@@ -29,7 +29,7 @@ from printhammer.report.contents import (
 from printhammer.report.reconstruction.results import BestFor, Family, FamilyMember, Share
 
 SAME: Final = 1e-9
-"""Relative tolerance for equal constants; larger than the rounding errors of unit conversions."""
+"""Relative tolerance for equal constants; larger than the rounding errors of unit conversions. Arbitrary."""
 
 
 def share_view(share: Share, floor: float | None = None) -> dict[str, Any]:

@@ -26,7 +26,7 @@ from printhammer.support.arrays import FloatArray
 _SAMPLES: Final = np.array([*np.linspace(0.0, 1.0, 9)[:-1], 1.0 - 1e-9])
 _BISECTIONS: Final = 52  # Number of bisections: the bits of a double's mantissa
 _HALVINGS: Final = 12  # Iteration limit of the step halving; arbitrary
-_HEAT_ERROR: Final = 1e-13  # Relative error at which the heat integral has converged
+_HEAT_ERROR: Final = 1e-13  # Relative error at which the heat integral has converged; arbitrary
 
 
 class CoilWork(Declared):
@@ -136,7 +136,7 @@ def _signs(problem: Problem, record: Record, times: FloatArray) -> FloatArray:
 
 
 _POINTS, _PIECES = 10, 8
-"""Gauss points per subinterval of the quadrature over the current, and number of subintervals."""
+"""Gauss points per subinterval of the quadrature over the current, and number of subintervals; arbitrary."""
 
 
 class Ledger(Declared):

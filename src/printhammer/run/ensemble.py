@@ -42,7 +42,7 @@ __all__ = [
 ]
 
 DISPLAY_TOLERANCE: Final = 5e-7
-"""Integration tolerance for plots: displacements are accurate to about 1e-4 of the stroke."""
+"""Integration tolerance for plots: displacements are accurate to about 1e-4 of the stroke; arbitrary."""
 
 Engine = Literal["auto", "plain", "lanes"]
 ENGINES: Final = get_args(Engine)

@@ -31,16 +31,16 @@ from printhammer.support.arrays import FloatArray
 T = TypeVar("T")
 
 TOLERANCE: Final = 2e-11
-"""Default tolerance: error of one step, in units of the stroke and of a typical speed."""
+"""Default tolerance: error of one step, in units of the stroke and of a typical speed; arbitrary."""
 
 LEAST_TOLERANCE: Final = 1e-15  # Smallest accepted tolerance, near the rounding error of doubles
-LARGEST_TOLERANCE: Final = 1e-5
+LARGEST_TOLERANCE: Final = 1e-5  # Arbitrary
 """Largest accepted tolerance; at larger tolerances, long steps would make the dense output inaccurate."""
 
-MAX_STEPS: Final = 50_000_000  # Default largest number of steps of a run
-_NODES: Final = 2048  # Rows of nodes in the smallest working space
-_CONTACTS: Final = 256  # Rows of contacts in the smallest working space
-_NODES_A_FLIGHT: Final = 40  # Nodes per flight in the initial guess of the array size
+MAX_STEPS: Final = 50_000_000  # Default largest number of steps of a run; arbitrary
+_NODES: Final = 2048  # Rows of nodes in the smallest working space; arbitrary
+_CONTACTS: Final = 256  # Rows of contacts in the smallest working space; arbitrary
+_NODES_A_FLIGHT: Final = 40  # Nodes per flight in the initial guess of the array size; arbitrary
 _MOST_FLIGHTS: Final = 1e6  # Largest number of flights of that guess; arbitrary
 
 

@@ -28,7 +28,7 @@ READINGS = schemes_1983.READINGS
 Reading = schemes_1983.Reading
 Scheme = schemes_1983.Scheme
 
-_GAUSS = np.polynomial.legendre.leggauss(4)
+_GAUSS = np.polynomial.legendre.leggauss(4)  # Nodes and weights of the quadrature of 4 points; arbitrary
 
 
 class SchemeProblem(Problem):

@@ -28,7 +28,7 @@ Scheme = Literal["default", "trapezoid", "runge-kutta-4"]
 SCHEMES: Final = get_args(Scheme)
 """Integrators: the default, with located contacts and high order, and the two schemes of the paper."""
 
-# Limits on the number of output points, and number of points per time scale of the hammer
+# Limits on the number of output points, and number of points per time scale of the hammer; arbitrary
 _FEWEST, _MOST, _PER_SCALE = 1001, 400_001, 100
 
 

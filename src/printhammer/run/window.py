@@ -23,12 +23,13 @@ from printhammer.run.plain.posing import CYCLE, flight_of, is_window, last_windo
 from printhammer.run.problem import Problem, scales_of
 from printhammer.run.supply import waveforms_of
 
-TOLERANCE: Final = 5e-7  # Tolerance of the single pulse, whose outcome is only compared with thresholds
+TOLERANCE: Final = 5e-7
+"""Tolerance of the single pulse, whose outcome is only compared with thresholds; arbitrary."""
 MOST_STEPS: Final = 500_000  # Largest number of steps of a single pulse; arbitrary
-_MOST_KEPT: Final = 512  # Number of cached windows at which the cache is emptied
+_MOST_KEPT: Final = 512  # Number of cached windows at which the cache is emptied; arbitrary
 
 _FLIGHT: Final = 0.28e-3  # Flight time of the paper's hammer, for which default rates and times are stated, s
-# Fraction of a period at the default rates that a pulse may cover; longer pulses would overlap
+# Fraction of a period at the default rates that a pulse may cover; longer pulses would overlap; arbitrary
 _ON: Final = 0.5
 
 _known: dict[tuple[str, str], Window] = {}

@@ -15,7 +15,7 @@ _IMPORTS: Final = re.compile(r'^import .* from ".*";$\n?', re.MULTILINE)
 _EXPORT: Final = re.compile(r"^export (?=(async )?function|const|let|class)", re.MULTILINE)
 
 _BLOCK: Final = 16
-_SHORTEST: Final = 32
+_SHORTEST: Final = 32  # Arbitrary
 """Length of hashed blocks, and least length of a copy, bytes; shorter blocks do not compress better."""
 
 

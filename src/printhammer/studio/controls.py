@@ -41,10 +41,10 @@ _INCHES: Final = {"um": "mil", "mm": "in", "m": "in"}
 """Inch unit shown in place of a metric unit of length."""
 
 _SLOW: Final = 2e-3
-"""Pulse width above which the page shows times in ms, s."""
+"""Pulse width above which the page shows times in ms, s; arbitrary."""
 
 _WIDE: Final = 3e-3
-"""Stroke above which the page shows lengths in mm, m."""
+"""Stroke above which the page shows lengths in mm, m; arbitrary."""
 
 EQUATIONS: Final = {
     "mass": "m x'' = Fm + Fs + Fp + Fb + Fe",

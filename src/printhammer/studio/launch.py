@@ -18,7 +18,7 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.studio.bounds import LARGEST_FILE, LARGEST_MESSAGE, MOST_DOTS
 from printhammer.support.files import make_folder, read_text, write_file
 
-FORMAT: Final = 1
+FORMAT: Final = 1  # Version of the state file format
 KIND: Final = "printhammer studio state"
 
 _KEPT: Final = 8

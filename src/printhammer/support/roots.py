@@ -20,12 +20,12 @@ _PIECES: Final = 16  # Number of subintervals per round of refinement; arbitrary
 _ROUNDS: Final = 16  # Number of rounds: 16^16 subintervals resolve all bits of a double
 _PROBE: Final = 1e-6  # Distance of a probe from a root at a grid point, as a fraction of the cell; arbitrary
 _SLOPE: Final = 1e-3  # Step of the slope at the ends of a cell, as a fraction of the cell; arbitrary
-# Largest length of an interval of zeros that counts as one root, since rounding widens a root
+# Largest length of an interval of zeros that counts as one root, since rounding widens a root; arbitrary
 _FLAT: Final = 1e-12
 
 
 MOST_POINTS: Final = 3
-"""Largest number of points at which a function is evaluated per grid point."""
+"""Largest number of evaluations per grid point, since a root on the grid has a probe on either side."""
 
 
 @dataclass(frozen=True)

@@ -106,8 +106,10 @@ MEMBER: Final = "member"
 
 _MOST_MEMBERS: Final = 1_000_000_000  # Largest number of members; arbitrary, to refuse typing errors
 _BLOCKS: Final = 128  # Number of blocks aimed at, for progress and resumption; arbitrary
-_FEWEST_IN_BLOCK: Final = 16  # Smallest number of members of a block: the lanes integrated together
-_MOST_IN_BLOCK: Final = 256  # Largest number of members of a block: the lanes of one thread
+_FEWEST_IN_BLOCK: Final = 16
+"""Smallest number of members of a block: the lanes integrated together; arbitrary."""
+_MOST_IN_BLOCK: Final = 256
+"""Largest number of members of a block: the lanes of one thread, as in `kernel.lanes.layout`."""
 _MOST_BYTES: Final = 2**25  # Largest size of the results of a block; arbitrary
 
 

@@ -52,7 +52,7 @@ _SPACING: Final = 5e-6  # Spacing of the samples of the first run at the default
 _FINE: Final = 8
 """Number of samples of the refined run on either side of the highest sample of the first run; arbitrary."""
 _PEAK_TOLERANCE: Final = 1e-8
-"""Largest tolerance of the refined run; the display tolerance, 5e-7, misses peaks by 1e-4 of the stroke."""
+"""Largest tolerance of the refined run, since `DISPLAY_TOLERANCE` misses peaks by 1e-4 of the stroke."""
 _FIRST, _SECOND = 2, 3  # Indices of the firings of the first and the second pulse
 
 

@@ -36,7 +36,7 @@ from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArra
 from printhammer.units import from_si
 
 SERIES: Final = (2, 4, 8)
-"""Orbit periods, in firings, of successive windows of a period-doubling cascade: doublings of period 1."""
+"""Orbit periods, in firings, of the windows of a period-doubling cascade: by definition, doublings of 1."""
 
 MOST_UNDECIDED: Final = 32
 """Number of undecided aperiodic trains after which the search for chaos along a route stops; arbitrary."""

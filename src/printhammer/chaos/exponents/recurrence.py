@@ -29,7 +29,7 @@ RATE: Final = 0.05
 """Default recurrence rate, used if neither a threshold nor a rate is given; arbitrary."""
 
 SHORTEST: Final = 2
-"""Default length of the shortest line, in points: the smallest length of a line."""
+"""Default length of the shortest line, in points; a line has two points by definition."""
 
 _ROWS: Final = 256  # Rows of the distance matrix computed at once, which bounds the memory; arbitrary
 

@@ -43,7 +43,7 @@ CHAOTIC: Final = 0.8
 """Limits of K: a series is regular up to `REGULAR`, and chaotic if K is at least `CHAOTIC`.
 
 K^2 is the fraction of the variance of M_c(n) that a straight line explains: at most a twentieth for a regular
-series, about two thirds or more for a chaotic series.
+series, about two thirds or more for a chaotic series. Arbitrary.
 """
 
 FEWEST: Final = 100  # Arbitrary
@@ -61,7 +61,7 @@ CYCLES: Final = 5  # Arbitrary
 FOLLOWS: Final = 0.7  # Arbitrary
 """Distance of the images of neighbours, relative to random pairs, below which a series is deterministic."""
 
-_CUT: Final = 10  # Ratio of the series length to the largest lag of the displacement (Gottwald and Melbourne)
+_CUT: Final = 10  # Ratio of the series length to the largest lag, as in Gottwald and Melbourne (2009)
 _PASSES: Final = 4  # Smallest number of cycles in a series for a cycle to be considered; arbitrary
 _TOGETHER: Final = 1 << 20
 """Number of complex numbers processed in one batch; arbitrary."""

@@ -51,7 +51,7 @@ _SETTLED: Final = 0.1  # Arbitrary
 """Extent of an image of a fundamental segment, relative to the spacing, below which a sink is sought."""
 _CLOSE: Final = 1e-10  # Relative residual at which Newton's method has converged; arbitrary
 _NEWTON: Final = 8  # Iteration limit of Newton's method; arbitrary
-_FEW: Final = 4  # Number of points from which the prediction is a cubic; a cubic has four coefficients
+_FEW: Final = 4  # Number of points from which the prediction is a cubic, since a cubic has four coefficients
 
 
 class Manifolds(Result, rows="point"):

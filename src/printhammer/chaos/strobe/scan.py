@@ -35,7 +35,10 @@ STAGES: Final = (32, 128)  # Arbitrary
 """Numbers of firings after which a still unclassified train is tested for a stable periodic motion."""
 
 CLOSER: Final = 1e-2
-"""Largest distance of repeated states in the early test, over `AGREEMENT`: 1 - `LARGEST_MULTIPLIER`."""
+"""Largest distance of repeated states in the early test, as a fraction of `AGREEMENT`.
+
+The value is 1 - `LARGEST_MULTIPLIER`, so that the remaining difference adds up to at most `AGREEMENT`.
+"""
 
 LARGEST_MULTIPLIER: Final = 0.99
 """Largest absolute Floquet multiplier with which the early test accepts a period; arbitrary."""

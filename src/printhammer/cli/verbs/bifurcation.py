@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Firing
 
-_RANGE: Final = (0.8e-3, 1.35e-3)  # Default range of periods for the paper's hammer, s
+_RANGE: Final = (0.8e-3, 1.35e-3)  # Default range of periods for the paper's hammer, s; arbitrary
 _PARAMETER: Final = "Parameter (default: period from 0.8 ms to 1.35 ms; longer for a slow device)"
 _of = partial(opt.text, panel=_PARAMETER)
 

@@ -15,7 +15,7 @@ from printhammer.errors import InputError
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
 
-_OFF: Final = 1e-3  # Relative change of the current at which the dots are always checked
+_OFF: Final = 1e-3  # Relative change of the current at which the dots are always checked; arbitrary
 _MOST_RATES: Final = 200  # Largest number of rates; each takes seconds to minutes; arbitrary
 
 

@@ -23,7 +23,7 @@ from printhammer.results import Declared, part
 from printhammer.run.ensemble import DISPLAY_TOLERANCE, MODE_NAMES, Ensemble
 from printhammer.support.arrays import BoolArray, FloatArray
 
-_SOON: Final = 1e-6  # Shortest advance of a run, s
+_SOON: Final = 1e-6  # Shortest advance of a run, s; arbitrary
 _LATER: Final = 5e-6  # Step by which a pack change is delayed during a contact with either pack, s; arbitrary
 _BRANCHES: Final = tuple(MODE_NAMES.index(name) for name in ("loading", "unloading", "reloading"))
 

@@ -50,7 +50,8 @@ if TYPE_CHECKING:
 
 BURST: Final = "11101101"  # Pattern of the recorded run; arbitrary
 MOST_GAPS: Final = 500  # Largest number of gaps in a double-pulse test; arbitrary
-# Defaults of the double-pulse test: first and last gap, in single-pulse flight times, and number of gaps
+# Defaults of the double-pulse test: first and last gap, in single-pulse flight times, and number of gaps;
+# arbitrary
 _GAPS: Final = (1.5, 6.0, 46)
 
 

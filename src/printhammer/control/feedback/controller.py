@@ -37,33 +37,38 @@ from printhammer.support.threads import Progress
 
 LEADS: Final = {PUSHED: 30e-6, FREE: 10e-6}
 """Lead time of a decision before the pack contact, s, by kind of contact: a push in progress may have to end
-at the touch, whereas a new push never begins before the touch."""
+at the touch, whereas a new push never begins before the touch. Arbitrary."""
 
-WINDOW: Final = 120e-6  # Length of the time window of samples, s
-# Expected standard deviations at a touch: displacement, as a fraction of the stroke, and speed, m/s
+WINDOW: Final = 120e-6  # Length of the time window of samples, s; arbitrary
+# Expected standard deviations at a touch: displacement, as a fraction of the stroke, and speed, m/s;
+# arbitrary
 _PLACE_ERROR: Final = 0.03
-_SPEED_ERROR: Final = 0.03  # Initial standard deviation of the speed, m/s
+_SPEED_ERROR: Final = 0.03  # Initial standard deviation of the speed, m/s; arbitrary
 # Initial standard deviation of the speed after the first launch, m/s, in addition to the effect of the
-# current scale
+# current scale; arbitrary
 _LAUNCH_ERRORS: Final = (0.005, 0.003)
-# Distance before the touch at which the simulation of a contact begins, as a fraction of the stroke
+# Distance before the touch at which the simulation of a contact begins, as a fraction of the stroke;
+# arbitrary
 _BEFORE: Final = 0.15
-# Time after a touch during which samples are used, in single-pulse flight times
+# Time after a touch during which samples are used, in single-pulse flight times; arbitrary
 CONTACT: Final = 1.1
-# Change of a touch time beyond which an estimate is rejected, in single-pulse flight times
+# Change of a touch time beyond which an estimate is rejected, in single-pulse flight times; arbitrary
 _ASTRAY: Final = 0.4
-# Current, as a fraction of the limit, that presses the armature against the backstop after a landing. With
-# 0.8, dots of the shipped hammer 0.84 to 1.6 ms apart are within 9 % and 23 us; with 1 and without `_RELAXED`
-# the soft backstop throws the armature when the current ends, and dots are up to 23 % too strong. With 0.7 a
-# harder hammer of the tests touches 30 us earlier than expected.
+# Current, as a fraction of the limit, that presses the armature against the backstop after a landing; tuned:
+# with 0.8, dots of the shipped hammer 0.84 to 1.6 ms apart are within 9 % and 23 us; with 1 and without
+# `_RELAXED` the soft backstop throws the armature when the current ends, and dots are up to 23 % too strong.
+# With 0.7 a harder hammer of the tests touches 30 us earlier than expected.
 _CLAMP: Final = 0.8
-_CLAMPED, _LONGEST = 0.6, 1.2  # Usual and largest duration of the pressing current, in flight times
-_FADED: Final = 3.0  # Time for a current to decay, in time constants of the driver
-# Time for the armature to come to rest after the pressing current, in flight times; with 0.4 a landing is too
-# short for the residual motion to decay
+_CLAMPED, _LONGEST = 0.6, 1.2
+"""Usual and largest duration of the pressing current, in flight times; arbitrary."""
+_FADED: Final = 3.0  # Time for a current to decay, in time constants of the driver; arbitrary
+# Time for the armature to come to rest after the pressing current, in flight times; tuned: with 0.4 a landing
+# is too short for the residual motion to decay
 _RELAXED: Final = 0.2
-_CLEAR: Final = 0.22  # Fraction of a launch's flight time after which the armature has left the backstop
-_PATIENCE: Final = 40e-6  # Least time from the end of a contact to a throw that may be decided again, s
+_CLEAR: Final = 0.22
+"""Fraction of a launch's flight time after which the armature has left the backstop; arbitrary."""
+_PATIENCE: Final = 40e-6
+"""Least time from the end of a contact to a throw that may be decided again, s; arbitrary."""
 _POLICIES: Final = 8  # Size of the policy cache; arbitrary
 
 

@@ -39,14 +39,14 @@ from printhammer.support.arrays import FloatArray
 if TYPE_CHECKING:
     Accelerations = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
-_ROUNDS: Final = 3  # Iterations of path integration, of the fit, and of the touch time
-_NODES: Final = 65  # Time nodes of a path
-_SLOWEST: Final = 1e-2  # Smallest speed of a touch, m/s
-_SHORTEST: Final = 1e-6  # Shortest flight, s
-# Finite-difference steps: relative speed, and current scale
+_ROUNDS: Final = 3  # Iterations of path integration, of the fit, and of the touch time; arbitrary
+_NODES: Final = 65  # Time nodes of a path; arbitrary
+_SLOWEST: Final = 1e-2  # Smallest speed of a touch, m/s; arbitrary
+_SHORTEST: Final = 1e-6  # Shortest flight, s; arbitrary
+# Finite-difference steps: relative speed, and current scale; arbitrary
 _STEP: Final = 0.01
-_SCALE_STEP: Final = 0.02
-_BENDS: Final = 2  # Number of Picard iterations of the path per fit
+_SCALE_STEP: Final = 0.02  # Finite-difference step of the current scale; arbitrary
+_BENDS: Final = 2  # Number of Picard iterations of the path per fit; arbitrary
 _PLACES, _CURRENTS = 97, 129  # Grid size of the force table: displacements, currents; arbitrary
 
 
@@ -230,16 +230,17 @@ def _interpolate(grid: FloatArray, values: FloatArray, times: FloatArray) -> Flo
     return blend(values[row, below], values[row, below + 1], place - below)
 
 
-# Standard deviation of the model error of a contact, as a fraction of the stroke
+# Standard deviation of the model error of a contact, as a fraction of the stroke; arbitrary
 _MODEL_ERROR: Final = 0.003
-_GRID: Final = 1.0 / 128.0  # Spacing of the simulated pack fronts, as a fraction of the stroke
+_GRID: Final = 1.0 / 128.0  # Spacing of the simulated pack fronts, as a fraction of the stroke; arbitrary
 # Finite-difference steps: front in grid steps, current scale, displacement as a fraction of the stroke, speed
-# in m/s
+# in m/s; arbitrary
 _FRONT_STEPS: Final = 4
-_FACTOR_STEP: Final = 0.03
+_FACTOR_STEP: Final = 0.03  # Finite-difference step of the current scale; arbitrary
 _PLACE_STEP: Final = 0.005
-_SPEED_STEP: Final = 0.02
-# Mean squared normalised residual above which a contact is rejected
+"""Finite-difference step of the displacement, as a fraction of the stroke; arbitrary."""
+_SPEED_STEP: Final = 0.02  # Finite-difference step of the speed, m/s; arbitrary
+# Mean squared normalised residual above which a contact is rejected; arbitrary
 _STRANGE: Final = 9.0
 
 

@@ -23,31 +23,32 @@ if TYPE_CHECKING:
     from printhammer.control.feedback.plant import Driver, Plant
     from printhammer.drive.waveforms.shapes import Switched
 
-AHEAD: Final = 1e-6  # Time before the touch at which the simulations of a map begin, s
+AHEAD: Final = 1e-6  # Time before the touch at which the simulations of a map begin, s; arbitrary
 PUSHED, FREE = 0, 1
 """Kinds of pack touch: with the coil current on, or in free flight."""
 
 ALWAYS: Final = 2e-3  # Width assigned to a push that is still on at the next touch, s; arbitrary, but long
-# Speeds of the touches, as fractions of the single pulse's impact speed
+# Speeds of the touches, as fractions of the single pulse's impact speed; arbitrary
 _PUSHED_SPEEDS: Final = np.linspace(0.3, 1.1, 17)
 _FREE_SPEEDS: Final = np.linspace(0.6, 1.25, 14)
-_RETURNS: Final = (0.0, -0.4, -1.0)  # Return currents, as fractions of the largest current
+_RETURNS: Final = (0.0, -0.4, -1.0)  # Return currents, as fractions of the largest current; arbitrary
 
 FORCES: Final = (0.95, 1.0, 1.05)
 """Forces for which actions are computed, as fractions of the single-pulse force. Actions are enumerated with
-the return current as the slowest index and the force as the next."""
+the return current as the slowest index and the force as the next. Arbitrary."""
 
-# Widths of the pushes that end before the touch, as fractions of the launch width
+# Widths of the pushes that end before the touch, as fractions of the launch width; arbitrary
 _WIDTHS: Final = (0.85, 1.0, 1.2)
-# Times of releases, and of throws before and after the bounce, in single-pulse flight times
+# Times of releases, and of throws before and after the bounce, in single-pulse flight times; arbitrary
 _RELEASES: Final = np.linspace(0.0, 0.85, 29)
 _EARLY: Final = np.linspace(0.14, 1.07, 38)
 _LATE: Final = np.linspace(1.1, 2.9, 48)
-# Durations of force simulations, and of simulations after a throw, in single-pulse flight times
+# Durations of force simulations, and of simulations after a throw, in single-pulse flight times; arbitrary
 _WATCHED, _WAIT = 3.0, 1.7
-# Time after which a change of the current has decayed, in time constants of the driver
+# Time after which a change of the current has decayed, in time constants of the driver; arbitrary
 _FADED: Final = 2.5
-_LARGEST_FORCE: Final = 1.15  # Force above which an action is inadmissible, relative to the single pulse
+_LARGEST_FORCE: Final = 1.15
+"""Force above which an action is inadmissible, relative to the single pulse; arbitrary."""
 
 
 @dataclass(frozen=True)

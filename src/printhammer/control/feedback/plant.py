@@ -71,7 +71,7 @@ class Plant:
         return result.ok, cast("DotTable", result.dots), cast("Strobes", result.strobes)
 
 
-LARGEST_CURRENT: Final = 2.0  # Default current limit, A
+LARGEST_CURRENT: Final = 2.0  # Default current limit, A: the range of the paper's Fig. 2
 FASTEST: Final = 1e-6  # Smallest time constant of a driver, s; arbitrary
 STANDARD: Final = 20e-6  # Time constant if the waveform of a hammer has no decay, s; arbitrary
 
@@ -133,15 +133,17 @@ def driver_of(hammer: Hammer, current: float = LARGEST_CURRENT, edge: float | No
     return Driver(current, own if edge is None else edge)
 
 
-REMEMBERED: Final = 4  # Number of the latest pulses whose currents may not have decayed
-APART: Final = 1e-9  # Shortest time between two switchings, s
-# Prior standard deviation of the front, as a fraction of the stroke
+REMEMBERED: Final = 4  # Number of the latest pulses whose currents may not have decayed; arbitrary
+APART: Final = 1e-9  # Shortest time between two switchings, s; arbitrary
+# Prior standard deviation of the front, as a fraction of the stroke; arbitrary
 FRONT_ERROR: Final = 0.04
-SCALE_ERROR: Final = 0.03  # Prior standard deviation of the current scale
-# Standard deviations of the random walk per decision (process noise)
+SCALE_ERROR: Final = 0.03  # Prior standard deviation of the current scale; arbitrary
+# Standard deviations of the random walk per decision (process noise); arbitrary
 _FRONT_DRIFT: Final = 0.002
 _SCALE_DRIFT: Final = 0.002
-_FARTHEST: Final = 5.0  # Prior standard deviations from nominal beyond which an estimate is rejected
+"""Standard deviation of the random walk of the current scale per decision; arbitrary."""
+_FARTHEST: Final = 5.0
+"""Prior standard deviations from nominal beyond which an estimate is rejected; arbitrary."""
 
 
 @dataclass

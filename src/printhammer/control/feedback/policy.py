@@ -39,14 +39,14 @@ from printhammer.printing.dots.judging import Limits
 from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.threads import Progress
 
-OFFSETS: Final = (-0.07, 0.0, 0.07)
+OFFSETS: Final = (-0.07, 0.0, 0.07)  # Arbitrary
 """Distances of the pack beyond nominal, one for each map, as fractions of the stroke; evenly spaced."""
 
 STEPS: Final = 100
-"""Number of steps of the progress bar for each distance of the pack."""
+"""Number of steps of the progress bar for each distance of the pack; arbitrary."""
 
 _MAPPING: Final = 70
-"""Number of steps of the progress bar, for each pack distance, up to the end of the impact map."""
+"""Number of steps of the progress bar, for each pack distance, up to the end of the impact map; arbitrary."""
 
 MIDDLE: Final = 1  # Index of the nominal distance
 
@@ -119,19 +119,20 @@ def between_fronts(front: FloatArray) -> tuple[IntArray, FloatArray]:
     return place_of(np.clip(front, OFFSETS[0], OFFSETS[-1]), np.array(OFFSETS))
 
 
-NEVER: Final = 50.0  # Cost of an inadmissible action
-# Standard deviation of the pack front, as a fraction of the stroke, above which a penalty applies
+NEVER: Final = 50.0  # Cost of an inadmissible action; arbitrary
+# Standard deviation of the pack front, as a fraction of the stroke, above which a penalty applies; arbitrary
 KNOWN: Final = 0.01
-_DISCOUNT: Final = 0.9  # Discount factor per dot
-_ROUNDS: Final = 8  # Number of dots before a rest after which the cost-to-go counts as converged
-_LATENESS: Final = np.linspace(-0.9, 0.9, 13)  # Nodes of the lateness, as fractions of the limit
-_SPEED_DOUBT: Final = 0.04  # Standard deviation of the estimated speed of a touch, m/s
-# Derivative of the next touch time with respect to speed, s / (m/s), where no finite difference is available
+_DISCOUNT: Final = 0.9  # Discount factor per dot; arbitrary
+_ROUNDS: Final = 8  # Number of dots before a rest after which the cost-to-go counts as converged; arbitrary
+_LATENESS: Final = np.linspace(-0.9, 0.9, 13)  # Nodes of the lateness, as fractions of the limit; arbitrary
+_SPEED_DOUBT: Final = 0.04  # Standard deviation of the estimated speed of a touch, m/s; arbitrary
+# Derivative of the next touch time with respect to speed, s / (m/s), where no finite difference is available;
+# arbitrary
 _STEEPEST: Final = 2e-3
-_NEAR: Final = 2  # Number of speed nodes to either side among which the steepest slope is searched
-_FAST: Final = 0.3  # Residual speed after a landing that costs 1, m/s
-_STEEP: Final = 8.0  # Weight of the sixth power of a deviation relative to its square
-_EFFORT: Final = 0.1  # Cost of the largest return current over a whole period
+_NEAR: Final = 2  # Number of speed nodes to either side among which the steepest slope is searched; arbitrary
+_FAST: Final = 0.3  # Residual speed after a landing that costs 1, m/s; arbitrary
+_STEEP: Final = 8.0  # Weight of the sixth power of a deviation relative to its square; arbitrary
+_EFFORT: Final = 0.1  # Cost of the largest return current over a whole period; arbitrary
 
 
 class Committed(NamedTuple):

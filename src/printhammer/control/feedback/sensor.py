@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     Words = npt.NDArray[np.uint64]
 
 
-# Smallest standard deviation assigned to a sample, as a fraction of the stroke
+# Smallest standard deviation assigned to a sample, as a fraction of the stroke; arbitrary
 _LEAST_ERROR: Final = 1e-4
-# Tolerance of a sample time at a boundary, as a fraction of the interval, against rounding
+# Tolerance of a sample time at a boundary, as a fraction of the interval, against rounding; arbitrary
 _SLACK: Final = 1e-6
 
 

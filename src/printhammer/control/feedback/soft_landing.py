@@ -21,18 +21,20 @@ from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.support.arrays import FloatArray, IntArray
 
-# Start times and widths of the brake pulses in the first grid, in single-pulse flight times
+# Start times and widths of the brake pulses in the first grid, in single-pulse flight times; arbitrary
 _STARTS: Final = np.linspace(0.85, 1.75, 28)
 _WIDTHS: Final = np.linspace(0.1, 0.75, 20)
 # Half-widths of the finer grids around the best pulse, in single-pulse flight times: a grid spans one step of
-# the preceding grid to either side
+# the preceding grid to either side; arbitrary
 _NEAR: Final = np.linspace(-1.0, 1.0, 7)
 _FINER: Final = (0.034, 0.01, 0.003)
-# Distances from rest are divided by this time, in single-pulse flight times, to give an equivalent speed
+# Distances from rest are divided by this time, in single-pulse flight times, to give an equivalent speed;
+# arbitrary
 _FALL: Final = 1.0 / 3.0
-# Times after the touch at which the residual motion is evaluated, in single-pulse flight times
+# Times after the touch at which the residual motion is evaluated, in single-pulse flight times; arbitrary
 _WATCHED: Final = np.linspace(2.2, 3.4, 16)
-_SETTLED: Final = 0.65  # Time after the brake pulse until the armature counts as at rest, in flight times
+_SETTLED: Final = 0.65
+"""Time after the brake pulse until the armature counts as at rest, in flight times; arbitrary."""
 
 
 @dataclass(frozen=True)
@@ -98,11 +100,11 @@ def _residual_speeds(
     return np.where(ok & (dots.extra_contacts[:, 0] == 0), remaining, np.inf).reshape(tried.shape[:2])
 
 
-# Candidate widths of the launch, in single-pulse flight times
+# Candidate widths of the launch, in single-pulse flight times; arbitrary
 _WIDTHS_LAUNCH: Final = np.linspace(0.2, 1.0, 81)
-_LENGTH: Final = 4.0  # Length of launch simulations, in single-pulse flight times
-_ALMOST: Final = 0.9  # Force of the touch without a push, relative to the single pulse
-_WEAKER: Final = 0.03  # Change of the current scale for the finite difference
+_LENGTH: Final = 4.0  # Length of launch simulations, in single-pulse flight times; arbitrary
+_ALMOST: Final = 0.9  # Force of the touch without a push, relative to the single pulse; arbitrary
+_WEAKER: Final = 0.03  # Change of the current scale for the finite difference; arbitrary
 
 
 @dataclass(frozen=True)

@@ -31,20 +31,26 @@ if TYPE_CHECKING:
     T = TypeVar("T")
     Search: TypeAlias = Work[FloatArray, FloatArray, T]
 
-LEVELS: Final = (1.0, 0.3, 0.1, 0.03, 0.0)  # Fraction of the surrogate's residual that counts as noise
-_NEAR: Final = (0.1, 0.0)  # Levels of a search that begins at a mode of the stage before
-_MODES: Final = 4  # Maximum number of modes of a belief
-_SHARE: Final = 0.01  # Smallest probability of a mode, relative to the most probable mode
-_CARE: Final = 1.3  # Factor by which standard deviations are widened in `Belief.draw`
-_FREEDOM: Final = 4.0  # Degrees of freedom of Student's t distribution of the errors
-_LOST: Final = 12.0  # Penalty, in 2 × negative log-likelihood, for an observed dot that is not predicted
-_STEP: Final = 0.1  # Finite-difference step of the Jacobian in a search, in prior standard deviations
-_FINE: Final = 0.01  # Finite-difference step for the covariance; small, since readings are nonlinear
-_ITERATIONS: Final = 10  # Iteration limit of a level
-_STILL: Final = 0.03  # Step size below which a level has converged, in prior standard deviations
-_GAIN: Final = 0.01  # Smallest decrease of the objective with which a step is accepted
+LEVELS: Final = (1.0, 0.3, 0.1, 0.03, 0.0)
+"""Fraction of the surrogate's residual that counts as noise; arbitrary."""
+_NEAR: Final = (0.1, 0.0)  # Levels of a search that begins at a mode of the stage before; arbitrary
+_MODES: Final = 4  # Maximum number of modes of a belief; arbitrary
+_SHARE: Final = 0.01  # Smallest probability of a mode, relative to the most probable mode; arbitrary
+_CARE: Final = 1.3
+"""Factor on standard deviations in `Belief.draw`; at 1, tables lost dots in 2 of 100 units (decision 22)."""
+_FREEDOM: Final = 4.0  # Degrees of freedom of Student's t distribution of the errors; arbitrary
+_LOST: Final = 12.0
+"""Penalty, in 2 × negative log-likelihood, for an observed dot that is not predicted; arbitrary."""
+_STEP: Final = 0.1
+"""Finite-difference step of the Jacobian in a search, in prior standard deviations; arbitrary."""
+_FINE: Final = 0.01
+"""Finite-difference step for the covariance; at 0.1, the covariance was too small (decision 22)."""
+_ITERATIONS: Final = 10  # Iteration limit of a level; arbitrary
+_STILL: Final = 0.03  # Step size below which a level has converged, in prior standard deviations; arbitrary
+_GAIN: Final = 0.01  # Smallest decrease of the objective with which a step is accepted; arbitrary
 _OUTLIER: Final = 5.0  # Clip of residuals in the misfit, in standard deviations; arbitrary
-_EXPLAINED: Final = 2.0  # Largest mean square residual, in variances, of a level that explains the readings
+_EXPLAINED: Final = 2.0
+"""Largest mean square residual, in variances, of a level that explains the readings; arbitrary."""
 
 
 @dataclass(frozen=True)

@@ -61,12 +61,13 @@ from printhammer.support.threads import together
 if TYPE_CHECKING:
     from printhammer.control.learning.lines import Press, Printing
 
-STEP: Final = 1e-6  # Unit of the corrections, s
-_LARGEST: Final = 25.0  # Largest change of an entry after a stage, in units of `STEP`
-# Allowance, s, for a unit that leaves the pack later than the nominal hammer; no pulse is fired earlier
+STEP: Final = 1e-6  # Unit of the corrections, s; arbitrary
+_LARGEST: Final = 25.0  # Largest change of an entry after a stage, in units of `STEP`; arbitrary
+# Allowance, s, for a unit that leaves the pack later than the nominal hammer; no pulse is fired earlier;
+# arbitrary
 MARGIN: Final = 20e-6
-_LEAST: Final = 0.5  # Smallest width of a pulse, as a fraction of the nominal width
-_LEAST_BRAKE: Final = 0.05  # Smallest width of a brake pulse, as a fraction of the nominal width
+_LEAST: Final = 0.5  # Smallest width of a pulse, as a fraction of the nominal width; arbitrary
+_LEAST_BRAKE: Final = 0.05  # Smallest width of a brake pulse, as a fraction of the nominal width; arbitrary
 ADVANCE, WIDTH, DELAY, BRAKE = range(4)
 
 
@@ -159,20 +160,23 @@ class Adjustable:
         return settings
 
 
-RUNS: Final = (1, 1, 2, 4, 8, 24)  # Number of runs of each stage
-GATE: Final = 3.0  # Deviations are clipped at this multiple of the limits
-_DAMPING: Final = 1e-3  # Regularisation of G+: mean square deviation, normalised by the limits, per `STEP`
-_STEEP: Final = 2.0  # Weight of the quartic term of the objective relative to the quadratic term
-_SIZES: Final = (1.0, 0.5, 0.2)  # Step fractions of the line search
-_NEWTON: Final = 10  # Iteration limit of the law on simulated hammers after a stage
-BAD: Final = 10.0
+RUNS: Final = (1, 1, 2, 4, 8, 24)  # Number of runs of each stage; arbitrary
+GATE: Final = 3.0  # Deviations are clipped at this multiple of the limits; arbitrary
+_DAMPING: Final = 1e-3
+"""Regularisation of G+: mean square deviation, normalised by the limits, per `STEP`; arbitrary."""
+_STEEP: Final = 2.0  # Weight of the quartic term of the objective relative to the quadratic term; arbitrary
+_SIZES: Final = (1.0, 0.5, 0.2)  # Step fractions of the line search; arbitrary
+_NEWTON: Final = 10  # Iteration limit of the law on simulated hammers after a stage; arbitrary
+BAD: Final = 10.0  # Arbitrary
 """Final objective of a stage (`Update.left`) above which the learner tries another starting table."""
 
-_SLOW: Final = 0.85  # The iteration stops if the objective exceeds this fraction of the value before
-_LEAST_LAW: Final = 1e-2  # Lower bound of the fraction a of the model error that is corrected
-_OTHERS: Final = 4  # Number of posterior samples on which the convergence condition is checked
-_ALIKE: Final = 24  # Number of posterior samples on which table and open loops are compared
-_GAIN: Final = 0.02  # Smallest mean gain of a table, as a fraction of the dots, with which it is used
+_SLOW: Final = 0.85
+"""The iteration stops if the objective exceeds this fraction of the value before; arbitrary."""
+_LEAST_LAW: Final = 1e-2  # Lower bound of the fraction a of the model error that is corrected; arbitrary
+_OTHERS: Final = 4  # Number of posterior samples on which the convergence condition is checked; arbitrary
+_ALIKE: Final = 24  # Number of posterior samples on which table and open loops are compared; arbitrary
+_GAIN: Final = 0.02
+"""Smallest mean gain of a table, as a fraction of the dots, with which it is used; arbitrary."""
 SURE: Final = 0.9
 """Smallest fraction of posterior samples that agree on the better open loop, to choose it; arbitrary."""
 

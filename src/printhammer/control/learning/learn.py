@@ -140,7 +140,8 @@ def table_of(learner: Learner, base: CompensationTable, driver: str, hammer: Ham
 
 
 _DOTS = "stage dot"
-_LIKELY: Final = 0.5  # Smallest fraction of posterior samples that print every dot, for a unit to pass
+_LIKELY: Final = 0.5
+"""Smallest fraction of posterior samples that print every dot, for a unit to pass; arbitrary."""
 
 
 def _percent(share: float) -> str:

@@ -19,18 +19,19 @@ if TYPE_CHECKING:
     from printhammer.control.learning.lines import Printing
     from printhammer.drive.waveforms.shapes import Waveform
 
-# Standard deviation of the model error, normalised by the limits
+# Standard deviation of the model error, normalised by the limits; arbitrary
 _FLOOR: Final = 0.01
-_STARTS: Final = 6  # Number of simulated hammers from which searches begin
-_OUTLIER: Final = 6.0  # Readings farther from the median are rejected, in standard deviations
-_FEWEST: Final = 3  # Smallest number of readings whose median can expose an outlier
+_STARTS: Final = 6  # Number of simulated hammers from which searches begin; arbitrary
+_OUTLIER: Final = 6.0  # Readings farther from the median are rejected, in standard deviations; arbitrary
+_FEWEST: Final = 3
+"""Smallest number of readings whose median exposes an outlier, since either of two may be the outlier"""
 MISFIT: Final = 2.0
 """Largest misfit with which a table is used: RMS of the residuals, in standard deviations of the noise.
 
 Arbitrary; units of the production have misfits of 0.7 to 1.6, whatever the offset of the sensor."""
 
 _ERRORS: Final = 3.0  # Largest excess of the misfit over 1 of a comparison, in standard errors; arbitrary
-_STARTED: Final = 3  # Maximum number of tables tuned for the most probable hammer
+_STARTED: Final = 3  # Maximum number of tables tuned for the most probable hammer; arbitrary
 _LATE: Final = (
     2  # Stages before an unstable row leads to a new table; arbitrary, since early posteriors are wide
 )

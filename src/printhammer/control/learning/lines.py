@@ -44,7 +44,8 @@ if TYPE_CHECKING:
     T = TypeVar("T")
     Printing: TypeAlias = "Work[Order, Printed, T]"
 
-_RIDGE: Final = 1e-3  # Ridge parameter of the regression, added to the diagonal of the normal matrix
+_RIDGE: Final = 1e-3
+"""Ridge parameter of the regression, added to the diagonal of the normal matrix; arbitrary."""
 
 
 @dataclass(frozen=True)
@@ -87,19 +88,22 @@ class Surrogate:
         return np.asarray(self.slope + rows @ self.curvature)
 
 
-DOTS: Final = 9
+DOTS: Final = 9  # Arbitrary
 """Number of dots in the ladder, the sequence of test pulses that is printed before the test lines."""
 
-# Widths of single pulses and of both pulses of a pair, as fractions of the nominal width
+# Widths of single pulses and of both pulses of a pair, as fractions of the nominal width; arbitrary
 _SINGLE: Final = (0.7, 0.85, 1.0, 1.15, 1.3, 1.45)
 _FIRST: Final = (0.8, 1.0, 1.3)
+"""Widths of the first pulse of a pair, as fractions of the nominal width; arbitrary."""
 _SECOND: Final = (1.0, 1.3, 1.5)
-# Times of the second pulse after the armature has left the pack, as fractions of the flight time
+"""Widths of the second pulse of a pair, as fractions of the nominal width; arbitrary."""
+# Times of the second pulse after the armature has left the pack, as fractions of the flight time; arbitrary
 _LATER: Final = (0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0, 1.2, 1.6, 2.0, 2.4)
-_CLEAR: Final = 20e-6  # Allowance for a unit that leaves the pack later than the nominal hammer, s
-_SEEN: Final = 0.97  # Smallest fraction of simulated hammers that must print all dots of a candidate rung
-_RUNS: Final = 8.0  # Number of averaged runs for which the choice of rungs is optimised
-_POINTS: Final = 24  # Number of simulated hammers over which the design is averaged
+_CLEAR: Final = 20e-6  # Allowance for a unit that leaves the pack later than the nominal hammer, s; arbitrary
+_SEEN: Final = 0.97
+"""Smallest fraction of simulated hammers that must print all dots of a candidate rung; arbitrary."""
+_RUNS: Final = 8.0  # Number of averaged runs for which the choice of rungs is optimised; arbitrary
+_POINTS: Final = 24  # Number of simulated hammers over which the design is averaged; arbitrary
 
 
 class Rung(NamedTuple):
@@ -197,8 +201,8 @@ def choose(
     return sorted(chosen)
 
 
-_MOST: Final = 4096  # Maximum number of hammers in an ensemble; bounds the memory
-_STEPS: Final = (1, 2)  # Slots from dot to dot in the rows whose multipliers are computed
+_MOST: Final = 4096  # Maximum number of hammers in an ensemble; bounds the memory; arbitrary
+_STEPS: Final = (1, 2)  # Slots from dot to dot in the rows whose multipliers are computed; arbitrary
 
 LINE: Final = slots_of(cycle_with_lead_in(5, 0))
 """Slots of the test line: the de Bruijn cycle of order 5, in which every history of two gaps occurs."""

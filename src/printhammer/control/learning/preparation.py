@@ -27,11 +27,11 @@ from printhammer.run.window import scaled_rate
 from printhammer.support.arrays import FloatArray
 from printhammer.support.threads import together
 
-FORGETTING: Final = 0.02  # Default of `forgetting`, the fraction of the corrections lost per stage
-DOUBT: Final = 0.0  # Default of `doubt`: no posterior sample may print fewer dots with the table
+FORGETTING: Final = 0.02  # Default of `forgetting`, the fraction of the corrections lost per stage; arbitrary
+DOUBT: Final = 0.0  # Default of `doubt`: no posterior sample may print fewer dots with the table; arbitrary
 MEMBERS: Final = 400
-"""Default number of simulated hammers on which the sequence of test pulses is chosen."""
-_FEW: Final = 24  # Number of simulated hammers on which the open loops are compared
+"""Default number of simulated hammers on which the sequence of test pulses is chosen; arbitrary."""
+_FEW: Final = 24  # Number of simulated hammers on which the open loops are compared; arbitrary
 _RATE: Final = 1275.0  # Default slot rate for the paper's hammer, Hz
 # Smallest default slot rate, relative to the lowest rate at which successive pulses interact; arbitrary
 _ABOVE: Final = 1.25

@@ -59,24 +59,25 @@ from printhammer.units import from_si
 if TYPE_CHECKING:
     import pandas as pd
 
-FORCE: Final = 0.9  # Default least force of an adequate dot, relative to the single pulse
+FORCE: Final = 0.9  # Default least force of an adequate dot, relative to the single pulse; arbitrary
 SPACING: Final = 0.6
 """Default time between the nodes of the current, as a fraction of the time in which a single pulse indents
-the pack; rounded to a whole fraction of the period."""
+the pack; rounded to a whole fraction of the period. Arbitrary."""
 
 MOST_DOTS: Final = 1000  # Largest number of dots in a burst; arbitrary
 Least = Literal["positive work", "heat"]
 # Objective: the positive work of the coil, or its heat, which is proportional to the squared current
 LEASTS: Final = get_args(Least)
-# Default relative changes of the current in `LeastWork.under_supply`
+# Default relative changes of the current in `LeastWork.under_supply`; arbitrary
 SUPPLY: Final = (-0.03, -0.01, -0.003, -0.001, 0.0, 0.001, 0.003, 0.01, 0.03)
 Shape = Literal["free", "pulses"]
 # Allowed currents: any current within the limits, or the hammer's pulses with free times and widths
 SHAPES: Final = get_args(Shape)
-# Time from the touch to the end of a slot, as a fraction of the time in which a single pulse indents the pack
+# Time from the touch to the end of a slot, as a fraction of the time in which a single pulse indents the
+# pack; arbitrary
 _PAST_PEAK: Final = 1.2
-_SPARE: Final = 5e-4  # Relative margin on the force of a planned dot
-# Motional energy below which a hammer counts as at rest, as a fraction of the pack loss of a dot
+_SPARE: Final = 5e-4  # Relative margin on the force of a planned dot; arbitrary
+# Motional energy below which a hammer counts as at rest, as a fraction of the pack loss of a dot; arbitrary
 _SETTLED: Final = 1e-2
 
 

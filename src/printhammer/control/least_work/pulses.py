@@ -29,16 +29,17 @@ from printhammer.errors import InputError
 from printhammer.run.ensemble import Ensemble
 from printhammer.support.arrays import FloatArray
 
-GONE: Final = 1e-2  # Fraction of its peak below which the current of a pulse counts as decayed
-_PER_SLOT: Final = 2  # Number of pulses per slot
-_TRIED: Final = 1024  # Number of Sobol points evaluated to select starts
-_TRIES, _MOST_TRIES = 4, 10  # Number of starts, and maximum number while no start succeeds
-_ROUNDS: Final = 40  # Iteration limit of SLSQP
-_SHORTEST: Final = 0.02  # Smallest width, as a fraction of the largest
-_SAMPLES: Final = 301  # Samples of the power per slot
+GONE: Final = 1e-2  # Fraction of its peak below which the current of a pulse counts as decayed; arbitrary
+_PER_SLOT: Final = 2  # Number of pulses per slot; arbitrary
+_TRIED: Final = 1024  # Number of Sobol points evaluated to select starts; arbitrary
+_TRIES, _MOST_TRIES = 4, 10  # Number of starts, and maximum number while no start succeeds; arbitrary
+_ROUNDS: Final = 40  # Iteration limit of SLSQP; arbitrary
+_SHORTEST: Final = 0.02  # Smallest width, as a fraction of the largest; arbitrary
+_SAMPLES: Final = 301  # Samples of the power per slot; arbitrary
 _HALVINGS: Final = 60  # Bisections of a width: more than the bits of a double's mantissa
-_NONE: Final = 1e-9  # Fraction of a slot below which a width counts as zero
-_WRONG: Final = 10.0  # Penalty for an extra contact or a failed simulation, in units of the loading work
+_NONE: Final = 1e-9  # Fraction of a slot below which a width counts as zero; arbitrary
+_WRONG: Final = 10.0
+"""Penalty for an extra contact or a failed simulation, in units of the loading work; arbitrary."""
 
 
 class PulsePlan:

@@ -28,12 +28,12 @@ from printhammer.hammer.equilibrium import rest_state
 from printhammer.support.arrays import FloatArray
 
 LOST: Final = 25.0  # Normalised deviation assigned to a failed simulation; arbitrary, but well above 1
-_MISSED: Final = 0.05  # Accepted deviation from the arrival time, in units of `ARRIVAL`
-_SLACK: Final = 8e-3  # Accepted shortfall of the force, in units of `_FORCE`
-ARRIVAL: Final = 20e-6  # Scale of arrival deviations, s
-_FORCE: Final = 0.05  # Scale of force deviations, relative
-_DIFFERENCE: Final = 1e-5  # Step of the finite differences
-_ENDS_AT: Final = 1e-5  # Change of the cost at which SLSQP stops
+_MISSED: Final = 0.05  # Accepted deviation from the arrival time, in units of `ARRIVAL`; arbitrary
+_SLACK: Final = 8e-3  # Accepted shortfall of the force, in units of `_FORCE`; arbitrary
+ARRIVAL: Final = 20e-6  # Scale of arrival deviations, s; arbitrary
+_FORCE: Final = 0.05  # Scale of force deviations, relative; arbitrary
+_DIFFERENCE: Final = 1e-5  # Step of the finite differences; arbitrary
+_ENDS_AT: Final = 1e-5  # Change of the cost at which SLSQP stops; arbitrary
 
 
 def descend(
@@ -130,12 +130,13 @@ def sobol(dimensions: int, count: int) -> FloatArray:
     return np.asarray(qmc.Sobol(dimensions, scramble=False).random(count))
 
 
-PRINTING_SHARES, LANDING_SHARES = 5, 4  # Number of parameters of a profile, each in [0, 1]
-_SPREAD: Final = 512  # Number of Sobol profiles
-_KEPT: Final = 16  # Number of profiles refined
-_CLOUD: Final = 32  # Number of trial points of the local search (the cloud)
-_MOVES: Final = 8  # Number of steps of the local search
-_REACH, _SHRINKS = 0.25, 0.7  # Half-width of the first cloud, and factor on the half-width per move
+PRINTING_SHARES, LANDING_SHARES = 5, 4  # Number of parameters of a profile, each in [0, 1]; arbitrary
+_SPREAD: Final = 512  # Number of Sobol profiles; arbitrary
+_KEPT: Final = 16  # Number of profiles refined; arbitrary
+_CLOUD: Final = 32  # Number of trial points of the local search (the cloud); arbitrary
+_MOVES: Final = 8  # Number of steps of the local search; arbitrary
+_REACH, _SHRINKS = 0.25, 0.7
+"""Half-width of the first cloud, and factor on the half-width per move; arbitrary."""
 
 
 def printing_profile(
@@ -197,18 +198,22 @@ def _in_steps(levels: FloatArray, edges: FloatArray, duration: float, nodes: int
     return np.asarray(np.diff((levels[:, :, np.newaxis] * past).sum(axis=1), axis=1) / np.diff(times))
 
 
-LEAD: Final = 2.0  # Time from the start, at rest, to the first touch, in flight times of the single pulse
-LANDING: Final = 5.0  # Length of the landing, in flight times of the single pulse
-_FEWEST, _MOST = 8, 96  # Smallest and largest number of nodes per slot
-# Fraction of a step by which a slot's current overlaps the next slot, whose current replaces it
+LEAD: Final = 2.0
+"""Time from the start, at rest, to the first touch, in flight times of the single pulse; arbitrary."""
+LANDING: Final = 5.0  # Length of the landing, in flight times of the single pulse; arbitrary
+_FEWEST, _MOST = 8, 96  # Smallest and largest number of nodes per slot; arbitrary
+# Fraction of a step by which a slot's current overlaps the next slot, whose current replaces it; arbitrary
 _OVERLAP: Final = 0.01
-_LAGS: Final = 1e-3  # Largest accepted lag in the pack (see `Outcomes`), in units of `RELOADING`
-_WRONG: Final = 10.0  # Penalty for an extra contact or a failed simulation, in units of the loading work
-_WEAK: Final = 3.0  # Weight of a force shortfall in the comparison of profiles
-_TRIES, _MOST_TRIES = 3, 12  # Number of starts, and maximum number while no start succeeds
-_LEGS: Final = 2  # Maximum number of consecutive SLSQP runs, each restarted from the previous result
-_ROUNDS, _ROUNDS_AGAIN = 30, 20  # SLSQP iteration limits, from a profile and from the preceding current
-_SEARCH_TOLERANCE: Final = 5e-7  # Integration tolerance of the comparison of profiles
+_LAGS: Final = 1e-3  # Largest accepted lag in the pack (see `Outcomes`), in units of `RELOADING`; arbitrary
+_WRONG: Final = 10.0
+"""Penalty for an extra contact or a failed simulation, in units of the loading work; arbitrary."""
+_WEAK: Final = 3.0  # Weight of a force shortfall in the comparison of profiles; arbitrary
+_TRIES, _MOST_TRIES = 3, 12  # Number of starts, and maximum number while no start succeeds; arbitrary
+_LEGS: Final = 2
+"""Maximum number of consecutive SLSQP runs, each restarted from the previous result; arbitrary."""
+_ROUNDS, _ROUNDS_AGAIN = 30, 20
+"""SLSQP iteration limits, from a profile and from the preceding current; arbitrary."""
+_SEARCH_TOLERANCE: Final = 5e-7  # Integration tolerance of the comparison of profiles; arbitrary
 _INSIDE: Final = 1.0 - 1e-9  # Factor on current and slope limits: rounding errors stay within the limits
 
 

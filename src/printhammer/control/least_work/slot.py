@@ -23,7 +23,7 @@ from printhammer.hammer.static_force import StaticForce
 from printhammer.run.ensemble import MODE_NAMES, Ensemble
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
-_SAMPLES: Final = 301  # Samples of power and motion per slot
+_SAMPLES: Final = 301  # Samples of power and motion per slot; arbitrary
 _IN_PACK: Final = {
     "loading": 1,
     "unloading": 2,
@@ -33,12 +33,13 @@ _IN_PACK: Final = {
 }
 """Pack branch code for `Ensemble`, by the name of the mode."""
 
-_MANY: Final = 64  # Smallest number of simulations that is distributed over threads
-_LEAST_SPEED: Final = 0.03  # Least speed at which the armature should leave the pack, m/s
-_CLEAR: Final = 2e-6  # Distance from the turning point beyond which the armature counts as leaving, m
-# Weight of the squared current relative to the positive work, a regularisation
+_MANY: Final = 64  # Smallest number of simulations that is distributed over threads; arbitrary
+_LEAST_SPEED: Final = 0.03  # Least speed at which the armature should leave the pack, m/s; arbitrary
+_CLEAR: Final = 2e-6
+"""Distance from the turning point beyond which the armature counts as leaving, m; arbitrary."""
+# Weight of the squared current relative to the positive work, a regularisation; arbitrary
 _SMOOTHING: Final = 1e-3
-RELOADING: Final = 1e-6  # Lag in the pack that costs as much as the loading work, m
+RELOADING: Final = 1e-6  # Lag in the pack that costs as much as the loading work, m; arbitrary
 
 
 @dataclass(frozen=True)
@@ -194,7 +195,7 @@ def end_of(ensemble: Ensemble, end: float, current: float) -> SlotState:
 
 
 _PLACES, _CURRENTS = 161, 33  # Numbers of spline nodes over displacement and current; arbitrary
-_BEHIND: Final = 0.2  # Range of the spline behind the backstop, as a fraction of the stroke
+_BEHIND: Final = 0.2  # Range of the spline behind the backstop, as a fraction of the stroke; arbitrary
 
 
 class CoilForce:

@@ -64,7 +64,7 @@ from printhammer.support.files import read_text, write_file
 if TYPE_CHECKING:
     import pandas as pd
 
-_NEAR: Final = 1e-9  # Rounding tolerance: relative for a rate, in s for a time
+_NEAR: Final = 1e-9  # Rounding tolerance: relative for a rate, in s for a time; arbitrary
 _CELLS: Final = "rate history"
 ANY_UNIT: Final = "any"
 """Serial number that matches every unit, so that a table learned on one unit can drive other units."""

@@ -208,11 +208,12 @@ def gaps_before(history: History, reach: int) -> list[tuple[int, ...]]:
     return [(), late, (*row, reach), (*row, *late), (reach, 1, reach, 1)]
 
 
-GOOD: Final = 1e-4  # Deviation, as a fraction of the limits, below which an entry is not improved further
-LEAST_OF_WIDEST: Final = 0.3  # Smallest width, as a fraction of the largest
-# Deviation, as a fraction of the limits, above which an entry is refitted to all its patterns
+GOOD: Final = 1e-4
+"""Deviation, as a fraction of the limits, below which an entry is not improved further; arbitrary."""
+LEAST_OF_WIDEST: Final = 0.3  # Smallest width, as a fraction of the largest; arbitrary
+# Deviation, as a fraction of the limits, above which an entry is refitted to all its patterns; arbitrary
 ROUGH: Final = 0.2
-_STEP: Final = 0.5e-6  # Step of the finite differences, s
+_STEP: Final = 0.5e-6  # Step of the finite differences, s; arbitrary
 
 
 def polish(draft: Draft) -> None:

@@ -31,7 +31,7 @@ from printhammer.printing.dots.strategy import slot_times
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.support.arrays import FloatArray, IntArray
 
-REST: Final = 0  # Gap of a dot printed from rest
+REST: Final = 0  # Code of the gap of a dot printed from rest
 MOST_GAPS: Final = 4  # Largest number of gaps in a history; arbitrary
 MOST_REACH: Final = 8  # Largest reach, slots; arbitrary
 History = tuple[int, ...]
@@ -119,16 +119,16 @@ def pattern_of(history: Sequence[int], before: Sequence[int] = ()) -> tuple[int,
     return tuple(itertools.accumulate(reversed(gaps), initial=0))
 
 
-ROUNDING: Final = 1e-9  # Relative rounding tolerance of a bound
+ROUNDING: Final = 1e-9  # Relative rounding tolerance of a bound; arbitrary
 # Largest width of a pulse whose current saturates at the limit, as a multiple of the hammer's own; rows of
 # the shipped hammer need 1.36, and a wider range makes the grid of starts coarser
 _SATURATED: Final = 1.5
 _HALVINGS: Final = 50  # Bisections of a width: about the bits of a double's mantissa
-_FEWER: Final = 12  # Bisections of a width for a driver, each of which needs a simulation
+_FEWER: Final = 12  # Bisections of a width for a driver, each of which needs a simulation; arbitrary
 _SAMPLES: Final = 4001  # Samples of a decaying pulse; arbitrary
-_WAIT: Final = 1e-6  # Step of the search for the wait after a brake pulse, s
+_WAIT: Final = 1e-6  # Step of the search for the wait after a brake pulse, s; arbitrary
 
-JUMP: Final = 8e-6
+JUMP: Final = 8e-6  # Arbitrary
 """Difference between neighbouring advances, s, above which the entries are on different solution branches."""
 
 
@@ -292,8 +292,8 @@ _REVERSED: Final = 1.0 - float(np.log(2.0))
 
 _EDGE: Final = 20e-6  # Time constant of a driver if the hammer's waveform has no decay, s; arbitrary
 _LEAST_EDGE: Final = 1e-6  # Smallest time constant of a driver, s; arbitrary
-_GRID: Final = 33  # Widths per round of the grid search
-_ROUNDS: Final = 7  # Rounds; each subdivides the bracketing interval of the previous round
+_GRID: Final = 33  # Widths per round of the grid search; arbitrary
+_ROUNDS: Final = 7  # Rounds; each subdivides the bracketing interval of the previous round; arbitrary
 
 
 def checked_driver(driver: str) -> Driver:

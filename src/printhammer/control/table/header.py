@@ -30,7 +30,7 @@ NANOSECOND: Final = 1e-9
 """Default unit of the times in a header, s."""
 
 _PLACE_BYTES: Final = 4
-"""Size of a rate, or of an axis value, in a C header, bytes: 32-bit integers."""
+"""Size of a rate, or of an axis value, in a C header, bytes: integers of 32 bits."""
 
 _ADVANCE, _, _DELAY, _BRAKE = range(len(COLUMNS))
 

@@ -44,8 +44,8 @@ STRATEGIES: Final = ("open loop", "table")
 SETS: Final = ("eight slots", *KINDS, "random")
 _LONG: Final = 12  # Number of rates above which a table is judged between its rates; arbitrary
 
-RANDOM: Final = 8  # Number of random patterns
-RANDOM_SLOTS: Final = 128  # Length of a random pattern, slots
+RANDOM: Final = 8  # Number of random patterns; arbitrary
+RANDOM_SLOTS: Final = 128  # Length of a random pattern, slots; arbitrary
 
 _AXES: Final = "strategy driven rate patterns"
 

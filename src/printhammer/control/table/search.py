@@ -47,29 +47,31 @@ from printhammer.control.table.ways import (
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 # Spacing of the periods at which a full search is run, s; other periods re-solve the solutions of their
-# neighbours
+# neighbours; arbitrary
 SPACING: Final = 30e-6
-_ROOM: Final = 100e-6  # Half-width of the range of firing times about the slot, s
-_GRID: Final = (12, 8)  # Numbers of firing times and widths of the starting grid
-_FINE: Final = 3  # Refinement factor of grid and number of starts without a brake pulse
-_DELAY: Final = 45e-6  # Spacing of the brake delays of the grid, s
-# Widths of brake pulses on the grid, as fractions of the hammer's own width
+_ROOM: Final = 100e-6  # Half-width of the range of firing times about the slot, s; arbitrary
+_GRID: Final = (12, 8)  # Numbers of firing times and widths of the starting grid; arbitrary
+_FINE: Final = 3  # Refinement factor of grid and number of starts without a brake pulse; arbitrary
+_DELAY: Final = 45e-6  # Spacing of the brake delays of the grid, s; arbitrary
+# Widths of brake pulses on the grid, as fractions of the hammer's own width; arbitrary
 _BRAKES: Final = (0.1, 0.15, 0.2, 0.3, 0.45, 0.7, 1.0)
-_APART: Final = 30e-6  # Smallest distance of firing times between two starts, s
-_STARTS: Final = 2  # Number of starts per brake pulse
-_FAR: Final = 8.0  # Deviation, as a fraction of the limits, above which no iteration starts
-_KEPT: Final = 5  # Number of solutions kept per period
-_ENOUGH: Final = 0.6  # Cost without a brake pulse below which brake pulses are not searched
-_HOPELESS: Final = 20.0  # Cost at which candidates are cut off
-_CLOSE: Final = 8e-6  # Spacing of the periods of the close search, s
-# Delay offsets of the close search, s: at most half of `_DELAY`
+_APART: Final = 30e-6  # Smallest distance of firing times between two starts, s; arbitrary
+_STARTS: Final = 2  # Number of starts per brake pulse; arbitrary
+_FAR: Final = 8.0  # Deviation, as a fraction of the limits, above which no iteration starts; arbitrary
+_KEPT: Final = 5  # Number of solutions kept per period; arbitrary
+_ENOUGH: Final = 0.6  # Cost without a brake pulse below which brake pulses are not searched; arbitrary
+_HOPELESS: Final = 20.0  # Cost at which candidates are cut off; arbitrary
+_CLOSE: Final = 8e-6  # Spacing of the periods of the close search, s; arbitrary
+# Delay offsets of the close search, s: at most half of `_DELAY`; arbitrary
 _LATER: Final = (-22e-6, -8e-6, 8e-6, 22e-6)
-_WIDER: Final = (0.75, 0.9, 1.0, 1.15, 1.35)  # Brake width factors of the close search
-_LEAST_BRAKE: Final = 0.05  # Smallest width of a brake pulse, as a fraction of the hammer's own width
-# Penalty for a change of branch between neighbouring periods, where the table is not interpolated
+_WIDER: Final = (0.75, 0.9, 1.0, 1.15, 1.35)  # Brake width factors of the close search; arbitrary
+_LEAST_BRAKE: Final = 0.05
+"""Smallest width of a brake pulse, as a fraction of the hammer's own width; arbitrary."""
+# Penalty for a change of branch between neighbouring periods, where the table is not interpolated; arbitrary
 _SWITCH: Final = 0.15
-_SAME: Final = 1e-6  # Firing-time difference below which two candidates are duplicates, s
-_ROUNDING: Final = 1e-12  # Tolerance by which ranges of delays are extended to include their ends, s
+_SAME: Final = 1e-6  # Firing-time difference below which two candidates are duplicates, s; arbitrary
+_ROUNDING: Final = 1e-12
+"""Tolerance by which ranges of delays are extended to include their ends, s; arbitrary."""
 
 
 def chosen(task: Task, periods: FloatArray) -> tuple[FloatArray, Ways]:

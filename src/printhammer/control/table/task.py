@@ -25,16 +25,20 @@ from printhammer.run.simulate import simulate
 from printhammer.run.window import time_scale, wait_of
 from printhammer.support.arrays import BoolArray, FloatArray
 
-# Distance from rest below which the hammer counts as settled, as a fraction of the distance to the pack
+# Distance from rest below which the hammer counts as settled, as a fraction of the distance to the pack;
+# arbitrary
 QUIET: Final = 2e-4
-_LONGEST: Final = 20e-3  # Lower bound of the time limit for settling after a single pulse, s
-_WINDOWS: Final = 2.0  # Lower bound of that time limit, in windows of the hammer (`printhammer.run.window`)
-_SAMPLE: Final = 2e-6  # Sampling interval of the motion that is tested for settling, s
+_LONGEST: Final = 20e-3  # Lower bound of the time limit for settling after a single pulse, s; arbitrary
+_WINDOWS: Final = 2.0
+"""Lower bound of that time limit, in windows of the hammer (`printhammer.run.window`); arbitrary."""
+_SAMPLE: Final = 2e-6  # Sampling interval of the motion that is tested for settling, s; arbitrary
 # Allowance for a late or wide print pulse before a brake pulse, s; arbitrary
 _WIDE: Final = 50e-6
-_TAIL: Final = 1e-3  # Shortest simulation time after the last slot, s: until the last contact is over
-_CONTACT: Final = 1.5  # Shortest simulation time after the last slot, in single-pulse times to departure
-_PIECE: Final = 4096  # Simulations per ensemble, which bounds the memory
+_TAIL: Final = 1e-3
+"""Shortest simulation time after the last slot, s: until the last contact is over; arbitrary."""
+_CONTACT: Final = 1.5
+"""Shortest simulation time after the last slot, in single-pulse times to departure; arbitrary."""
+_PIECE: Final = 4096  # Simulations per ensemble, which bounds the memory; arbitrary
 
 
 @dataclass(frozen=True)

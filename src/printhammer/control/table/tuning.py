@@ -35,8 +35,8 @@ from printhammer.printing.rates.variability import Perturbation, Variability, pe
 from printhammer.run.effort import DISPLAY, Effort, Keywords, computation
 from printhammer.support.arrays import FloatArray, IntArray
 
-HALVINGS: Final = 3  # Maximum number of bisections of the step between two rates
-# Deviation halfway between two rates, as a fraction of the limits, above which a rate is inserted
+HALVINGS: Final = 3  # Maximum number of bisections of the step between two rates; arbitrary
+# Deviation halfway between two rates, as a fraction of the limits, above which a rate is inserted; arbitrary
 BETWEEN: Final = 0.5
 
 
@@ -109,21 +109,23 @@ def _tuned_between(draft: Draft, lower: IntArray) -> Draft:
     return halfway
 
 
-FIRST: Final = 100.0  # Lowest rate of an automatic grid, Hz: every dot is printed from rest
-STEP: Final = 5.0  # Step of an automatic grid of rates, Hz
+FIRST: Final = 100.0  # Lowest rate of an automatic grid, Hz: every dot is printed from rest; arbitrary
+STEP: Final = 5.0  # Step of an automatic grid of rates, Hz; arbitrary
 SPREAD: Final = (
     *(Perturbation(current=share) for share in (0.03, -0.03)),
     *(Perturbation(travel=way) for way in (10e-6, -10e-6)),
 )
 """Perturbations of the hammers on which candidates are compared, and on which a robust table is tuned."""
 
-# Deviation, as a fraction of the limits, up to which a rate is kept in an automatic grid
+# Deviation, as a fraction of the limits, up to which a rate is kept in an automatic grid; arbitrary
 _USABLE: Final = 0.9
 _GAP: Final = 6
 """Largest number of successive unusable rates that are tuned again; arbitrary: a rate takes some seconds."""
-_TRIES: Final = 4  # Maximum number of times to search a rate again, without the candidates that failed
-_POOR: Final = 0.5  # Deviation, as a fraction of the limits, above which a requested rate is tuned again
-# Offsets of additional periods at which candidates are then searched, s
+_TRIES: Final = 4
+"""Maximum number of times to search a rate again, without the candidates that failed; arbitrary."""
+_POOR: Final = 0.5
+"""Deviation, as a fraction of the limits, above which a requested rate is tuned again; arbitrary."""
+# Offsets of additional periods at which candidates are then searched, s; arbitrary
 _AROUND: Final = 1e-6 * np.arange(-60.0, 61.0, 15.0)
 
 

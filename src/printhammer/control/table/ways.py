@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     Measure = Callable[[FloatArray, IntArray, FloatArray], FloatArray]
     Bounded = Callable[[FloatArray, IntArray, BoolArray], None]
 
-ROUNDS: Final = 7  # Maximum number of iterations
-LONGEST_STEP: Final = 25e-6  # Largest change of firing time or width per iteration, s
-# Levenberg-Marquardt damping, as a fraction of the limits for a change of `LONGEST_STEP`
+ROUNDS: Final = 7  # Maximum number of iterations; arbitrary
+LONGEST_STEP: Final = 25e-6  # Largest change of firing time or width per iteration, s; arbitrary
+# Levenberg-Marquardt damping, as a fraction of the limits for a change of `LONGEST_STEP`; arbitrary
 _DAMPING: Final = 0.02
 
 
@@ -107,26 +107,30 @@ def changes(
     return np.asarray(np.clip(np.column_stack([later, wider]), -longest, longest))
 
 
-BAD: Final = 0.75  # Cost above which more candidates are searched for
+BAD: Final = 0.75  # Cost above which more candidates are searched for; arbitrary
 _SECOND: Final = 2  # Index of the first firing after the two dots with solved pulses
 UNSTABLE: Final = 1e3
 """Lowest cost of an unstable candidate, which is never chosen, but may have a stable neighbour; arbitrary."""
 
-ROW: Final = 8  # Number of dots in the row that rates a candidate
-NOMINAL: Final = 8.0  # Weight of the design hammer relative to the perturbed hammers
-LEAST_OF_OWN: Final = 0.5  # Smallest pulse width, as a fraction of the width of the hammer's own pulse
-# Deviation of the second dot, as a fraction of the limits, at which a candidate is solved
+ROW: Final = 8  # Number of dots in the row that rates a candidate; arbitrary
+NOMINAL: Final = 8.0  # Weight of the design hammer relative to the perturbed hammers; arbitrary
+LEAST_OF_OWN: Final = 0.5
+"""Smallest pulse width, as a fraction of the width of the hammer's own pulse; arbitrary."""
+# Deviation of the second dot, as a fraction of the limits, at which a candidate is solved; arbitrary
 _SOLVED: Final = 1e-3
-_STEPS: Final = (1e-6, 0.5e-6)  # Finite-difference steps of firing time and width, s
-# Deviation of the second dot, as a fraction of the limits, above which a candidate is not a solution
+_STEPS: Final = (1e-6, 0.5e-6)  # Finite-difference steps of firing time and width, s; arbitrary
+# Deviation of the second dot, as a fraction of the limits, above which a candidate is not a solution;
+# arbitrary
 _RIGHT: Final = 0.02
-_WRONG: Final = 1.0  # Cost added to a candidate that is not a solution, so that solutions rank first
+_WRONG: Final = 1.0
+"""Cost added to a candidate that is not a solution, so that solutions rank first; arbitrary."""
 STABLE: Final = 0.97
 """Largest absolute multiplier, from dot to dot, of an admissible row of dots: inside the unit circle,
-with a margin for interpolation and timer ticks."""
+with a margin for interpolation and timer ticks. Arbitrary."""
 
-_FAR_OFF: Final = 5.0  # Deviation, as a fraction of the limits, at which an RMS term is cut off
-_ROUNDING: Final = 1e-12  # Tolerance by which ranges of firing times are extended to include their ends, s
+_FAR_OFF: Final = 5.0  # Deviation, as a fraction of the limits, at which an RMS term is cut off; arbitrary
+_ROUNDING: Final = 1e-12
+"""Tolerance by which ranges of firing times are extended to include their ends, s; arbitrary."""
 
 
 class Ways(NamedTuple):

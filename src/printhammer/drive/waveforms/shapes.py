@@ -26,11 +26,11 @@ from printhammer.errors import InputError
 from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import quantity
 
-TAIL: Final = 1e-3
+TAIL: Final = 1e-3  # Arbitrary
 """Largest remainder of a decaying waveform that the next waveform may cut off, relative to the peak."""
 
 _SAMPLES: Final = 257  # Samples of the remaining waveform; arbitrary
-_ROUNDING: Final = 1e-14  # Relative difference between times that counts as rounding
+_ROUNDING: Final = 1e-14  # Relative difference between times that counts as rounding; arbitrary
 
 
 class Chain(Waveform):

@@ -30,7 +30,7 @@ from printhammer.run.motion import Motion
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray
 
-POINTS: Final = 600
+POINTS: Final = 600  # Arbitrary
 """Number of strobe points drawn under the orbits; a third as many firings are discarded before them."""
 
 _MARKS: Final = (("o", style.BLUE), ("s", style.ORANGE), ("^", style.GREEN), ("D", style.YELLOW))

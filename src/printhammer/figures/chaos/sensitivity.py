@@ -20,7 +20,7 @@ from printhammer.support.arrays import FloatArray
 SHOWN: Final = ("flight_time", "impact_speed", "peak_force", "net_loss")
 """Quantities drawn by default: flight time, impact speed, peak force and net loss."""
 
-_COLUMNS: Final = 2  # Panels in a row
+_COLUMNS: Final = 2  # Panels in a row; arbitrary
 _BAR: Final = 0.62  # Height of a bar, as a fraction of the spacing; arbitrary
 
 

@@ -40,7 +40,7 @@ _CYCLE: Final = 8
 
 _SMALL: Final = 0.04
 """Area of an aperiodic attractor, relative to the window, below which an inset enlarges it; arbitrary."""
-# Lower left corners of an inset, fractions of the axes, best first
+# Lower left corners of an inset, fractions of the axes, best first; arbitrary
 _PLACES: Final = ((0.55, 0.36), (0.06, 0.36), (0.06, 0.06), (0.55, 0.06))
 _INSET: Final = (0.38, 0.42)
 """Width and height of an inset, as fractions of the axes; arbitrary."""

@@ -39,8 +39,8 @@ UNKNOWN: Final = "#e4e4e4"
 LOWEST, HIGHEST, RATES, TIMES = 500.0, 2500.0, 640, 1024
 """Defaults of Figs. 8 and 9: lowest and highest rate, Hz, and the numbers of rates and of times."""
 
-_KILO: Final = 1e3  # Highest rate of a map, Hz, from which on its axis is in kHz
-_LOST: Final = 2.0  # Width of the lines of lost dots, points
+_KILO: Final = 1e3  # Highest rate of a map, Hz, from which on its axis is in kHz; arbitrary
+_LOST: Final = 2.0  # Width of the lines of lost dots, points; arbitrary
 
 
 def chart_of(

@@ -35,7 +35,8 @@ from printhammer.support.arrays import FloatArray
 CURVE: Final = "curve:"
 """Label prefix of the curves that texts and insets must not cover."""
 
-_SPACING: Final = 0.004  # Spacing of points on a curve, as a fraction of the axes; smaller than any label
+_SPACING: Final = 0.004
+"""Spacing of points on a curve, as a fraction of the axes; smaller than any label; arbitrary."""
 
 
 def occupied(ax: Axes) -> FloatArray:
@@ -92,7 +93,7 @@ _LINE_NAME: Final = (0.095, 0.06)
 """Width and height of a name on a horizontal line, as fractions of the axes; arbitrary."""
 
 _BELOW: Final = 30.0
-"""Distance from a panel to a legend below its tick labels and axis label, in points."""
+"""Distance from a panel to a legend below its tick labels and axis label, in points; arbitrary."""
 
 
 def place_lines(ax: Axes, hammer: Hammer, shown: Scale, side: Literal["x", "y"] = "y") -> None:

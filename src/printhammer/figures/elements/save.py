@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 FORMATS: Final = ("svg", "pdf", "png")
 
 DOTS_PER_INCH: Final = 200.0
-"""Default resolution of a PNG, dots per inch."""
+"""Default resolution of a PNG, dots per inch; arbitrary."""
 
 _METADATA: Final[dict[str, dict[str, Any]]] = {
     # No dates or versions, which would make equal figures differ.

@@ -38,11 +38,11 @@ SURFACES: Final = {"backstop": "#8a8a8a", "pack": YELLOW}
 """Colours of backstop and pack, used as tints."""
 
 WIDTH: Final = 6.4
-"""Default width of a figure, in inches."""
+"""Default width of a figure, in inches; arbitrary."""
 
 TEXT, SMALL, TINY = 9.0, 8.0, 6.5  # Font sizes, points; arbitrary
 LINE, THIN, HAIR = 1.4, 0.9, 0.6  # Line widths, points; arbitrary
-_LINE_OF_REMARK: Final = 112  # Number of characters in a line of a remark
+_LINE_OF_REMARK: Final = 112  # Number of characters in a line of a remark; arbitrary
 
 RC: Final[dict[str, Any]] = {
     "axes.edgecolor": INK,

@@ -233,7 +233,7 @@ def phase_plane(hammer: Hammer, *, duration: float | str | None = None) -> Figur
 CURRENTS: Final = (0.0, 0.5, 1.0, 1.5, 2.0)
 """Coil currents drawn in the paper's Fig. 2, A."""
 
-_POINTS: Final = 400  # Points of a static curve: more than a picture resolves
+_POINTS: Final = 400  # Points of a static curve: more than a picture resolves; arbitrary
 _HALF_WIDTH, _ENOUGH, _PREFERRED = 0.04, 0.055, 0.3
 """Half-width, sufficient clearance and preferred position of a label, in fractions of the axes; arbitrary."""
 

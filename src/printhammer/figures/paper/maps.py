@@ -65,15 +65,15 @@ def frequency_map(
 CURVES: Final = 81
 """Number of curves of Fig. 8."""
 
-_TIMES: Final = 1361  # Times of a curve: more than a picture resolves
-_LEAN: Final = (0.19, 0.66)
+_TIMES: Final = 1361  # Times of a curve: more than a picture resolves; arbitrary
+_LEAN: Final = (0.19, 0.66)  # Arbitrary
 """Offset of the last curve relative to the first, to the right and up, in units of the picture width."""
 
 _ACROSS: Final = 0.80
-"""Width of each displacement curve, in units of the picture width."""
+"""Width of each displacement curve, in units of the picture width; arbitrary."""
 
 _TALL: Final = 0.22
-"""Height of a curve over the displacement range, in units of the picture width."""
+"""Height of a curve over the displacement range, in units of the picture width; arbitrary."""
 
 _TICK: Final = 0.008  # Length of a tick, in units of the picture width; arbitrary
 
@@ -81,11 +81,11 @@ _SHEETS: Final = 2.0
 """Common z-order of curves and the sheets below them, so that they are drawn in order of creation."""
 
 _FLAT: Final = 4e-4
-"""Tolerance of thinned curves, in units of the picture width; corresponds to 0.15 points."""
+"""Tolerance of thinned curves, in units of the picture width; corresponds to 0.15 points. Arbitrary."""
 
 _NAME: Final[dict[str, Any]] = {"fontsize": "medium"}  # Style of the axis names
 _POST: Final = 0.13
-"""Distance from the displacement axis to the curves, in units of the picture width."""
+"""Distance from the displacement axis to the curves, in units of the picture width; arbitrary."""
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ PERIODS: Final = tuple(hundredths / 1e5 for hundredths in range(135, 75, -5))
 POINTS: Final = 200
 """Number of strobe points in each panel of Fig. 11."""
 
-_COLUMNS: Final = 3  # Panels in a row
+_COLUMNS: Final = 3  # Panels in a row; arbitrary
 
 
 @styled

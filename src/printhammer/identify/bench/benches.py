@@ -38,31 +38,31 @@ from printhammer.run.supply import typical_current
 from printhammer.run.window import wait_of
 from printhammer.support.arrays import FloatArray
 
-DISPLACEMENTS: Final = 31
+DISPLACEMENTS: Final = 31  # Arbitrary
 """Default number of displacements in a static force table, evenly spaced from backstop to platen."""
 
 CURRENTS: Final = 6
-"""Default number of coil currents in a static force table, evenly spaced from zero."""
+"""Default number of coil currents in a static force table, evenly spaced from zero; arbitrary."""
 
 HIGHEST_CURRENT: Final = 1.25
-"""Default highest coil current, as a multiple of the waveform's peak."""
+"""Default highest coil current, as a multiple of the waveform's peak; arbitrary."""
 
 PEAKS: Final = (0.3, 0.45, 0.6)
 """Default peak indentations of the load cycles, as fractions of the pack thickness.
 
-If the pack has no thickness, the largest peak is the indentation that a single pulse causes.
+If the pack has no thickness, the largest peak is the indentation that a single pulse causes. Arbitrary.
 """
 
 BRANCH_POINTS: Final = 30
-"""Default number of readings per branch of a load cycle."""
+"""Default number of readings per branch of a load cycle; arbitrary."""
 
 SPEEDS: Final = (0.1, 2.0, 40)
-"""Default lowest and highest impact speed on the backstop, m/s, and number of impacts."""
+"""Default lowest and highest impact speed on the backstop, m/s, and number of impacts; arbitrary."""
 
 BEFORE: Final = 100e-6
-"""Default time between the start of the record and the firing, s."""
+"""Default time between the start of the record and the firing, s; arbitrary."""
 
-_FINEST: Final = 0.5e-6
+_FINEST: Final = 0.5e-6  # Arbitrary
 """Largest time step of the displacement before low-pass filtering, s: about 1/100 of a contact's duration."""
 
 _MOST: Final = 2_000_000
@@ -75,7 +75,7 @@ _LONGEST: Final = 30
 """Maximum number of doublings of the simulation time for a rebound; arbitrary."""
 
 _LEAST: Final = 1e-6
-"""Lower bound of the coefficient of restitution in the search for the rebound speed."""
+"""Lower bound of the coefficient of restitution in the search for the rebound speed; arbitrary."""
 
 
 class Bench(Declared, eq=False):

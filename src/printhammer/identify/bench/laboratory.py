@@ -49,9 +49,9 @@ SI: Final = {name: si for name, (si, _unit) in UNITS.items()}
 """SI unit of each column, by name of the column."""
 
 SAMPLING_RATE: Final = 1e6
-"""Default sampling rate of a record, Hz."""
+"""Default sampling rate of a record, Hz; arbitrary."""
 BANDWIDTH: Final = 200e3
-"""Default bandwidth of the sensor of a record, Hz."""
+"""Default bandwidth of the sensor of a record, Hz; arbitrary."""
 
 _LENGTH: Final = Channel(noise=Amount(0.2e-6), resolution=Amount(0.05e-6))
 _FORCE: Final = Channel(noise=Amount(0.005, FULL_SCALE), resolution=Amount(0.0005, FULL_SCALE))

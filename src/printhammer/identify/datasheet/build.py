@@ -39,7 +39,7 @@ INDUCTANCE_ERROR: Final = 0.05
 """Relative standard error of a printed inductance; assumed."""
 
 DERIVED: Final = 0.5
-"""Ratio of posterior to prior standard deviation below which a constant counts as derived."""
+"""Ratio of posterior to prior standard deviation below which a constant counts as derived; arbitrary."""
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,7 @@ def _classify(
     )
 
 
-IRON: Final = 7860.0  # Density of iron, kg/m^3
+IRON: Final = 7860.0  # Density of iron, kg/m^3; textbook value
 _HEAVY: Final = 3.0  # Ratio of required to stated armature mass above which a fit is implausible; arbitrary
 
 

@@ -64,7 +64,7 @@ TABLES: Final = {
 
 _ZERO: Final = ("end_gap", "spring.preload", "spring.stiffness", "stop.restitution", "stop.damping")
 _OTHERS: Final = ("force", "inductance", "driver", "assumed", "why")
-_PAIR: Final = 2  # Length of a pair of gap and force
+_PAIR: Final = 2  # Length of a pair of gap and force, by definition
 _WHOLE: Final = 1e6  # Magnitude up to which whole numbers are written without a decimal point; arbitrary
 
 

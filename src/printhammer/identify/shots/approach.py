@@ -16,16 +16,16 @@ from printhammer.identify.shots.shooting import Chain, Shooting
 from printhammer.results import Declared, part
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
-_WIDE: Final = 10.0
+_WIDE: Final = 10.0  # Arbitrary
 """Initial width of the gap penalty, relative to the largest gap; a gap so wide costs as much as all data."""
 _NARROW: Final = 0.001
-"""Width of the gap penalty, normalised by stroke and typical speed, at which the approach ends."""
-_RISE: Final = 0.3  # Factor on the width of the gap penalty after a successful step
-_LONGEST: Final = 0.3
+"""Width of the gap penalty, normalised by stroke and typical speed, at which the approach ends; arbitrary."""
+_RISE: Final = 0.3  # Factor on the width of the gap penalty after a successful step; arbitrary
+_LONGEST: Final = 0.3  # Arbitrary
 """Largest change per step: relative for a constant, normalised by stroke and typical speed for a state."""
 _HALVINGS: Final = 6  # Maximum number of step halvings; arbitrary
 _TRIES: Final = 2
-"""Maximum number of Gauss-Newton steps at each width of the gap penalty."""
+"""Maximum number of Gauss-Newton steps at each width of the gap penalty; arbitrary."""
 
 
 class Prior(Declared, eq=False):

@@ -24,13 +24,13 @@ from printhammer.identify.shots.shooting import Chain, Shooting
 from printhammer.results import Declared, part
 from printhammer.support.arrays import BoolArray, FloatArray
 
-_DEGENERATE: Final = 1e5
+_DEGENERATE: Final = 1e5  # Arbitrary
 """Condition number above which difference quotients no longer separate the columns of a Jacobian."""
 _TIED: Final = 0.98
-"""Absolute correlation above which two constants are reported as hardly separable."""
+"""Absolute correlation above which two constants are reported as hardly separable; arbitrary."""
 _WEAK: Final = 0.1
-"""Relative standard error above which a constant is reported as weakly determined."""
-_SHARE: Final = 0.02
+"""Relative standard error above which a constant is reported as weakly determined; arbitrary."""
+_SHARE: Final = 0.02  # Arbitrary
 """Component in the degenerate direction, relative to the largest, above which a constant is named."""
 
 
@@ -122,24 +122,24 @@ def changes_if_fitted(
 
 _MOST_STEPS: Final = 40  # Iteration limit of the Gauss-Newton method; arbitrary
 _FULL: Final = 0.4
-"""Largest relative change of a constant in one Gauss-Newton step."""
-_SHORTEST: Final = 1e-3  # Smallest step fraction of the damping
+"""Largest relative change of a constant in one Gauss-Newton step; arbitrary."""
+_SHORTEST: Final = 1e-3  # Smallest step fraction of the damping; arbitrary
 _EXACT: Final = 1e-11
-"""Relative change of all constants below which a fit to exact data has converged."""
-_NEAR, _DONE = 1.0, 1e-3
+"""Relative change of all constants below which a fit to exact data has converged; arbitrary."""
+_NEAR, _DONE = 1.0, 1e-3  # Arbitrary
 """Step sizes, in standard errors, below which outliers are excluded and below which the fit has converged."""
-_NARROW, _CLOSED = 1e-2, 1e-8
+_NARROW, _CLOSED = 1e-2, 1e-8  # Arbitrary
 """Gap sizes, normalised, below which outliers are excluded and below which the fit has converged."""
 _FLOOR: Final = 1e-7
-"""Noise floor, as a fraction of the stroke; smaller residuals are never outliers."""
-_LEAST: Final = 1e-16
+"""Noise floor, as a fraction of the stroke; smaller residuals are never outliers. Arbitrary."""
+_LEAST: Final = 1e-16  # Arbitrary
 """Standard deviation, m, that is assumed for the noise of exact data, so that their weight is finite."""
 _REACH: Final = 3.0
-"""Half-width of a profile likelihood, in standard errors."""
+"""Half-width of a profile likelihood, in standard errors; arbitrary."""
 _POINTS: Final = 7
-"""Number of points of a profile likelihood."""
+"""Number of points of a profile likelihood; arbitrary."""
 _LOST: Final = 1e-7
-"""Relative singular value below which rounding errors dominate a direction."""
+"""Relative singular value below which rounding errors dominate a direction; arbitrary."""
 _NO_MOTION: Final = "the simulated hammer does not move, so that the records cannot be compared"
 
 

@@ -37,14 +37,14 @@ from printhammer.identify.shots.shot import FEWEST, Pulse, Shot, fit_pulse, read
 from printhammer.support.arrays import FloatArray
 
 _REJECTED: Final = 0.01
-"""Significance level below which the F-test rejects the model."""
-_LARGER: Final = 1.1
+"""Significance level below which the F-test rejects the model; arbitrary."""
+_LARGER: Final = 1.1  # Arbitrary
 """Largest accepted ratio of RMS residual to estimated noise; allows for the error of the estimate."""
 _DEGREES: Final = 0.22
-"""Degrees of freedom per sample of the noise estimate (median of third differences)."""
+"""Degrees of freedom per sample of the noise estimate (median of third differences), from simulated noise."""
 _TOLD: Final = 0.05
-"""Relative standard error below which a held constant is reported as one that could be fitted."""
-_OFF: Final = 5.0  # Number of standard errors above which a deviation is reported
+"""Relative standard error below which a held constant is reported as one that could be fitted; arbitrary."""
+_OFF: Final = 5.0  # Number of standard errors above which a deviation is reported; arbitrary
 
 
 def tested(shots: Sequence[Shot], solution: Solution, count: int) -> tuple[float, str]:
@@ -160,7 +160,7 @@ def further(fit: GaussNewton, solution: Solution, hammer: Hammer, rejected: str)
 
 _DAMPING: Final = "backstop.damping"
 _FIRST_GUESS: Final = 0.3
-"""Initial guess of the ratio l/k if the hammer has no backstop damping, s/m."""
+"""Initial guess of the ratio l/k if the hammer has no backstop damping, s/m; arbitrary."""
 
 
 def fit_motion(

@@ -25,10 +25,10 @@ from printhammer.identify.shots.shot import Pulse, Shot, stroke_of
 from printhammer.run.ensemble import Ensemble
 from printhammer.support.arrays import FloatArray, IntArray
 
-_STEP: Final = 1e-7
+_STEP: Final = 1e-7  # Arbitrary
 """Finite-difference step: relative for a constant, normalised by stroke and typical speed for a state."""
 _FINEST: Final = 2e-6
-"""Largest time step of the displacement before low-pass filtering, s."""
+"""Largest time step of the displacement before low-pass filtering, s; arbitrary."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,11 +29,11 @@ from printhammer.units import from_si
 Surface = Literal["pack", "backstop"]
 
 FEWEST: Final = 5
-"""Smallest number of samples in a detected contact."""
-_CLEAR: Final = 0.005
+"""Smallest number of samples in a detected contact; arbitrary."""
+_CLEAR: Final = 0.005  # Arbitrary
 """Distance from a surface, as a fraction of the stroke, that confirms the beginning or end of a contact."""
 _WINDOW: Final = 15e-6
-"""Longest averaging time for contact detection, s; shorter than any contact."""
+"""Longest averaging time for contact detection, s; shorter than any contact. Arbitrary."""
 
 
 class Touch(Declared):
@@ -251,13 +251,13 @@ def _um(metres: float) -> str:
 
 
 _FLOOR: Final = 1e-9
-"""Noise, as a fraction of the amplitude, below which a record counts as exact."""
-_POOR: Final = 1e-3
+"""Noise, as a fraction of the amplitude, below which a record counts as exact; arbitrary."""
+_POOR: Final = 1e-3  # Arbitrary
 """RMS residual of the fitted waveform, as a fraction of the peak current, that is always accepted."""
-_LARGER: Final = 1.2
+_LARGER: Final = 1.2  # Arbitrary
 """Ratio of RMS residual to noise above which the waveform does not describe the recorded current."""
 _INTERVALS: Final = 200
-"""Largest number of segments in a waveform sampled from the record."""
+"""Largest number of segments in a waveform sampled from the record; arbitrary."""
 
 
 class Pulse(Declared, eq=False):

@@ -30,16 +30,16 @@ from printhammer.results import Declared, part
 from printhammer.support.arrays import FloatArray, IntArray
 
 LEVEL: Final = 0.01
-"""Significance level below which a law is rejected."""
+"""Significance level below which a law is rejected; arbitrary."""
 
 _RUNS: Final = "residuals of neighbours are correlated: the data deviate from the law, or the sensor is slow"
-_COPY: Final = 1e-6
+_COPY: Final = 1e-6  # Arbitrary
 """Singular value of the normalised Jacobian below which a term counts as collinear with its columns."""
 
 _TOGETHER: Final = "the excluded rows are consecutive: there the data deviate from the law"
 
 _HARD_TO_TELL: Final = 30.0
-"""Condition number above which the result names the constants that the data hardly separate."""
+"""Condition number above which the result names the constants that the data hardly separate; arbitrary."""
 
 
 def judge(
@@ -164,12 +164,12 @@ def inseparable(solution: Solution, names: Sequence[str]) -> list[str]:
 
 
 _WEAK: Final = 0.1
-"""Relative standard error above which the profile likelihood of a constant is computed."""
+"""Relative standard error above which the profile likelihood of a constant is computed; arbitrary."""
 
-_GRID: Final = 25  # Number of values of a profile likelihood
+_GRID: Final = 25  # Number of values of a profile likelihood; arbitrary
 
 _COARSE: Final = 1e-8
-"""Relative tolerance of the least-squares iterations of a profile likelihood."""
+"""Relative tolerance of the least-squares iterations of a profile likelihood; arbitrary."""
 
 
 class Data(Declared, eq=False):

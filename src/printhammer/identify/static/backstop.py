@@ -34,7 +34,7 @@ _SERIES: Final = (1.0, -2 / 3, 4 / 9, -44 / 135, 104 / 405, -40 / 189, 7648 / 42
 """Coefficients of the power series of y / z in z, derived from the restitution law."""
 
 _SMALL: Final = 0.02
-"""Largest |z| at which the power series replaces the logarithms, which suffer cancellation."""
+"""Largest |z| at which the power series replaces the logarithms, which suffer cancellation; arbitrary."""
 
 
 def rebound(z: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -95,9 +95,9 @@ class RestitutionLaw:
 RATIO: Final = "backstop.damping / backstop.stiffness"
 """Key of the ratio l/k, in s/m."""
 
-_ROWS: Final = 6  # Smallest number of rebounds for a fit with an error
+_ROWS: Final = 6  # Smallest number of rebounds for a fit with an error; arbitrary
 _SPAN: Final = 1.5
-"""Smallest ratio of largest to smallest impact speed at which the law can be tested."""
+"""Smallest ratio of largest to smallest impact speed at which the law can be tested; arbitrary."""
 
 _AXES: Final = (("impact speed", "m/s"), ("rebound speed", "m/s"))
 

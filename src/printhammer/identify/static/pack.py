@@ -26,10 +26,10 @@ from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 from printhammer.support.tables.readings import Readings, read_table
 from printhammer.units import from_si
 
-_TURN: Final = 0.05
+_TURN: Final = 0.05  # Arbitrary
 """Smallest reversal, as a fraction of the largest indentation, that counts as a change of direction."""
 
-_FALL: Final = 0.05
+_FALL: Final = 0.05  # Arbitrary
 """Smallest drop of the loading force, as a fraction of the largest force, that counts as a decrease."""
 
 
@@ -129,13 +129,13 @@ def check_loading(table: Readings, cycles: Cycles) -> None:
 LOADING, UNLOADING = 2.7, 11.0
 """Exponents of the loading and unloading branches of equation (5)."""
 
-_SPARE: Final = 4  # Smallest number of rows beyond the number of unknowns
-_LOADING_ROWS: Final = 4  # Smallest number of rows of a loading branch
+_SPARE: Final = 4  # Smallest number of rows beyond the number of unknowns; arbitrary
+_LOADING_ROWS: Final = 4  # Smallest number of rows of a loading branch; arbitrary
 _MEETS: Final = 0.02
 """Smallest relative deviation of a fitted from a measured turning point that is reported; arbitrary."""
 
 _FAR: Final = 1.0
-"""Largest accepted absolute logarithm of the ratio of fitted to measured turning point."""
+"""Largest accepted absolute logarithm of the ratio of fitted to measured turning point; arbitrary."""
 
 
 class PackLaw:

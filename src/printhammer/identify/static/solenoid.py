@@ -40,13 +40,13 @@ _REACH: Final = 1e3
 _ABSENT_HIGH: Final = ("saturation_flux", "leakage_reach")
 """Constants whose effect vanishes when they are large; the effect of every other constant vanishes at 0."""
 
-_FACTOR: Final = 4.0
+_FACTOR: Final = 4.0  # Arbitrary
 """Ratio of force to i^2/2 dL/dg that saturation cannot explain, e.g. 4.4 for forces in lbf instead of N."""
 
 _SPARE: Final = 4
 """Smallest number of rows in excess of parameters for which standard errors are computed; arbitrary."""
 
-_STARTS: Final = 8
+_STARTS: Final = 8  # Arbitrary
 """Number of initial guesses of the multi-start search: an estimate, and random points around the estimate."""
 
 

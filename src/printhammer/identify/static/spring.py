@@ -17,7 +17,7 @@ from printhammer.identify.static.assemble import Data, assemble, check_rows, jud
 from printhammer.support.arrays import FloatArray
 from printhammer.support.tables.readings import read_table
 
-_ROWS = 5  # Smallest number of rows for two constants and their errors
+_ROWS = 5  # Smallest number of rows for two constants and their errors; arbitrary
 
 
 class SpringLaw:

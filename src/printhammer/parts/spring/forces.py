@@ -32,10 +32,10 @@ LEVELS = True
 """Whether the slope of the law changes at the positions that `spring_level` returns."""
 
 ROOM: Final = 64
-"""Number of packed constants that the kernel reserves for a spring."""
+"""Number of packed constants that the kernel reserves for a spring; arbitrary."""
 
 WIDTH: Final = 5
-"""Number of packed constants of a force or contact."""
+"""Number of packed constants of a force or contact, by definition of the row."""
 
 MOST: Final = (ROOM - 1) // WIDTH
 """Maximum number of forces and contacts, including the spring."""

@@ -30,21 +30,24 @@ from printhammer.support.arrays import BoolArray
 
 MAX_CURRENT: Final = 2.0  # Default limit on the coil current of a train, A: the range of the paper's Fig. 2
 
-FORCES: Final = (0.3, 0.95)  # Range of peak forces that count, as fractions of the single-pulse force
+FORCES: Final = (0.3, 0.95)
+"""Range of peak forces that count, as fractions of the single-pulse force; arbitrary."""
 
-FEWEST: Final = 6  # Smallest number of consecutive dots, without a backstop touch, that is buzz printing
+FEWEST: Final = 6
+"""Smallest number of consecutive dots, without a backstop touch, that is buzz printing; arbitrary."""
 
 _PULSES: Final = 9  # Number of pulses of a train, as in the paper
-_PERIODS: Final = 96  # Number of trial periods of even trains
+_PERIODS: Final = 96  # Number of trial periods of even trains; arbitrary
 _DELAY_STEP: Final = 2e-6
-"""Spacing of the grid of trial delays, s."""
+"""Spacing of the grid of trial delays, s; arbitrary."""
 
-_DELAYS: Final = 400  # Maximum number of delays searched; a slow hammer gets a wider spacing instead
+_DELAYS: Final = 400
+"""Maximum number of delays searched; a slow hammer gets a wider spacing instead; arbitrary."""
 
-PATIENCE: Final = 3.0
+PATIENCE: Final = 3.0  # Arbitrary
 """Time limit for a dot, as a multiple of the single pulse's time from firing to the end of contact."""
 
-_ZOOMS, _PER_ZOOM = 2, 4  # Number of refinements, and factor on the spacing of each
+_ZOOMS, _PER_ZOOM = 2, 4  # Number of refinements, and factor on the spacing of each; arbitrary
 
 
 class Run(Declared):

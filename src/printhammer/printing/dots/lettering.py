@@ -29,7 +29,7 @@ from printhammer.errors import InputError
 from printhammer.support.arrays import BoolArray
 
 NAME: Final = "nine-wire"
-WIRES: Final = 9  # Number of wires of the built-in font
+WIRES: Final = 9  # Number of wires of the built-in font: rows of a character in the font file
 ADVANCE: Final = 6
 """Character pitch: number of columns from the start of a character to the start of the next character."""
 
@@ -135,7 +135,7 @@ def _characters(path: Path) -> frozenset[int]:
     return frozenset(FT2Font(str(path)).get_charmap())
 
 
-COLUMNS: Final = 40  # Default number of characters in a print line
+COLUMNS: Final = 40  # Default number of characters in a print line; arbitrary
 
 _NAMED: Final = 8  # Largest number of missing characters named in a message; arbitrary
 

@@ -24,12 +24,12 @@ from printhammer.run.window import wait_of
 from printhammer.support.arrays import BoolArray
 
 SETTLED: Final = 0.01
-"""Distance from rest, as a fraction of the stroke, within which the armature counts as settled."""
+"""Distance from rest, as a fraction of the stroke, within which the armature counts as settled; arbitrary."""
 
-CYCLE: Final = 20e-3  # Shortest duration of the simulation, s
+CYCLE: Final = 20e-3  # Shortest duration of the simulation, s; arbitrary
 
-_WINDOWS: Final = 2.0  # Shortest duration of the simulation, in windows (`printhammer.run.window`)
-_SPACING: Final = 1e-6  # Spacing of the samples, s
+_WINDOWS: Final = 2.0  # Shortest duration of the simulation, in windows (`printhammer.run.window`); arbitrary
+_SPACING: Final = 1e-6  # Spacing of the samples, s; arbitrary
 _BISECTIONS: Final = 40  # Bisections of the settling time, down to rounding error
 _SAMPLES: Final = 4001  # Number of samples of a motion from which the time of exact rest is found; arbitrary
 _MARGIN: Final = 0.99  # Reduction of the undisturbed rate, since integration errors shift the rest; arbitrary

@@ -27,9 +27,9 @@ from printhammer.printing.dots.lettering import lettered
 from printhammer.printing.dots.nominal import pulse_of
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
-SLOTS: Final = 8  # Number of slots of a pattern from rest, and order of the de Bruijn cycle
+SLOTS: Final = 8  # Number of slots of a pattern from rest, and order of the de Bruijn cycle; arbitrary
 
-LEAD_IN: Final = 64  # Slots simulated before the first judged slot of the cycle
+LEAD_IN: Final = 64  # Slots simulated before the first judged slot of the cycle; arbitrary
 
 FIRST_SLOT: Final = 1e-3
 """Time of slot 0, s, so that a drive may fire ahead of slot 0, but not before time 0; arbitrary."""
@@ -169,9 +169,9 @@ def name_of(strategy: Strategy) -> str:
     return str(name).replace("_", " ")
 
 
-ROW: Final = 200  # Number of slots of a row of dots
+ROW: Final = 200  # Number of slots of a row of dots; arbitrary
 
-STEPS: Final = (1, 2, 3)  # Slots from one dot to the next in the rows
+STEPS: Final = (1, 2, 3)  # Slots from one dot to the next in the rows; arbitrary
 
 TEXT: Final = "Pack my box with five dozen liquor jugs 0123456789"
 """Text of the test line: every letter of the alphabet and every digit."""

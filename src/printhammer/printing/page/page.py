@@ -48,10 +48,10 @@ from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArra
 DENSITY: Final = 1.0
 """Optical density of the single-pulse dot, an assumption: a tenth of the light is reflected."""
 
-_THICKNESS: Final = 4 / 3  # Default wire diameter, as a multiple of the wire pitch
+_THICKNESS: Final = 4 / 3  # Default wire diameter, as a multiple of the wire pitch; arbitrary
 _HEIGHT: Final = 9 * 25.4e-3 / 72  # Height of a column of nine wires 1/72 in apart, m
 LINE_GAP: Final = 1 / 3
-"""Gap between print lines, as a fraction of the height of the wire column."""
+"""Gap between print lines, as a fraction of the height of the wire column; arbitrary."""
 
 
 class Head(Declared):
@@ -132,7 +132,7 @@ def head_of(
 
 _HEAD: Final = ("wire_pitch", "pitch", "line_pitch", "wire_diameter", "density")
 _FAULTS: Final = np.array([*FAULTS, "none"], "U16")
-_PIECE: Final = 512  # Number of wire lines simulated in one batch, which bounds the memory
+_PIECE: Final = 512  # Number of wire lines simulated in one batch, which bounds the memory; arbitrary
 _MOST_DOTS: Final = 5_000_000  # Largest number of dots of a page; arbitrary, bounds the time
 
 

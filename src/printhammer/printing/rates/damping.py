@@ -123,17 +123,17 @@ def materials(hammer: Hammer, single: Nominal) -> list[Material]:
     return listed
 
 
-CURRENT: Final = 2.0  # Default current limit, A
+CURRENT: Final = 2.0  # Default current limit, A: the range of the paper's Fig. 2
 
-STEP: Final = 25.0  # Default step of the rate grid, Hz
+STEP: Final = 25.0  # Default step of the rate grid, Hz; arbitrary
 
 LEAST: Final = 0.6
 MOST: Final = 1.6
-"""Range of the amplitude factors searched for the nominal print force."""
+"""Range of the amplitude factors searched for the nominal print force; arbitrary."""
 
-_COARSE: Final = 41  # Number of amplitude factors of the first grid
-_FINE: Final = 9  # Number of amplitude factors of each refinement
-_ROUNDS: Final = 5  # Number of refinements
+_COARSE: Final = 41  # Number of amplitude factors of the first grid; arbitrary
+_FINE: Final = 9  # Number of amplitude factors of each refinement; arbitrary
+_ROUNDS: Final = 5  # Number of refinements; arbitrary
 
 
 class DampingStudy(Result):

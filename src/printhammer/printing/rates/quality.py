@@ -46,7 +46,8 @@ from printhammer.run.window import wait_of
 from printhammer.support.arguments import checked
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
-PITCH: Final = 25.4e-3 / 60.0  # Default distance between neighbouring slots on the paper, m: 60 per inch
+PITCH: Final = 25.4e-3 / 60.0
+"""Default distance between neighbouring slots on the paper, m: 60 per inch; arbitrary."""
 
 _SPREADS: Final = {"flight_time": "s", "force": "N", "indentation": "m", "arrival": "s", "placement": "m"}
 

@@ -49,16 +49,16 @@ from printhammer.run.effort import DEFAULT, Effort, InThreads, computation
 from printhammer.run.window import scaled_rate
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
-FIRST: Final = 100.0  # First rate of the grid of the paper's hammer, Hz
+FIRST: Final = 100.0  # First rate of the grid of the paper's hammer, Hz; arbitrary
 
-LAST: Final = 4000.0  # Last rate of the grid of the paper's hammer, Hz
+LAST: Final = 4000.0  # Last rate of the grid of the paper's hammer, Hz; arbitrary
 
-STEP: Final = 5.0  # Step of the grid of the paper's hammer, Hz
+STEP: Final = 5.0  # Step of the grid of the paper's hammer, Hz; arbitrary
 
 MOST_RATES: Final = 10_000  # Largest number of rates in a grid; arbitrary
 
 _AT_FIRST: Final = 2  # Number of rates in the first ensemble, doubled for each further ensemble; arbitrary
-_FEW: Final = 3  # Number of slots of the patterns that are simulated first
+_FEW: Final = 3  # Number of slots of the patterns that are simulated first; arbitrary
 _AT_ONCE: Final = 16  # Largest number of rates per ensemble; arbitrary
 _HAMMERS_AT_ONCE: Final = 32  # Number of hammers per ensemble; arbitrary
 

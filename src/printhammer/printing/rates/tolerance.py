@@ -30,7 +30,7 @@ from printhammer.support.arrays import BoolArray, FloatArray, TextArray
 
 SPREAD: Final = 0.01  # Default relative spread of a constant, to either side; arbitrary
 
-STEP: Final = 25.0  # Default step of the rate grid, Hz: coarser than for a single safe rate
+STEP: Final = 25.0  # Default step of the rate grid, Hz: coarser than for a single safe rate; arbitrary
 
 MOST: Final = 100_000  # Largest number of hammers in a yield; arbitrary
 
@@ -43,7 +43,7 @@ FIXED: Final = ("backstop.position", "platen")
 
 
 _SHARES: Final = (0.95, 0.5)
-"""Fractions of the hammers for which a summary states the largest common safe rate."""
+"""Fractions of the hammers for which a summary states the largest common safe rate; arbitrary."""
 
 
 class ToleranceYield(Result):

@@ -138,7 +138,7 @@ Row = tuple[int, list[str]]
 
 _SEPARATORS: Final = "\t;|, "
 _LINES: Final = 2000
-"""Number of leading lines from which the separator is determined."""
+"""Number of leading lines from which the separator is determined; arbitrary."""
 _START: Final = ("xorg", "xorigin", "t0", "x0", "tstart", "xzero", "hoffset", "start", "begin")
 _STEP: Final = (
     *("increment", "incr", "inc", "step", "delta", "tinc", "dt", "deltax", "timeincrement", "hresolution"),

@@ -28,7 +28,7 @@ from printhammer.units import all_to_si, describe, is_unit_of, parse, to_si
 _NONE: Final[Mapping[str, str]] = MappingProxyType({})
 _NO_WORDS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType({})
 
-LARGEST: Final = 1e9
+LARGEST: Final = 1e9  # Arbitrary
 """Largest magnitude accepted for a value in SI; instruments write numbers such as 9.9e37 for no reading."""
 
 BEFORE: Final = 0.1
