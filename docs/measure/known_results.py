@@ -12,11 +12,15 @@ import numpy as np
 from measured import MOTION, Cell, Column, write
 
 import printhammer as ph
+from printhammer.chaos import orbit
 from printhammer.chaos.continuation.branch import Branch
+from printhammer.run.regime import Regime
 
 ROOMS = (*MOTION, "chaos", "derivatives")
 SHARP = 1e-9
 """Tolerance for results with a closed form."""
+FRICTION = 0.3
+"""Dry friction of the oscillator of Den Hartog, N."""
 
 
 @dataclass(frozen=True)
@@ -143,11 +147,63 @@ def rocking_angle(impacts: int) -> float:
     return float(rocking().maxima[1][impacts - 1])
 
 
+def shaken(amplitude: float, omega: float) -> ph.SineForce:
+    """Return a force with the time course of a cosine."""
+    return ph.SineForce(amplitude, omega / (2.0 * math.pi), phase="90 deg")
+
+
+def dry(amplitude: float, omega: float, static: float, cycles: float) -> ph.Motion:
+    """Simulate the oscillator with dry friction from the displacement 1 at rest."""
+    hammer = ph.load("den-hartog-1931").replace("force.guide.static", static)
+    return ph.simulate(
+        hammer,
+        shaken(amplitude, omega),
+        duration=cycles * 2.0 * math.pi / omega,
+        state=(1.0, 0.0),
+        tolerance=1e-13,
+    )
+
+
+def dry_amplitude(amplitude: float, omega: float) -> float:
+    """Return the largest displacement of the periodic motion under dry friction."""
+    return float(dry(amplitude, omega, FRICTION, 30.0).maxima[1][-1])
+
+
+def sticking(omega: float, static: float, low: float, high: float) -> float:
+    """Return the amplitude of the force below which the periodic motion sticks, by bisection."""
+    cycles = 30.0
+    start = (cycles - 2.0) * 2.0 * math.pi / omega
+    while high - low > 1e-11:
+        middle = 0.5 * (low + high)
+        sticks = dry(middle, omega, static, cycles).sticks
+        if any(stick.t_in > start for stick in sticks):
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+def dry_product() -> float:
+    """Return the product of the multipliers of the periodic motion under dry friction."""
+    regime = Regime.of(ph.load("den-hartog-1931"), drive=shaken(0.5, 0.7))
+    return float(orbit(regime, (0.6, 0.2)).multipliers.prod().real)
+
+
+def left_at_rest() -> float:
+    """Return the displacement at which dry friction holds the mass that is let go at 1."""
+    (stick,) = ph.simulate(
+        ph.load("den-hartog-1931"), ph.SineForce(0.0, 1.0), duration=10.0, state=(1.0, 0.0), tolerance=1e-13
+    ).sticks
+    return float(stick.x)
+
+
 MODEL = "model of Simpson and Ghosh (2026), closed form"
 SHAW = "model of Shaw and Holmes (1983), closed form"
 BOOK = "Tufillaro, Abbott and Reilly (1992)"
 HOUSNER = "Housner (1963), formula"
 RECIPES = "Dankowicz and Schilder (2013), closed form"
+DEN_HARTOG = "Den Hartog (1931), closed form"
+SHAW_FRICTION = "Den Hartog (1931) and Shaw (1986), closed form"
 HOLMES = "equation of Holmes (1979), quoted to three digits"
 
 CASES = (
@@ -268,6 +324,52 @@ CASES = (
             lambda impacts=impacts: rocking_angle(impacts),
         )
         for impacts, printed in ((1, "0.434668238996"), (2, "0.330017910687"), (5, "0.159101605236"))
+    ),
+    *(
+        Known(
+            "den-hartog-1931",
+            f"w = {omega}, F = 0.5: amplitude of the motion without stops",
+            DEN_HARTOG,
+            printed,
+            SHARP,
+            lambda omega=omega: dry_amplitude(0.5, omega),
+        )
+        for omega, printed in ((0.7, "0.819974135042"), (1.4, "0.270684438460"))
+    ),
+    *(
+        Known(
+            "den-hartog-1931",
+            f"w = {omega}: F below which the mass sticks",
+            DEN_HARTOG,
+            printed,
+            SHARP,
+            lambda omega=omega: sticking(omega, FRICTION, 0.3, 2.0),
+        )
+        for omega, printed in ((0.42, "1.633144255304"), (0.7, "0.415471622602"), (1.4, "0.451735887038"))
+    ),
+    Known(
+        "den-hartog-1931",
+        "w = 0.7, static friction 0.45: F below which the mass sticks",
+        SHAW_FRICTION,
+        "0.542667268742",
+        SHARP,
+        lambda: sticking(0.7, 0.45, 0.3, 2.0),
+    ),
+    Known(
+        "den-hartog-1931",
+        "w = 0.7, F = 0.5: product of the multipliers",
+        DEN_HARTOG,
+        "0.021036639786",
+        SHARP,
+        dry_product,
+    ),
+    Known(
+        "den-hartog-1931",
+        "F = 0, let go at 1: displacement at rest",
+        "Lorenz (1924), formula",
+        "-0.2",
+        SHARP,
+        left_at_rest,
     ),
     Known(
         "dankowicz-schilder-2013",

@@ -9,6 +9,7 @@ from printhammer.hammer.hammer import shipped
 
 TEXTBOOK = {
     "bouncing-ball",
+    "den-hartog-1931",
     "duffing-holmes",
     "housner-1963",
     "linear-impact-oscillator",

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.hammers import PACKS, STOP, compare, drives, interpreted, made_of, rigid
+from tests.oracle.den_hartog import DenHartog
 from tests.truth.impact_orbits import BouncingBall, DampedImpacts
 
 import printhammer as ph
@@ -82,6 +83,26 @@ def test_other_closed_forms_of_the_table() -> None:
     for impacts in (1, 2, 5):
         angle = 1.0 - math.sqrt(1.0 - 0.81**impacts * (1.0 - 0.4**2))
         assert known("housner-1963", f"after {impacts} ") == pytest.approx(angle, abs=1e-12)
+
+
+def test_closed_forms_of_the_table_for_dry_friction() -> None:
+    friction = 0.3
+    for omega in (0.7, 1.4):
+        x0, _phase = DenHartog(omega, friction).motion(0.5)
+        assert known("den-hartog-1931", f"w = {omega}, F", "amplitude") == pytest.approx(x0, abs=1e-12)
+    for omega in (0.42, 0.7, 1.4):
+        boundary = DenHartog(omega, friction).boundary
+        assert known("den-hartog-1931", f"w = {omega}: F", "sticks") == pytest.approx(boundary, abs=1e-12)
+    exact = DenHartog(0.7, friction)
+    # At a turn the other forces are x0 w^2; they must exceed the static friction (Shaw 1986).
+    boundary = math.hypot(0.45 / 0.49, friction * exact.big_u) / abs(exact.big_v)
+    assert known("den-hartog-1931", "static") == pytest.approx(boundary, abs=1e-12)
+    # Every reversal multiplies the velocity by the ratio of the accelerations after and before.
+    turn = 0.49 * exact.motion(0.5)[0]
+    product = ((turn - friction) / (turn + friction)) ** 2
+    assert known("den-hartog-1931", "product") == pytest.approx(product, abs=1e-12)
+    # Half a swing about the displacement 0.3, and half a swing about -0.3.
+    assert known("den-hartog-1931", "rest") == pytest.approx(1.0 - 4.0 * friction, abs=1e-12)
 
 
 @pytest.mark.parametrize("a", [2.7, 2.9, 3.0488, 3.4])

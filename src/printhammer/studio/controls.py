@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any, Final, get_args
 
 from printhammer.drive.waveforms.drivers import DRIVERS, Rail
 from printhammer.drive.waveforms.shapes import SHAPES, Sine, Waveform
+from printhammer.parts.base import Part
 from printhammer.parts.friction import DryFriction
+from printhammer.parts.spring.forces import ForceSum
 from printhammer.studio import bounds
 from printhammer.studio.coil import by_voltage, open_constants, rail_of, span_of
 from printhammer.support.constants import quantities
@@ -56,6 +58,12 @@ EQUATIONS: Final = {
 }
 """Equations of the laws of the paper; other laws show the first line of their module docstring."""
 
+_SUMS: Final[dict[tuple[str, str], type[Part]]] = {
+    ("damping", DryFriction.law): DryFriction,
+    ("spring", ForceSum.law): ForceSum,
+}
+"""Parts that a hammer file does not name, because they are sums of its forces and contacts."""
+
 # Period chosen such that a hop of the ball lasts about one period.
 _HOPS: Final[dict[str, Any]] = {
     "waveform": {"shape": "half-sine", "amplitude": 0.5, "width": 3e-4, "quantity": "force"},
@@ -97,6 +105,7 @@ OPENINGS: Final[dict[str, dict[str, Any]]] = {
     "shaw-holmes-1983": _shaken(1.0, 2.8, _QUARTER, 1.5, 5.0),
     "dankowicz-schilder-2013": _shaken(0.12, 1.0, -_QUARTER, 0.6, 2.0),
     "duffing-holmes": _shaken(0.3, 1.0, _QUARTER, 0.5, 2.0),
+    "den-hartog-1931": _shaken(0.5, 0.7, _QUARTER, 0.5, 2.0),
     "housner-1963": _PUSHES,
     "braille-embosser": {"rate": 20.0, "pulses": 3, "low": 10.0, "high": 60.0},
     "dot-peen": {"rate": 40.0, "pulses": 5, "low": 10.0, "high": 160.0},
@@ -181,7 +190,8 @@ def equation_of(section: str, law: str) -> str:
         return known or ""
     from printhammer.parts import PARTS
 
-    text = import_module(PARTS[section, law].__module__).__doc__ or ""
+    part = _SUMS.get((section, law)) or PARTS[section, law]
+    text = import_module(part.__module__).__doc__ or ""
     return text.strip().partition("\n")[0]
 
 
