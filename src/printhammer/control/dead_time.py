@@ -136,10 +136,10 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
     """Table of the time from switch-on to impact, by rail voltage and coil temperature."""
 
     hammer: Hammer = part("driven hammer")
-    blow: float = scalar("m/s", "impact speed that the solved widths give")
+    blow: float = scalar("m/s", "impact speed for which the pulse widths are solved")
     own_width: float = scalar("s", "width of the hammer's own pulse")
     own_time: float = scalar(
-        "s", "time from switching on to impact with the own pulse at nominal rail and temperature"
+        "s", "time from switching on to impact with the hammer's own pulse, at nominal rail and temperature"
     )
     voltage: FloatArray = coordinate("V", "rail voltage", "voltage")
     temperature: FloatArray = coordinate("degC", "temperature of the coil", "temperature")
@@ -149,11 +149,14 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
         "voltage temperature",
         more="NaN, as the next three columns, if the hammer does not reach the pack",
     )
-    speed: FloatArray = column("m/s", "impact speed with the own pulse", "voltage temperature")
-    current: FloatArray = column("A", "largest current with the own pulse", "voltage temperature")
-    heat: FloatArray = column("J", "coil heat with the own pulse", "voltage temperature")
+    speed: FloatArray = column("m/s", "impact speed with the hammer's own pulse", "voltage temperature")
+    current: FloatArray = column("A", "largest current with the hammer's own pulse", "voltage temperature")
+    heat: FloatArray = column("J", "coil heat with the hammer's own pulse", "voltage temperature")
     status: TextArray = column(
-        "", "status of the simulation with the own pulse", "voltage temperature", more="as for a motion"
+        "",
+        "status of the simulation with the hammer's own pulse",
+        "voltage temperature",
+        more="as for a motion",
     )
     strongest: FloatArray = column(
         "m/s", "impact speed with a pulse that lasts until impact", "voltage temperature"
@@ -165,9 +168,9 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
         more="NaN, as the next two columns, if no width gives that impact speed",
     )
     width_time: FloatArray = column(
-        "s", "time from switching on to impact with that width", "voltage temperature"
+        "s", "time from switching on to impact with the pulse width `width`", "voltage temperature"
     )
-    width_heat: FloatArray = column("J", "coil heat with that width", "voltage temperature")
+    width_heat: FloatArray = column("J", "coil heat with the pulse width `width`", "voltage temperature")
 
     @property
     def title(self) -> str:

@@ -156,19 +156,19 @@ class ThermalDuty(Result, rows="ambient burst"):
     burst: FloatArray = coordinate("Hz", "dot rate in a burst", "burst")
     temperature: FloatArray = column(
         "degC",
-        "steady temperature of the winding at that rate",
+        "steady temperature of the winding at the dot rate of the burst",
         "ambient burst",
         more="infinite if the winding would melt",
     )
     time: FloatArray = column(
         "s",
-        "time from ambient temperature to the limit at that rate",
+        "time to heat the winding from ambient temperature to the limit at the dot rate of the burst",
         "ambient burst",
         more="infinite if the limit is never reached; NaN without a heat capacity",
     )
     share: FloatArray = column(
         "1",
-        "largest duty cycle at that rate, for bursts short compared with the warming",
+        "largest duty cycle at the dot rate of the burst, for bursts short compared with the warming",
         "ambient burst",
     )
 

@@ -40,7 +40,7 @@ class ThermalLimit(Result):
     error: float = scalar(
         "K", "standard error of the limit", more="from the residuals; NaN without a spare degree of freedom"
     )
-    voltage: FloatArray = column("V", "rail", "row")
+    voltage: FloatArray = column("V", "rail voltage", "row")
     ambient: FloatArray = column("degC", "ambient temperature", "row")
     rate: FloatArray = column("Hz", "largest dot rate, as stated", "row")
     fitted: FloatArray = column("Hz", "largest dot rate, from the fit", "row")

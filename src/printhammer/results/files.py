@@ -52,10 +52,12 @@ _MOST_INT: Final = 2**31  # Integers of the classic NetCDF format have 32 bits
 class Reopened(Declared):
     """Result read from a file."""
 
-    path: Path = part("the file")
-    dataset: xr.Dataset = part("the arrays; of a table (.csv, .parquet) its columns over `row`", repr=False)
+    path: Path = part("path of the file")
+    dataset: xr.Dataset = part(
+        "arrays as a Dataset; of a table (.csv, .parquet), the columns over the dimension `row`", repr=False
+    )
     dataframe: pd.DataFrame = part(
-        "the table; of a Dataset the arrays over the dimensions of the first one", repr=False
+        "columns as a table; of a Dataset, the arrays over the dimensions of the first one", repr=False
     )
 
     @property

@@ -37,11 +37,11 @@ _DRAFT: Final = f"{MARK}/.draft"
 class Variable(Declared):
     """Array of a store: dimensions, type, chunks and attributes."""
 
-    name: str = part("its name")
+    name: str = part("name of the variable")
     dims: tuple[str, ...] = part("names of the dimensions, member dimensions first")
-    shape: tuple[int, ...] = part("their lengths")
-    dtype: str = part("type of the numbers, as numpy names it")
-    fill: Any = part("fill value where nothing is written yet")
+    shape: tuple[int, ...] = part("lengths of the dimensions")
+    dtype: str = part("NumPy name of the data type")
+    fill: Any = part("fill value of entries not written yet")
     attrs: Mapping[str, Any] = part("attributes such as unit and meaning", default_factory=dict)
     values: npt.NDArray[Any] | None = part(
         "values of a coordinate, written with the layout; None for a result", default=None

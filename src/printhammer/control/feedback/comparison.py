@@ -58,7 +58,7 @@ _GAPS: Final = (1.5, 6.0, 46)
 class ObservedRun(Declared):
     """One run of the closed loop with the samples that the controller used."""
 
-    pattern: str = part("the slots, 1 for a dot")
+    pattern: str = part("requested slots: 1 for a dot, 0 for none")
     motion: Motion = part("motion of the run", repr=False)
     times: FloatArray = column("s", "times of the samples used", "sample")
     shown: FloatArray = column("m", "sensor readings", "sample")
@@ -89,8 +89,8 @@ class Feedback(Result, rows=_DOTS):
     arrival: FloatArray = column(
         "s", "arrival minus slot time and single-pulse flight time", _DOTS, more="NaN without a dot"
     )
-    lost: IntArray = column("1", "lost dots", "strategy", dtype=np.int32)
-    extra_contacts: IntArray = column("1", "extra contacts", "strategy", dtype=np.int32)
+    lost: IntArray = column("1", "number of lost dots", "strategy", dtype=np.int32)
+    extra_contacts: IntArray = column("1", "number of extra contacts", "strategy", dtype=np.int32)
     peak_current: FloatArray = column("A", "largest absolute value of the current", "strategy")
     gaps: FloatArray = coordinate("s", "time between two slots", "gap", name="gap")
     gap_force: FloatArray = column("1", "relative force deviation of the second of two dots", "strategy gap")

@@ -79,7 +79,7 @@ STANDARD: Final = 20e-6  # Time constant if the waveform of a hammer has no deca
 class Driver(Declared):
     """Coil driver that switches the current between levels, with a first-order lag."""
 
-    current: float = scalar("A", "current limit, of either sign")
+    current: float = scalar("A", "largest absolute value of the current")
     edge: float = scalar("s", "time constant of the current")
 
     def __post_init__(self) -> None:

@@ -48,13 +48,13 @@ class PositionSensor(Declared):
     """A position sensor with white noise, delay and quantisation."""
 
     noise: float = part(
-        "standard deviation of a sample, as a fraction of the stroke; normal, white",
+        "standard deviation of the normal white noise of a sample, as a fraction of the stroke",
         default=0.01,
     )
-    delay: float = scalar("s", "time from a sample until it is available", default=20e-6)
+    delay: float = scalar("s", "delay from the sampling time until the sample is available", default=20e-6)
     interval: float = scalar("s", "sampling interval", default=2e-6)
     step: float = part("quantisation step, as a fraction of the stroke; 0 for none", default=2.0**-10)
-    seed: int = part("seed of the noise", default=0)
+    seed: int = part("seed of the random number generator of the noise", default=0)
 
     def __post_init__(self) -> None:
         for name, unit in (("noise", ""), ("delay", " s"), ("interval", " s"), ("step", "")):

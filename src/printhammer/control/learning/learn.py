@@ -159,7 +159,7 @@ class Learning(Result, rows=_DOTS):
     hammer: Hammer = part("the nominal hammer, known to the learner")
     unit: Hammer = part("the simulated unit, unknown to the learner", repr=False)
     table: CompensationTable = part("the learned table of the unit", repr=False)
-    rate: float = scalar("Hz", "slots per second", name="rate_Hz")
+    rate: float = scalar("Hz", "slot rate", name="rate_Hz")
     driver: str = scalar("", "driver of the coil")
     sensor: ImpactSensor = part("the impact sensor")
     variability: Variability = part("the variability of the production")

@@ -26,19 +26,19 @@ class Readings(NamedTuple):
 class ImpactSensor(Declared):
     """Sensor that reads the impact time of each dot and, if `force` is set, the peak force of each dot."""
 
-    noise: float = scalar("s", "standard deviation of the time of impact", default=5e-6)
+    noise: float = scalar("s", "standard deviation of the measured impact time", default=5e-6)
     force: float | None = part(
-        "standard deviation of the force, relative; None if it is not measured", default=None
+        "relative standard deviation of the measured force; None without a force measurement", default=None
     )
     colour: float = part("correlation of the noise of consecutive dots", default=0.0)
     gain: float = part("relative gain error of times and forces", default=0.0)
     missed: float = part("fraction of impacts that are not detected", default=0.0)
-    false: float = part("fraction of impacts with a false detection before them", default=0.0)
-    seed: int = part("seed of the noise", default=0)
+    false: float = part("fraction of impacts that are preceded by a false detection", default=0.0)
+    seed: int = part("seed of the random number generator of the noise", default=0)
     delay: float = scalar("s", "constant error of the impact time, unknown to the learner", default=0.0)
     offset: float | None = part(
-        "standard deviation, s, over units of an error common to all dots of a unit; None where it is not "
-        "stated: none is simulated, and the learner expects 25 us",
+        "standard deviation over units, s, of the offset that all impact times of a unit have in common; "
+        "None if not stated: no offset is simulated, and the learner expects 25 us",
         default=None,
     )
 

@@ -40,10 +40,10 @@ _STROBES: Final = 4001  # Samples of each undriven rebound; arbitrary
 class Bound(Declared):
     """Lower bounds on the positive coil work of the first and of each later dot of a burst."""
 
-    first: float = scalar("J", "for a dot from rest")
-    later: float = scalar("J", "for each later dot, from a turning point in front of the pack")
-    bounced: float = scalar("J", "for each later dot, after a bounce off the backstop")
-    turn: float = scalar("m", "turning point nearest to the paper from which a later dot can be made")
+    first: float = scalar("J", "lower bound on the positive work for a dot from rest")
+    later: float = scalar("J", "lower bound for each later dot, from a turning point in front of the pack")
+    bounced: float = scalar("J", "lower bound for each later dot, after a bounce off the backstop")
+    turn: float = scalar("m", "turning point nearest to the paper from which a later dot is possible")
     loading: float = scalar("J", "loading work of the pack for one dot")
 
     def burst(self, dots: int) -> float:

@@ -124,9 +124,9 @@ class LeastWork(Result, rows="node"):
     rate: float = scalar("Hz", "dot rate")
     count: int = part("requested number of dots")
     force: float = scalar("1", "requested force, relative to the single pulse", name="least_force")
-    largest: float = scalar("A", "current limit, of either sign", name="largest_current")
+    largest: float = scalar("A", "largest absolute value of the current", name="largest_current")
     slew: float = scalar(
-        "A/s", "slope limit, of either sign", name="largest_slew", more="does not apply to pulses"
+        "A/s", "largest absolute slope of the current", name="largest_slew", more="does not apply to pulses"
     )
     least: Least = scalar("", "objective of the optimisation", more="see `LEASTS`")
     shape: Shape = scalar("", "kind of current allowed", more="see `SHAPES`")

@@ -53,7 +53,7 @@ _AXES: Final = "strategy driven rate patterns"
 class TableReport(Result, rows=_AXES):
     """Comparison of a compensation table with open loop, by hammer, rate and set of patterns."""
 
-    table: CompensationTable = part("the table", repr=False)
+    table: CompensationTable = part("compensation table to be tested", repr=False)
     hammer: Hammer = part(
         "hammer that the table is made for", more="every dot is compared with its single-pulse dot"
     )
@@ -72,8 +72,8 @@ class TableReport(Result, rows=_AXES):
     arrival: FloatArray = column(
         "s", "largest deviation of the arrival", _AXES, more="of the printed dots only"
     )
-    lost: FloatArray = column("1", "lost dots", _AXES)
-    extra: FloatArray = column("1", "extra contacts", _AXES)
+    lost: FloatArray = column("1", "number of lost dots", _AXES)
+    extra: FloatArray = column("1", "number of extra contacts", _AXES)
     multiplier: FloatArray = column(
         "1",
         "multiplier of a small error from dot to dot in a row",
@@ -87,7 +87,11 @@ class TableReport(Result, rows=_AXES):
         more="NaN for a lost dot",
         repr=False,
     )
-    arrival_deviation: FloatArray = part("arrival deviation of the same dots, s", repr=False)
+    arrival_deviation: FloatArray = part(
+        "arrival deviation of every dot of the cycle at the first rate, for "
+        "the table's hammer, s, shape (strategies, dots)",
+        repr=False,
+    )
     seed: int = scalar("1", "seed of the random patterns")
     tolerance: float = part("error tolerance per integration step")
     strategy: tuple[str, ...] = coordinate("", "drive strategy", "strategy", default=STRATEGIES)

@@ -31,8 +31,8 @@ class SinglePulse(Declared):
 class Nominal(SinglePulse):
     """Dot of a single pulse from rest, with its speed, indentation and energies."""
 
-    impact_speed: float = scalar("m/s", "speed at touch")
-    indentation: float = scalar("m", "largest indentation")
+    impact_speed: float = scalar("m/s", "impact speed on the pack")
+    indentation: float = scalar("m", "largest indentation of the pack")
     loading_work: float = scalar("J", "work done on the pack up to its largest indentation")
     pack_loss: float = scalar("J", "energy dissipated in the pack")
 

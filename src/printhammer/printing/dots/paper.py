@@ -48,9 +48,9 @@ _UNITS: Final = {"stiffness": "1", "front": "m", "length": "m"}
 class Paper(Declared):
     """Random variation of pack stiffness and pack front along a print line, about the hammer's values."""
 
-    stiffness: float = part("standard deviation of the stiffness of the pack, relative", default=0.05)
-    front: float = scalar("m", "standard deviation of the front of the pack", default=3e-6)
-    length: float = scalar("m", "distance over which the correlation falls to 1/e", default=2e-3)
+    stiffness: float = part("relative standard deviation of the pack stiffness", default=0.05)
+    front: float = scalar("m", "standard deviation of the position of the pack front", default=3e-6)
+    length: float = scalar("m", "correlation length, over which the correlation falls to 1/e", default=2e-3)
     seed: int = part("seed of the random number generator", default=0)
 
     def __post_init__(self) -> None:

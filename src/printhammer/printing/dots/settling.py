@@ -38,12 +38,12 @@ _MARGIN: Final = 0.99  # Reduction of the undisturbed rate, since integration er
 class Wear(Declared):
     """Load on the backstop: touches, impulse, energy, largest speed and force."""
 
-    touches: int = part("number of touches")
-    impulse: float = scalar("N s", "sum over the touches of the change of momentum of the armature")
+    touches: int = part("number of backstop touches")
+    impulse: float = scalar("N s", "change of momentum of the armature, summed over the backstop touches")
     loss: float = scalar("J", "energy dissipated in the backstop")
-    largest_speed: float = scalar("m/s", "largest speed at touch")
+    largest_speed: float = scalar("m/s", "largest impact speed on the backstop")
     largest_force: float | None = scalar(
-        "N", "largest contact force", more="None for a rigid backstop, whose force is not finite"
+        "N", "largest backstop force", more="None for a rigid backstop, whose force is not finite"
     )
 
 

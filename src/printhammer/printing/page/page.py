@@ -140,15 +140,17 @@ class Page(Result, rows="dot"):
     """Printed page: the requested dots, the extra contacts, and the simulations of all wires."""
 
     hammer: Hammer = part("hammer of every wire")
-    pattern: Pattern = part("requested dots")
+    pattern: Pattern = part("requested dot pattern")
     head: Head = part("wire positions and diameter")
     rate: float = scalar("Hz", "slot rate")
     strategy: str = scalar("", "name of the drive strategy")
     nominal: Nominal = part("single-pulse dot")
     limits: Limits = part("limits on the deviations of the dots")
-    line: IntArray = column("1", "print line", "dot", more="of the requested dot, counted from 0")
-    wire: IntArray = column("1", "wire; the topmost is 0", "dot")
-    slot: IntArray = column("1", "slot", "dot", more="counted from 0")
+    line: IntArray = column(
+        "1", "index of the print line", "dot", more="of the requested dot, counted from 0"
+    )
+    wire: IntArray = column("1", "index of the wire; 0 is the topmost", "dot")
+    slot: IntArray = column("1", "index of the slot", "dot", more="counted from 0")
     run: BoolArray = column("1", "whether the simulation reached the dot", "dot")
     lost: BoolArray = column("1", "whether the firing made no dot", "dot")
     fault: IntArray = part(
@@ -166,15 +168,18 @@ class Page(Result, rows="dot"):
     peak_force: FloatArray = column("N", "largest pack force", "dot")
     indentation: FloatArray = column("m", "largest indentation", "dot")
     extra_contacts: IntArray = column("1", "number of extra pack contacts", "dot")
-    extra_of: IntArray = column("1", "dot that the extra contact belongs to", "extra")
+    extra_of: IntArray = column("1", "index of the dot to which the extra contact belongs", "extra")
     extra_arrival: FloatArray = part(
-        "touch of each extra contact minus slot time and single-pulse flight time, s", repr=False
+        "arrival of each extra contact: touch minus slot time and single-pulse flight time, s", repr=False
     )
     extra_force: FloatArray = column("N", "largest pack force of the extra contact", "extra")
     run_line: IntArray = column(
-        "1", "print line of the simulation", "member", more="a wire without a dot in a line has no simulation"
+        "1",
+        "index of the print line of the simulation",
+        "member",
+        more="a wire without a dot in a line has no simulation",
     )
-    run_wire: IntArray = column("1", "wire of the simulation", "member")
+    run_wire: IntArray = column("1", "index of the wire of the simulation", "member")
     status: TextArray = column("1", "status of the simulation", "member")
     tolerance: float = part("error tolerance per integration step")
 

@@ -199,7 +199,7 @@ class Pattern(Declared):
     name: str = part("name of the pattern")
     dots: BoolArray = column(
         "1",
-        "True where a dot is requested",
+        "mask of the requested dots",
         "line wire slot",
         more="lines and wires from the top, slots from the left, each slot one column of dots; read-only",
     )

@@ -58,7 +58,7 @@ class Material(Declared):
     """Replacement material for the backstop or the pack of the studied hammer."""
 
     kind: str = part("one of `KINDS`")
-    label: str = part("short description")
+    label: str = part("short description of the material")
     changes: Mapping[str, Any] = part("constants, options and parts to replace, as for `Hammer.replace`")
 
     def __post_init__(self) -> None:
@@ -142,7 +142,7 @@ class DampingStudy(Result):
     The numbers are NaN unless `status` is "ok" or "current limit".
     """
 
-    hammer: Hammer = part("the studied hammer")
+    hammer: Hammer = part("hammer under study")
     limits: Limits = part("limits on the dots, for the safe rates")
     current_limit: float = scalar("A", "current limit")
     nominal: Nominal = part(
@@ -168,8 +168,10 @@ class DampingStudy(Result):
         more="from the firing until the armature stays within a hundredth of the stroke from rest; NaN if"
         " it has not settled within 20 ms or two windows",
     )
-    rebounds: FloatArray = column("1", "rebounds higher than a hundredth of the stroke", "material")
-    highest: FloatArray = column("1", "highest rebound, as a fraction of the stroke", "material")
+    rebounds: FloatArray = column("1", "number of rebounds higher than a hundredth of the stroke", "material")
+    highest: FloatArray = column(
+        "1", "height of the highest rebound, as a fraction of the stroke", "material"
+    )
     restitution: FloatArray = column(
         "1",
         "speed after the first touch of the backstop over the speed before",

@@ -104,7 +104,7 @@ class Quality(Result):
     extra_contacts: IntArray = column("1", "number of extra pack contacts", "dot", dtype=np.int32)
     fault: IntArray = column(
         "1",
-        "first fault of the dot, -1 for a good one",
+        "index of the first fault of the dot; -1 for a dot within limits",
         "dot",
         dtype=np.int32,
         attrs={"codes": ", ".join(f"{code} {name}" for code, name in enumerate(FAULTS))},

@@ -147,7 +147,7 @@ class SafeRate(Result):
         "largest absolute value of the drives at the safe rate",
         more="in N for a force; NaN if there is no safe rate",
     )
-    step: float = scalar("Hz", "step of the grid")
+    step: float = scalar("Hz", "step of the rate grid")
     tolerance: float = part("error tolerance per integration step")
 
     @property

@@ -61,7 +61,9 @@ class ToleranceYield(Result):
         more="in the order of `spreads`",
         name="factor",
     )
-    judged_by: Judged = scalar("", '"own" or "design"', more="hammer whose single-pulse dot is the reference")
+    judged_by: Judged = scalar(
+        "", 'reference of the dots: "own" or "design"', more="hammer whose single-pulse dot is the reference"
+    )
     status: TextArray = column(
         "1",
         "status of the hammer",
@@ -89,7 +91,7 @@ class ToleranceYield(Result):
         name="safe_rate",
     )
     grid: FloatArray = part("grid of rates, Hz", repr=False)
-    seed: int = scalar("1", "seed of the random draw")
+    seed: int = scalar("1", "seed of the random number generator")
     tolerance: float = part("error tolerance per integration step")
 
     @property

@@ -157,12 +157,23 @@ WIDEST: Final = 3.0
 class Variability(Declared):
     """Standard deviations of the constants of a production; the constants vary independently."""
 
-    magnet: float = part("F0 and Am of equation (3), pole area, or force constant, relative", default=0.01)
-    spring: float = part("Bs and As of equation (4), or preload and stiffness, relative", default=0.01)
-    damping: float = part("damping, relaxation time or restitution of the backstop, relative", default=0.2)
-    current: float = part("all currents, relative: Bm of equation (3), or the coil resistance", default=0.05)
-    travel: float = part("distance of pack and platen, m", default=10e-6)
-    paper: float = part("stiffness of the pack, relative", default=0.1)
+    magnet: float = part(
+        "relative standard deviation of F0 and Am of equation (3), of "
+        "the pole area, or of the force constant",
+        default=0.01,
+    )
+    spring: float = part(
+        "relative standard deviation of Bs and As of equation (4), or of preload and stiffness", default=0.01
+    )
+    damping: float = part(
+        "relative standard deviation of damping, relaxation time or restitution of the backstop", default=0.2
+    )
+    current: float = part(
+        "relative standard deviation of all currents: of Bm of equation (3), or of the coil resistance",
+        default=0.05,
+    )
+    travel: float = part("standard deviation of the distance of pack and platen, m", default=10e-6)
+    paper: float = part("relative standard deviation of the stiffness of the pack", default=0.1)
 
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():
