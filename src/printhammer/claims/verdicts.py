@@ -36,12 +36,12 @@ def printed_verdicts() -> dict[float, str]:
     return dict(zip(claim.settings["strobe_times_s"], claim.band["verdicts"], strict=True))
 
 
-def changed(hammer: Hammer, sign: Callable[[int], int], part: float = _CHANGE) -> Hammer:
-    """Return a copy of a hammer with every constant raised or lowered by the fraction `part`."""
+def changed(hammer: Hammer, sign: Callable[[int], int], fraction: float = _CHANGE) -> Hammer:
+    """Return a copy of a hammer with constant i scaled by 1 + `fraction` * `sign(i)`, for all constants."""
     # Keep the unit of the file, which distinguishes a current from a force.
     return hammer.replace(
         {
-            key: replace(constant, value=constant.value * (1.0 + part * sign(number)))
+            key: replace(constant, value=constant.value * (1.0 + fraction * sign(number)))
             for number, (key, constant) in enumerate(hammer.constants.items())
         }
     )

@@ -41,7 +41,7 @@ class Option:
     default: Any = None
     """Default value; an ellipsis marks a required option."""
     flag: str | None = None
-    """Flag; None derives it from the name of the parameter."""
+    """Command-line flag; None for a flag derived from the name of the parameter."""
     panel: str | None = None
     """Heading of the help panel that lists the option."""
     type: Any = str
@@ -88,7 +88,7 @@ class Option:
 
 @dataclass(frozen=True)
 class Files(Option):
-    """Option for output files; the runner checks them before the computation and writes them after it."""
+    """Option for output files, which the runner checks before the computation and writes afterwards."""
 
     endings: tuple[str, ...] = ()
     """Accepted file endings besides those of pictures; if empty, every ending is accepted."""

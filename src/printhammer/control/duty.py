@@ -95,7 +95,7 @@ def dot_heat(heat: float | str, feed: str = "voltage") -> DotHeat:
 
 
 def read_temperature(value: float | str, name: str) -> float:
-    """Parse a temperature, a number in degC or text such as "60 degC"; it must exceed `COLDEST`.
+    """Parse a temperature, a number in degC or text such as "60 degC", above `COLDEST`.
 
     Raises
     ------

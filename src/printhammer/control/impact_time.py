@@ -76,7 +76,7 @@ class ImpactTime(Result, rows=_CELLS):
         return f"time of impact of {self.hammer.name} from the {self.signal} of its coil"
 
     def summary(self) -> Summary:
-        """Tabulate the errors, one row per sampling setting."""
+        """Tabulate the errors of the estimated impact times, one row per sampling setting."""
         noise, rate, bits = np.meshgrid(self.noise, self.sampling_rate, self.bits, indexing="ij")
         columns = [
             Cells("noise", 1e3 * noise.ravel(), f"m{self.unit}", ".3g"),
@@ -301,7 +301,8 @@ def errors_of(
 ) -> tuple[FloatArray, BoolArray]:
     """Return the errors of estimated impact times, s, and a mask of the estimates that are not flagged.
 
-    The dots cycle through the records, which `unit_record` simulates.
+    `records` are the signals and flight times from `unit_record`; dot number n uses record n modulo their
+    number.
     """
     errors, believed = [], []
     for number in range(dots):

@@ -232,7 +232,7 @@ class _Look:
         return self.flow.states[row], self.flow.changes[row]
 
     def later(self, columns: FloatArray, surface: str, v: float) -> FloatArray:
-        """Return the derivatives, by constant, of the time, s, at which a surface is passed at `v`, m/s."""
+        """Differentiate the time, s, at which the armature passes a surface at the speed `v`, m/s."""
         return np.asarray(-(columns[0] - surface_moves(self.wanted)[surface]) / v)
 
     def dot(self, dot: Struck, contacts: Sequence[Contact]) -> dict[str, FloatArray]:

@@ -318,7 +318,7 @@ class Rows(tuple[_T, ...]):
     kind: type[_T]
 
     def __new__(cls, rows: Iterable[_T], kind: type[_T]) -> Self:
-        """Create the tuple from its rows and the class of the rows."""
+        """Create a tuple of objects of the class `kind` from an iterable of such objects."""
         made = super().__new__(cls, rows)
         made.kind = kind
         return made

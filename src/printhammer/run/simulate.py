@@ -68,9 +68,10 @@ def simulate(
     points : int, optional
         Number of points of a uniform output grid; by default about a hundred in the time of one flight.
     times : array, optional
-        The output grid itself, ascending, s. The motion does not depend on the grid.
+        Times of the output grid, ascending, s. The motion does not depend on the grid.
     scheme : str, optional
-        "default", or one of the paper's: "trapezoid", "runge-kutta-4", in fixed steps on its schedule.
+        "default", or an integrator of the paper, with the paper's step sizes: "trapezoid" or
+        "runge-kutta-4".
     step_scale : float, optional
         Factor on all steps of the paper's schemes.
     ledger : bool, optional

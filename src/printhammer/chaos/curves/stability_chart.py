@@ -263,7 +263,7 @@ class _Chart:
         return self.value if start.other is None else start.other
 
     def curves(self, starts: list[Start], effort: Effort) -> tuple[list[BifurcationCurve], list[str]]:
-        """Trace a curve through every start on no earlier curve; return curves and reasons for failure."""
+        """Trace a curve through each start that lies on no earlier curve; return curves and failures."""
         curves: list[BifurcationCurve] = []
         refused: list[str] = []
         left = starts
@@ -280,7 +280,7 @@ class _Chart:
         return curves, refused
 
     def curve(self, start: Start) -> BifurcationCurve | str:
-        """Trace the curve through a start; return the curve, or the reason for the failure."""
+        """Trace the bifurcation curve through a start; return the curve, or the reason for the failure."""
         try:
             traced = CurveTracer(self.plane, start.kind, self.steps).trace(start, self.second(start), 1)
         except InputError as error:
@@ -288,7 +288,7 @@ class _Chart:
         return curve_of(self.plane, traced, (0, 0), 1)
 
     def is_on(self, curve: BifurcationCurve, start: Start) -> bool:
-        """Whether a start lies on a traced curve of the same kind, between two of its points."""
+        """Whether a start lies between two points of a traced curve of the same kind of bifurcation."""
         if curve.kind != start.kind:
             return False
         second = self.second(start)

@@ -61,7 +61,7 @@ TESTS: Final[dict[str, Callable[[FloatArray], float]]] = {
 
 GRAZING: Final = "grazing"
 KINDS: Final = (*TESTS, GRAZING)
-"""Kinds of bifurcation that can be followed."""
+"""Kinds of bifurcation that can be continued in two parameters."""
 
 SPACING: Final = 1e-6  # Arbitrary
 """Scaled step size of finite differences, whose errors affect only the convergence of Newton's method."""

@@ -102,7 +102,7 @@ class CurveTracer:
         self.rigid = has_rigid_backstop(plane.regime)
 
     def trace(self, start: Start, second: float, threads: int | None) -> Traced:
-        """Trace the curve through a start; InputError if Newton's method does not converge there."""
+        """Trace the bifurcation curve through a start; InputError if Newton's method does not converge."""
         system, unknown = self.begin(start, second)
         at = f"{self.kind} at {start.first} = {start.value:.9g} {start.regime.quantity(start.first).si}"
         try:
@@ -184,7 +184,7 @@ class CurveTracer:
         return MultiplierSystem(moved, self.kind), np.append(quiet[1], start.value)
 
     def state_at(self, start: Start, second: float) -> FloatArray:
-        """Compute displacement and velocity of the orbit of a start, at the section used by its curve."""
+        """Compute displacement and velocity of a start's orbit, at the section that its curve uses."""
         system, unknown = self.begin(start, second)
         if isinstance(system, MultiplierSystem):
             return np.asarray(unknown[:2])

@@ -342,7 +342,7 @@ def multipliers_of(jacobians: FloatArray) -> npt.NDArray[np.complex128]:
 
 
 class _Run:
-    """Run over several drive periods from a section, within a train of earlier pulses."""
+    """Run from a section over several drive periods; pulses fired before the section may still be active."""
 
     def __init__(self, regime: Regime, start: FloatArray, periods: int, tolerance: float) -> None:
         self.regime, self.periods = regime, periods

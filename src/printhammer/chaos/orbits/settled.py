@@ -53,7 +53,7 @@ NO_ORBIT: Final = "Newton's method finds no stable orbit of {} there that the st
 
 
 class Settled(Declared):
-    """Orbit to which a motion has settled, or the reason why it is undecided."""
+    """Orbit to which a motion has settled, or the reason why the motion is undecided."""
 
     period: int | None = part("firings after which the orbit repeats; None if undecided")
     states: FloatArray = part(

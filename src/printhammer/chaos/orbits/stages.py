@@ -48,7 +48,7 @@ _STEPS: Final = Steps(most=150, precision=1e-10)
 
 
 def crossings(orbit: Orbit) -> list[FloatArray]:
-    """Find states of other orbits at an orbit's drive period, where its branch returns to this period."""
+    """Follow an orbit's branch; return the states at which the branch returns to the drive period."""
     regime, own = orbit.regime, orbit.regime.period
     if PERIOD not in regime.names:
         return []
@@ -125,7 +125,7 @@ class _Known:
     hits: int = 1
 
     def is_visible(self, block: int, batch: int) -> bool:
-        """Whether a stage up to the given block of starts and batch of guesses found the orbit."""
+        """Whether a search up to a stage (block of starts, batch of guesses) has found the orbit."""
         return any(i <= block and j <= batch for i, j in self.stages)
 
 
@@ -439,7 +439,7 @@ def _doublings(first: int, below: int) -> list[int]:
 
 
 def _steps(ladder: Sequence[int], most: int) -> list[int]:
-    """Extend an ascending sequence by doubling; return its terms up to the first of at least `most`."""
+    """Extend an ascending sequence by doubling its last term, up to the first term of at least `most`."""
     rungs = list(ladder)
     while rungs[-1] < most:
         rungs.append(2 * rungs[-1])

@@ -311,7 +311,7 @@ def _ensemble(
 def _in_stretches(
     trains: Sequence[Train], every: Sequence[FloatArray], effort: Effort
 ) -> tuple[FloatArray, FloatArray, IntArray, FloatArray, list[str], FloatArray]:
-    """Compute states of trains at times, s, one row per train, with statuses and the times reached.
+    """Compute the states of trains at given times, s, one row per train; also statuses and end times.
 
     Each run lasts one period, so that the time and its rounding error stay small.
     """

@@ -255,7 +255,7 @@ def is_positive(exponent: Exponent) -> bool:
 
 
 def _without_period(exponent: Exponent | None) -> tuple[str, str]:
-    """Classify an aperiodic train by its exponent; return the class, and the reason if it is undecided."""
+    """Classify an aperiodic train by its exponent; return the class, and the reason for "undecided"."""
     name = "undecided"
     if exponent is None:
         return name, "no period, and the exponent was not computed"

@@ -179,7 +179,7 @@ def feedback(
     sensor : PositionSensor, optional
         Sensor of the controller; by default with noise of 1 % of the stroke and a delay of 20 us.
     current : float or str, optional
-        Current limit of the driver, of either sign, A; by default 2 A, or the peak of the hammer's own
+        Largest absolute value of the driver's current, A; by default 2 A, or the peak of the hammer's own
         pulse if it is larger.
     edge : float or str, optional
         Time constant of the driver, s; by default the decay time constant of the hammer's own waveform.

@@ -68,7 +68,7 @@ _RELAXED: Final = 0.2
 _CLEAR: Final = 0.22
 """Fraction of a launch's flight time after which the armature has left the backstop; arbitrary."""
 _PATIENCE: Final = 40e-6
-"""Least time from the end of a contact to a throw that may be decided again, s; arbitrary."""
+"""Smallest time from the end of a contact to a throw whose decision may be revised, s; arbitrary."""
 _POLICIES: Final = 8  # Size of the policy cache; arbitrary
 
 

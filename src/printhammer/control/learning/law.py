@@ -171,7 +171,7 @@ BAD: Final = 10.0  # Arbitrary
 """Final objective of a stage (`Update.left`) above which the learner tries another starting table."""
 
 _SLOW: Final = 0.85
-"""The iteration stops if the objective exceeds this fraction of the value before; arbitrary."""
+"""Largest ratio of successive objective values with which the iteration goes on; arbitrary."""
 _LEAST_LAW: Final = 1e-2  # Lower bound of the fraction a of the model error that is corrected; arbitrary
 _OTHERS: Final = 4  # Number of posterior samples on which the convergence condition is checked; arbitrary
 _ALIKE: Final = 24  # Number of posterior samples on which table and open loops are compared; arbitrary
@@ -310,7 +310,7 @@ class LearningLaw:
         return Update(found, contraction, verdict, left)
 
     def choose_loop(self, belief: Belief, verdict: Verdict) -> Printing[Verdict]:
-        """Choose a unit's open loop from its posterior, given readings of `COMPARED` in every loop."""
+        """Choose the open loop of a unit from the posterior, after the line `COMPARED` in each open loop."""
         drawn = self.production.hammers(belief.draw(_ALIKE, self.seed))
         press = self.production.press([each for each in drawn if each is not None])
         others = yield from order_loops(press, self.entries)

@@ -54,7 +54,7 @@ class Bound(Declared):
 def bound(hammer: Hammer, single: Nominal, force: float, largest: float) -> Bound:
     """Compute lower bounds on the coil work of dots with `force` times the single-pulse force.
 
-    The hammer needs magnet, pack and backstop; `largest` is the current limit of either sign, A.
+    The hammer needs magnet, pack and backstop; `largest` is the largest absolute value of the current, A.
     """
     static = StaticForce(hammer)
     deepest, loading = _indentation(static, single, force)

@@ -46,7 +46,7 @@ def descend(
     linear: tuple[FloatArray, FloatArray] | None = None,
     inward: bool = False,
 ) -> tuple[FloatArray, float]:
-    """Minimise an objective by SLSQP, subject to optional constraints; `measured` evaluates both.
+    """Minimise an objective by SLSQP, with optional constraints; `measured` evaluates all of these.
 
     `measured` maps points (places, n) to rows (1 or 3, places). With `conditions` there are three rows: the
     objective, an equality constraint (second row = 0) and an inequality constraint (third row >= 0). `bounds`

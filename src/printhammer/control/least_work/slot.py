@@ -122,8 +122,8 @@ class Task:
 
     hammer: Hammer  # Driven hammer
     coil: CoilForce  # Force of the hammer's coil
-    largest: float  # Current limit of either sign, A
-    slew: float  # Slope limit of either sign, A/s
+    largest: float  # Largest absolute value of the current, A
+    slew: float  # Largest absolute slope of the current, A/s
     force: float  # Least force of a dot, N
     loading: float  # Loading work of a dot with that force, J; the unit of the cost
     heat: bool  # Whether to minimise the squared current instead of the positive work

@@ -76,7 +76,7 @@ class Draft:
         return Draft(self.task, self.rates[which], self.values[:, which])
 
     def table(self) -> CompensationTable:
-        """Convert the draft to a table."""
+        """Convert the draft to a compensation table."""
         task = self.task
         shared = shared_numbers(task.gaps, task.reach)
         return CompensationTable(

@@ -232,7 +232,7 @@ def clearance(hammer: Hammer, pulse: Waveform, width: float, largest: float) -> 
 
 
 def brake_of(pulse: Waveform, width: float) -> Waveform:
-    """Return the brake pulse of a width, s; with full supply if it fits into the peak phase of a driver."""
+    """Return the brake pulse with a given width, s, at full supply if the driver's peak phase is as long."""
     if isinstance(pulse, PeakAndHold) and width <= pulse.peak_time:
         shared = {name: value for name, value in dict(pulse).items() if name in Rail.model_fields}
         return Rail(**{**shared, "width": width})

@@ -27,7 +27,7 @@ from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.c_code import comment, guarded, identifier, nested, numbers
 
 NANOSECOND: Final = 1e-9
-"""Default unit of the times in a header, s."""
+"""Default unit of the times in a C header, s."""
 
 _PLACE_BYTES: Final = 4
 """Size of a rate, or of an axis value, in a C header, bytes: integers of 32 bits."""
@@ -36,13 +36,13 @@ _ADVANCE, _, _DELAY, _BRAKE = range(len(COLUMNS))
 
 
 def bits_of(times: Mapping[str, FloatArray], tick: float) -> int:
-    """Return the integer width of a header's times, bits: 32 for nanoseconds, else 16 if they fit."""
+    """Return the width of a C header's times, bits: 32 for nanoseconds, else 16 if all times fit."""
     largest = max(float(np.abs(np.rint(values / tick)).max()) for values in times.values())
     return 32 if tick == NANOSECOND or largest > np.iinfo(np.int16).max else 16
 
 
 def size_of(rates: int, entries: int, bits: int, values: int = 0) -> int:
-    """Return the size of a header's arrays, bytes, for counts of rates, entries and axis values."""
+    """Return the size of a C header's arrays, bytes, for numbers of rates, entries and axis values."""
     each = len(COLUMNS) * bits // 8 + 1
     return max(values, 1) * rates * entries * each + _PLACE_BYTES * (rates + values)
 

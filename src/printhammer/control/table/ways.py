@@ -44,12 +44,13 @@ def solve(
 
     The method is Levenberg-Marquardt (J. Nocedal and S. J. Wright, *Numerical Optimization*, ch. 10).
 
-    `measure` returns deviations (active, shifts, deviations), as fractions of the limits and NaN for a lost
-    dot, from all current values, the indices of the active dots, and shifts (shifts, 2) of their values.
-    `start` contains firing time, or advance, and width, s. Derivatives are finite differences with `steps`,
-    s, forward in time and backward in width; a step is at most `longest`, s. A dot is finished at a deviation
-    of `good`; widths stay between `least` and `most`, s. `bounded` clips values in place to their bounds,
-    from all values, the indices of the active dots, and a mask of the dots that made a step.
+    The values of a dot are its firing time, or advance, and width, s; `start` contains the initial guesses.
+    `measure(values, active, shifts)` returns the deviations of the dots with the indices `active` for each of
+    the shifts of their values, as fractions of the limits, NaN for a lost dot; shape (active, shifts,
+    deviations). Derivatives are finite differences with `steps`, s, forward in time and backward in width. A
+    step is at most `longest`, s, and widths stay between `least` and `most`, s. `bounded(values, active,
+    stepped)` clips the values in place; `stepped` is the mask of the active dots that made a step. A dot is
+    finished when its largest deviation is at most `good`.
     """
     now, best, best_off = start.copy(), start.copy(), np.full(len(start), np.inf)
     shifts = np.array([(0.0, 0.0), (steps[0], 0.0), (0.0, -steps[1])])

@@ -116,7 +116,7 @@ def read_csv(path: Path) -> Samples:
 
 
 def _held(times: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Hold each level up to the next row: repeat it just before the time of that row."""
+    """Repeat each logic level just before the next row, so that the level holds up to that row."""
     before = times[1:] - min(_EDGE, 0.5 * float(np.diff(times).min()))
     order = np.argsort(times := np.concatenate([times, before]))
     return times[order], np.concatenate([values, values[:-1]])[order]

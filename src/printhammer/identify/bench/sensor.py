@@ -224,10 +224,11 @@ def applicable(sensor: Sensor, settings: Mapping[str, Any]) -> dict[str, Any]:
     return kept
 
 
-def by_quantity(texts: list[str], part: str, quantities: Mapping[str, str]) -> dict[str, str]:
+def by_quantity(texts: list[str], setting: str, quantities: Mapping[str, str]) -> dict[str, str]:
     """Parse settings such as "force=0.5 %", or "0.2 um" for all quantities of that dimension.
 
-    Returns the text of the error size by quantity; messages name the setting `part`, such as "noise".
+    Returns the text of the error size by quantity; `setting` is the name in error messages, such as
+    "noise".
 
     Raises
     ------
@@ -238,20 +239,20 @@ def by_quantity(texts: list[str], part: str, quantities: Mapping[str, str]) -> d
     for text in texts:
         name, equals, amount = text.partition("=")
         name = " ".join(name.lower().split())
-        names = [name] if equals else _of_dimension(text, part, quantities)
+        names = [name] if equals else _of_dimension(text, setting, quantities)
         for quantity in names:
             if quantity not in quantities:
                 known = ", ".join(quantities)
                 raise InputError(
-                    f"{part} {text!r}: the quantity {quantity!r} is not known",
-                    key=part,
+                    f"{setting} {text!r}: the quantity {quantity!r} is not known",
+                    key=setting,
                     value=text,
                     expected=f"one of {known}",
                 )
             if quantity in amounts:
                 raise InputError(
-                    f"{part} {text!r}: {quantity} occurs twice",
-                    key=part,
+                    f"{setting} {text!r}: {quantity} occurs twice",
+                    key=setting,
                     value=text,
                     expected="each quantity once",
                 )
@@ -259,7 +260,7 @@ def by_quantity(texts: list[str], part: str, quantities: Mapping[str, str]) -> d
     return amounts
 
 
-def _of_dimension(text: str, part: str, quantities: Mapping[str, str]) -> list[str]:
+def _of_dimension(text: str, setting: str, quantities: Mapping[str, str]) -> list[str]:
     from printhammer.units import parse
 
     names = []
@@ -270,19 +271,19 @@ def _of_dimension(text: str, part: str, quantities: Mapping[str, str]) -> list[s
     if not names:
         such = next(iter(quantities))
         raise InputError(
-            f"{part} {text!r}: expected an amount such as '{such}=0.5 %', or a number with the unit of"
+            f"{setting} {text!r}: expected an amount such as '{such}=0.5 %', or a number with the unit of"
             f" {' or '.join(quantities)}",
-            key=part,
+            key=setting,
             value=text,
         )
     return names
 
 
-def _quantities(part: str, amounts: Any) -> Mapping[str, Any]:
+def _quantities(setting: str, amounts: Any) -> Mapping[str, Any]:
     if amounts is None:
         return {}
     if not isinstance(amounts, Mapping):
-        raise InputError.of(part, amounts, "amounts by quantity, such as {'force': '0.5 %'}")
+        raise InputError.of(setting, amounts, "amounts by quantity, such as {'force': '0.5 %'}")
     return amounts
 
 

@@ -36,7 +36,7 @@ MOST: Final = 100_000  # Largest number of hammers in a yield; arbitrary
 
 Judged = Literal["own", "design"]
 GAP: Final = "pack.front"
-"""Position whose spread is relative to the distance from the backstop (the origin of x is arbitrary)."""
+"""Position whose spread is relative to its distance from the backstop, as the origin of x is arbitrary."""
 
 FIXED: Final = ("backstop.position", "platen")
 """Constants without a default spread, since no force depends on them: the origin of x, and the platen."""
