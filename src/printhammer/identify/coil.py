@@ -289,7 +289,7 @@ class CurrentLaw:
         return _kept(self._slopes, p, made)
 
     def variance_columns(self, p: FloatArray) -> FloatArray:  # noqa: ARG002
-        """Return the variance coefficients: one noise variance per record."""
+        """Return the variance coefficients: rows of one record share one noise variance."""
         count = len(self.traces)
         return np.repeat(np.eye(count), [len(trace.table) for trace in self.traces], axis=0)
 
@@ -334,7 +334,7 @@ class Averaged:
         return np.column_stack([self.mean(column) for column in slopes.T])
 
     def variance_columns(self, p: FloatArray) -> FloatArray:
-        """Return the variance coefficients: one rounding variance per record."""
+        """Return the variance coefficients of the means: rows of one record share one noise variance."""
         return np.asarray(self.law.variance_columns(p)[self.begins] * self.share[:, np.newaxis])
 
 

@@ -178,7 +178,7 @@ _ALIKE: Final = 24  # Number of posterior samples on which table and open loops 
 _GAIN: Final = 0.02
 """Smallest mean gain of a table, as a fraction of the dots, with which it is used; arbitrary."""
 SURE: Final = 0.9
-"""Smallest fraction of posterior samples that agree on the better open loop, to choose it; arbitrary."""
+"""Smallest fraction of posterior samples that favour an open loop for it to be chosen; arbitrary."""
 
 TRIED: Final = slots_of(cycle_with_lead_in(6, 0))
 """Slots of the line on which corrections are evaluated in simulation: the de Bruijn cycle of order 6."""

@@ -167,7 +167,7 @@ class Learner:
     def _believe(
         self, means: Sequence[Mean], drives: Sequence[DrivenLine], before: Belief | None
     ) -> Printing[Belief]:
-        """Estimate the constants from mean readings: first of the ladder, then of one test line per drive."""
+        """Estimate the constants from averaged readings of the test pulses and of one test line per drive."""
         law = self.law
         measured = law.production.measured
         value = np.concatenate([each.value for each in means], axis=1)

@@ -86,7 +86,7 @@ class NoBurstError(PrinthammerError):
 
 
 class SupplyCheck(Declared):
-    """Dots of a burst at n relative changes of all currents, e.g. of the supply: arrays of shape (n,)."""
+    """Dots of a burst when all currents change by each of n relative amounts: arrays of shape (n,)."""
 
     changes: FloatArray = part("relative change of every current: 0.03 for 3 % more")
     adequate: IntArray = part(

@@ -266,7 +266,7 @@ def growths(task: Task, ways: Ways) -> FloatArray:
 
 
 def seconds(task: Task, ways: Ways) -> FloatArray:
-    """Simulate the second dots; return normalised deviations of force and arrival, shape (ways, 2)."""
+    """Simulate each candidate's second dot; return normalised force and arrival errors, shape (ways, 2)."""
     return _deviations(task, task.hammers[0], ways, rows_of(task, ways, 2))[:, 1]
 
 

@@ -31,7 +31,7 @@ _TIED: Final = 0.98
 _WEAK: Final = 0.1
 """Relative standard error above which a constant is reported as weakly determined; arbitrary."""
 _SHARE: Final = 0.02  # Arbitrary
-"""Component in the degenerate direction, relative to the largest, above which a constant is named."""
+"""Smallest relative component of the degenerate direction with which a constant is reported."""
 
 
 def condition_number(design: FloatArray) -> float:

@@ -76,7 +76,7 @@ class RestitutionLaw:
         return (self.speed**2 * rebound(self._z(p))[1])[:, None]
 
     def variance_columns(self, p: FloatArray) -> FloatArray:
-        """Return the variance coefficients: absolute error of each speed, proportional error of both.
+        """Return the variance coefficients: absolute error of each speed, relative error of both speeds.
 
         An error of the impact speed acts through the slope d(v_out)/d(v_in) = e + z de/dz.
         """

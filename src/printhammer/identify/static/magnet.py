@@ -64,7 +64,7 @@ class TotalLaw:
         return np.column_stack(columns)
 
     def variance_columns(self, p: FloatArray) -> FloatArray:
-        """Return the variance coefficients: force with and without magnet, displacement, current."""
+        """Return the variance coefficients of force (with and without magnet), displacement and current."""
         magnet = self.magnet.astype(np.float64)
         by_current = 2.0 * p[2] * (p[1] - p[2] * self.current) / np.sqrt(self._place(p)) * magnet
         return np.column_stack([magnet, 1.0 - magnet, (self._slope(p) * magnet) ** 2, by_current**2])

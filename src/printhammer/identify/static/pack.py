@@ -164,7 +164,7 @@ class PackLaw:
         return np.where(self.inside, p[0] * np.exp(power), 0.0)
 
     def jacobian(self, p: FloatArray) -> FloatArray:
-        """Compute the derivatives of the force with respect to the parameters."""
+        """Compute the derivatives of the pack force with respect to the parameters."""
         force, (low, high) = self.value(p), self.exponents(p)
         columns = [force / p[0]]
         for k in range(len(self.turns)):
@@ -181,7 +181,7 @@ class PackLaw:
         return [np.where(out, depth, self.log_r) * force, np.where(out, (self.log_r - depth) * force, 0.0)]
 
     def variance_columns(self, p: FloatArray) -> FloatArray:
-        """Return the variance coefficients: absolute force, proportional force, indentation."""
+        """Return the variance coefficients of absolute and relative force errors and indentation errors."""
         force, (low, high) = self.value(p), self.exponents(p)
         steep = np.where(self.cycles.unloading, high, low) / (np.exp(self.log_r) * self.thickness)
         return np.column_stack([np.ones_like(force), force**2, (steep * force) ** 2])

@@ -60,8 +60,9 @@ def fit_solenoid(
 ) -> Fit:
     """Fit the law `reluctance` to a table of one coil with a given number of turns.
 
-    `current`, A, applies to all rows of a table without that column. The `CONSTANTS` are fitted for a magnet
-    that pulls toward the paper and is closed at 0; a table over the gap does not determine that position.
+    `current`, A, applies to all rows of a table without a column of currents. The `CONSTANTS` are fitted for
+    a magnet that pulls toward the paper and is closed at 0; a table over the gap does not determine that
+    position.
     Common options are described with `printhammer.identify.fitting.fit`.
 
     Raises
@@ -195,7 +196,7 @@ class CircuitLaw:
         return np.column_stack(columns)
 
     def variance_columns(self, p: FloatArray) -> FloatArray:  # noqa: ARG002
-        """Return the variance coefficients: relative error of the force, relative error of the linkage."""
+        """Return the variance coefficients of the relative errors of force and linkage, shape (2 m, 2)."""
         return np.repeat(np.eye(2), len(self.rows), axis=0)
 
 

@@ -35,7 +35,7 @@ class SpringLaw:
         return np.column_stack([1.0 - self.travel / p[1], p[0] * self.travel / (p[1] * p[1])])
 
     def variance_columns(self, p: FloatArray) -> FloatArray:  # noqa: ARG002
-        """Return the variance coefficients, all 1: errors in x act as force errors of the same size."""
+        """Return the variance coefficients, all 1: errors in x act like errors of the linear force."""
         return np.ones((len(self.travel), 1))
 
 

@@ -260,7 +260,7 @@ def layout_of(text: str, where: str, words: Collection[str] = ()) -> Table:
 
 
 def _separator(text: str) -> str:
-    """Determine the separator with which most lines are rows of numbers, or else most lines are split."""
+    """Determine the separator that makes most lines rows of numbers, or else splits most lines."""
     lines = [line for line in text.split("\n", _LINES)[:_LINES] if line.strip() and line.strip()[0] != "#"]
     best, chosen = 0, ""
     for sign in _SEPARATORS:
