@@ -240,7 +240,7 @@ def thermal_duty(
         Coil heat per dot with the winding at 20 degC, J or text with a unit; or a function of the winding
         temperature; see `printhammer.control.duty.heat_of`.
     thermal_resistance : float or str
-        Thermal resistance from the winding to ambient, or to the body if there is one, K/W.
+        Thermal resistance from the winding to ambient or, if the coil has a body, to the body, K/W.
     limit : float or str
         Temperature limit of the winding, degC.
     ambient : sequence of float or str, optional

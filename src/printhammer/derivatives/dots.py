@@ -100,7 +100,7 @@ def _touches(contacts: Sequence[Contact]) -> list[int]:
 
 
 def _back(contacts: Sequence[Contact], row: int) -> int | None:
-    """Return the row of the first backstop contact after a dot and its extra contacts; None without one."""
+    """Return the row of the first backstop contact after a dot and its extra contacts; None if absent."""
     following = next((k for k in range(row + 1, len(contacts)) if not contacts[k].extra), None)
     return following if following is not None and contacts[following].surface == "backstop" else None
 

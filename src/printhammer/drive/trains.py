@@ -69,7 +69,7 @@ class PulseTrain(_Pulsed):
     Parameters
     ----------
     waveform
-        Waveform of every firing; None, for instance from a hammer without a waveform, is an error.
+        Waveform of every firing; None, as from a hammer without a waveform, raises `InputError`.
     rate, period
         Firings per second, Hz, or the time between them, s; one of the two.
     at

@@ -173,8 +173,8 @@ def load_measured_map(
     path : path
         A CSV file (`printhammer.maps.measured`), or a NetCDF file or Zarr store with the variables `rate`,
         `time` and `displacement`, each with any unit in the attribute `units`. `displacement` has
-        the dimension `rate` and a second one; `time` has the second one only, or both if the rates have
-        different times.
+        the dimension `rate` and a second dimension; `time` has only the second dimension, or both if the
+        rates have different times.
     times : array, optional
         Times from the first firing, s, ascending, at which the records are interpolated linearly. By default
         the sample times if all rates share them; otherwise evenly spaced times, with the smallest sample

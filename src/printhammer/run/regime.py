@@ -154,7 +154,7 @@ class Regime(Declared):
         Raises
         ------
         InputError
-            There is no waveform, period and rate are not exactly one positive number, the drive is not a
+            There is no waveform, not exactly one of period and rate is set or positive, the drive is not a
             continuous periodic force, or the phase is invalid.
         """
         part = 0.0 if phase is None else read_phase(phase)

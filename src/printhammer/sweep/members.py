@@ -69,7 +69,7 @@ class Base(Declared):
 
     @property
     def kind(self) -> str:
-        """Name of the drive table that defines the firing times, such as "train"; empty without one."""
+        """Name of the drive table with the firing times, such as "train"; empty if there is no such table."""
         return next((name for name in KINDS if name in self.drive), "")
 
 

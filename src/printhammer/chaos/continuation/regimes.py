@@ -64,7 +64,7 @@ class Branches(Result):
 
     @property
     def title(self) -> str:
-        """Title of the branches, with the name of their parameter."""
+        """Title of the set of branches, with the name of the parameter."""
         return f"branches of periodic orbits along {self.found[0].parameter if self.found else ''}"
 
     def summary(self) -> Summary:
@@ -326,7 +326,7 @@ def _is_on(branch: Branch, orbit: Orbit) -> bool:
 
 
 def _is_at_section(branch: Branch, orbit: Orbit, phase: float) -> bool:
-    """Whether an orbit lies on a branch, tested on the segments at the section with the phase `phase`."""
+    """Whether an orbit lies on any segment of the branch at the section with the phase `phase`."""
     value, state = orbit.regime.value(branch.parameter), _state_at(orbit, phase)
     half_widths = branch.regime.window.half_widths
     values = branch.values

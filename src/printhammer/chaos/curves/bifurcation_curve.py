@@ -299,7 +299,7 @@ def bifurcation_curve(
         default the first event that can be followed. For a curve in a file: the index of a point, "first" or
         "last".
     regime : Regime, optional
-        For a file: the regime, which is not stored there (hammer and periodic drive).
+        For a file: the regime (hammer and periodic drive), which the file does not contain.
     first : tuple, optional
         Least and largest value of the first parameter, by default those of the branch.
     grid : tuple of int, optional

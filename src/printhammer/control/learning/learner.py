@@ -51,7 +51,7 @@ class Learner:
     the production explains the readings; more posterior samples than the doubt allows would print fewer dots
     within limits with the table than in open loop, or a row in which errors grow; or the mean gain is below
     2 % of the dots. The open loop is the one that prints more dots over the production, unless the
-    readings of the unit in both open loops show that the other one prints more dots.
+    readings of the unit in both open loops show that the other open loop prints more dots.
 
     Parameters
     ----------

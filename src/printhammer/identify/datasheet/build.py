@@ -359,7 +359,7 @@ def _derived_from(sheet: DataSheet, key: str, how: str) -> tuple[str, str]:
 
 
 def _spring(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, Any] | None:
-    """Return the spring table, None without one; `InputError` if the magnet cannot overcome the spring."""
+    """Return the spring table, None without a spring; `InputError` if the spring overcomes the magnet."""
     stated = [name for name in ("preload", "stiffness") if f"spring.{name}" in sheet.entries]
     if not stated:
         return None
