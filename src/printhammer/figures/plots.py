@@ -31,6 +31,7 @@ PLOTS: Final = {
     "LyapunovChart": "chaos.exponents.plot_chart",
     "Manifolds": "chaos.basins.plot_manifolds",
     "Motion": "paper.motion.plot",
+    "Motion.timings": "contacts.plot_timings",
     "Orbit": "chaos.orbits.plot_orbit",
     "Orbits": "chaos.orbits.plot",
     "Page": "page.plot",

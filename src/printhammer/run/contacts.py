@@ -318,7 +318,8 @@ def _closings(name: str, contact: LinearContact, problem: Problem, record: Recor
             continue
         t_in, t_out = nodes[first, 0], nodes[last, 0]
         depths = sign * (places[(times >= t_in) & (times <= t_out)] - contact.position)
-        depth = float(max([inside[first], inside[last], *depths.tolist()]))
+        # At an impact on a rigid surface, the displacement has its maximum at a node, without v = 0.
+        depth = float(max([inside[first : last + 1].max(), *depths.tolist()]))
         is_open = last < len(closed)
         closings.append(
             Closing(

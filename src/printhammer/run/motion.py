@@ -47,6 +47,7 @@ from printhammer.run.contacts import (
 from printhammer.run.energy import CoilWork, Ledger, coil_work_of, increments_of, ledger_of
 from printhammer.run.problem import Problem, Record, message_of
 from printhammer.run.start import state_to_begin
+from printhammer.run.switching.timings import Timing, timing_facts, timings_of
 from printhammer.support.arrays import FloatArray
 from printhammer.support.files import write_file
 
@@ -293,6 +294,11 @@ class Motion(Result, fields=False):
         return Rows(closings_of(self._problem, self._record), Closing)
 
     @cached_property
+    def timings(self) -> Rows[Timing]:
+        """Operate, release and bounce times of the contacts of ``[[contact]]``, shown as a table."""
+        return Rows(timings_of(self._problem, self._record, self.closings), Timing)
+
+    @cached_property
     def sticks(self) -> Rows[Stick]:
         """Phases in which dry friction holds the armature, in order of time; empty without dry friction."""
         is_dry = isinstance(self.hammer.damping, DryFriction)
@@ -366,15 +372,10 @@ class Motion(Result, fields=False):
             forces = [each.peak_force for each in touches if each.peak_force is not None]
             up_to = f", up to {quantity(max(forces), 'N')}" if forces else ""
             rows.append((surface, f"{len(touches)} {'touch' if len(touches) == 1 else 'touches'}{up_to}"))
-        for name in dict.fromkeys(closing.contact for closing in self.closings):
-            own = [each for each in self.closings if each.contact == name]
-            count = f"{len(own)} {'closing' if len(own) == 1 else 'closings'}"
-            largest = quantity(max(each.peak_force for each in own), "N")
-            rows.append((name, f"{count} from {quantity(own[0].t_in, 's')}, up to {largest}"))
         if self.sticks:
             first = quantity(self.sticks[0].t_in, "s")
             rows.append(("held by friction", f"{len(self.sticks)} x, first at {first}"))
-        energies = Facts([*rows, *self._energy_facts()])
+        energies = Facts([*rows, *timing_facts(self.timings, self.end), *self._energy_facts()])
         if self.drive.quantity != "current" and self.hammer.pack is None:
             return Summary([energies])
         heads = {

@@ -48,6 +48,13 @@ _record = partial(opt.file, panel=_FILES)
     dots=_record("Output file for the table of dots (.csv, .parquet).", ".csv", ".parquet"),
     contacts=_record("Output file for the table of contacts (.csv, .parquet).", ".csv", ".parquet"),
     closings=_record("Output file for the closings of contacts (.csv, .parquet).", ".csv", ".parquet"),
+    timings=opt.files(
+        "Output file for operate, release and bounce times of contacts (.csv, .parquet), or a picture of the"
+        " contacts (.svg, .png, .pdf); repeatable.",
+        ".csv",
+        ".parquet",
+        panel=_FILES,
+    ),
 )
 def run(
     job: Job,
@@ -80,6 +87,7 @@ def run(
             "dots": Content(motion.dots.save),
             "contacts": Content(motion.contacts.save),
             "closings": Content(motion.closings.save),
+            "timings": Content(motion.timings.save, partial(motion.plot, picture="timings")),
         },
         complaints=[] if motion.ok else [motion.message],
     )

@@ -1,0 +1,1 @@
+"""Switching of electrical contacts, as makers of relays measure it."""

@@ -1,0 +1,173 @@
+"""Switching times of contacts: operate, release and bounce times, and contact forces.
+
+The contacts are those of the list ``[[contact]]``, the terms those of IEC 61810-1. A contact on the front
+side of the armature is a make contact: it closes when the relay operates, and opens when the relay releases.
+A contact on the back side is a break contact: it opens when the relay operates, and closes when the relay
+releases. A contact bounces if it switches more than once; the bounce time is the time from the first to the
+last of these switchings. Operate and release times end at the first switching: they exclude the bounce time.
+
+All times follow from `Motion.closings`. Weakness: contacts have no mass, so that only the rebound of the
+armature makes them bounce, not the vibration of the contact spring.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Final, Literal
+
+import numpy as np
+
+from printhammer.drive.trains import Drive
+from printhammer.drive.waveforms.shapes import Trapezoid, Waveform
+from printhammer.parts.spring.forces import LinearContact
+from printhammer.results import Declared, part, scalar
+from printhammer.results.summary import FactRow, interval, quantity
+from printhammer.run.contacts import Closing
+from printhammer.run.problem import Problem, Record
+
+_NOT_SEEN: Final = "None if the contact does not switch in the run"
+
+
+class Timing(Declared):
+    """Switching times and forces of a contact in one firing; the next firing, or the run, ends the firing."""
+
+    contact: str = part("name of the contact")
+    kind: Literal["make", "break"] = part("kind of the contact")
+    firing: int = part("index of the firing, from 0")
+    switched_on: float = scalar("s", "time of the firing, at which the drive is switched on")
+    switched_off: float | None = scalar(
+        "s",
+        "time at which the drive is switched off",
+        more="None if the drive is endless or the next firing begins earlier",
+    )
+    operate_time: float | None = scalar(
+        "s", "time from switch-on to the first switching", more=f"excludes the bounce; {_NOT_SEEN}"
+    )
+    operate_bounce: float | None = scalar("s", "bounce time after switch-on", more=_NOT_SEEN)
+    release_time: float | None = scalar(
+        "s", "time from switch-off to the first switching back", more=f"excludes the bounce; {_NOT_SEEN}"
+    )
+    release_bounce: float | None = scalar("s", "bounce time after switch-off", more=_NOT_SEEN)
+    largest_force: float = scalar("N", "largest contact force")
+    final_force: float = scalar(
+        "N", "contact force at switch-off (make contact) or at the end of the firing (break contact)"
+    )
+
+
+def off_after(waveform: Waveform) -> float:
+    """Return the time from a firing to the switch-off of its drive, s; infinity for an endless drive.
+
+    A driver is switched off at the end of its width, a trapezoid where its fall begins, a pulse without a
+    width at its end.
+    """
+    if isinstance(waveform, Trapezoid):
+        return waveform.rise + waveform.width
+    return float(getattr(waveform, "width", waveform.support))
+
+
+def timings_of(problem: Problem, record: Record, closings: Sequence[Closing]) -> list[Timing]:
+    """Return the switching times of all contacts, in the order of the hammer file, then of the firings.
+
+    `closings` are those of the run, from `printhammer.run.contacts.closings_of`.
+    """
+    timings = []
+    for key, term in problem.hammer.terms.items():
+        if isinstance(term, LinearContact):
+            name = key.partition(".")[2]
+            own = [each for each in closings if each.contact == name]
+            for number, span in _firings(problem.drive, record):
+                timings.append(_timing(name, term, number, span, own, problem, record))
+    return timings
+
+
+_Span = tuple[float, float, float]  # Times of switch-on, switch-off (may be infinite) and end of a firing, s
+
+
+def _firings(drive: Drive, record: Record) -> Iterator[tuple[int, _Span]]:
+    """Yield index and times of the firings of a run."""
+    first, last = float(record.nodes[0, 0]), float(record.nodes[-1, 0])
+    times = [float(time) for time in drive.times]
+    fired = getattr(drive, "waveforms", None) or (drive.waveform,) * len(times)
+    for number, (on, waveform) in enumerate(zip(times, fired, strict=True)):
+        following = min(times[number + 1 : number + 2], default=math.inf)
+        off = on + off_after(waveform)
+        if first <= on < last:
+            yield number, (on, off if off < following else math.inf, min(following, last))
+
+
+def _timing(
+    name: str,
+    contact: LinearContact,
+    number: int,
+    span: _Span,
+    closings: Sequence[Closing],
+    problem: Problem,
+    record: Record,
+) -> Timing:
+    """Compute the switching times of one contact in one firing."""
+    on, off, end = span
+    makes = contact.side == "front"
+    closed = [each.t_in for each in closings if not each.initial]
+    opened = [each.t_out for each in closings if each.t_out is not None]
+    forth, back = (closed, opened) if makes else (opened, closed)
+    forth = [time for time in forth if on <= time < end]
+    # A short pulse may be over before the contact switches.
+    released = [time for time in back if max(off, min(forth, default=math.inf)) <= time < end]
+    operated = [time for time in forth if time < min(released, default=math.inf)]
+    place = float(problem.resample(record, np.array([min(off, end) if makes else end]))[0, 0])
+    depth = (place - contact.position) * (1.0 if makes else -1.0)
+    during = [each for each in closings if each.t_in < end and (each.t_out is None or each.t_out > on)]
+    return Timing(
+        contact=name,
+        kind="make" if makes else "break",
+        firing=number,
+        switched_on=on,
+        switched_off=off if math.isfinite(off) else None,
+        operate_time=operated[0] - on if operated else None,
+        operate_bounce=operated[-1] - operated[0] if operated else None,
+        release_time=released[0] - off if released else None,
+        release_bounce=released[-1] - released[0] if released else None,
+        largest_force=max((each.peak_force for each in during), default=0.0),
+        final_force=contact.force(max(depth, 0.0)),
+    )
+
+
+def timing_facts(timings: Sequence[Timing], end: float) -> list[FactRow]:
+    """Return the switching times of each contact, for the summary of a run that ends at `end`, s."""
+    rows: list[FactRow] = []
+    for name in dict.fromkeys(each.contact for each in timings):
+        own = [each for each in timings if each.contact == name]
+        forth, back = ("closes", "opens") if own[0].kind == "make" else ("opens", "closes")
+        told = [
+            _phrase(forth, "switch-on", [(each.operate_time, each.operate_bounce) for each in own]),
+            _phrase(back, "switch-off", [(each.release_time, each.release_bounce) for each in own]),
+        ]
+        largest = quantity(max(each.largest_force for each in own), "N")
+        rows.append((f"{own[0].kind} contact {name}", ", ".join([*told, f"up to {largest}"])))
+    last = max((each.firing for each in timings), default=-1)
+    held = [each for each in timings if each.firing == last and _is_held(each)]
+    if held:
+        names = " and ".join(each.contact for each in held)
+        rows.append(
+            ("release", f"not seen: the run ends at {quantity(end, 's')}, before the release of {names}")
+        )
+    return rows
+
+
+def _is_held(timing: Timing) -> bool:
+    """Whether a contact is still switched at the end of the firing, although the drive is finite."""
+    switched = timing.operate_time is not None and timing.release_time is None
+    is_pressed = timing.final_force > 0.0
+    return timing.switched_off is not None and switched and is_pressed == (timing.kind == "make")
+
+
+def _phrase(verb: str, event: str, times: Sequence[tuple[float | None, float | None]]) -> str:
+    """Describe the first switchings after an event, and the bounce times."""
+    known = [(time, bounce) for time, bounce in times if time is not None and bounce is not None]
+    if not known:
+        return f"never {verb} after {event}"
+    first, bounce = np.array(known).T
+    extent = quantity(first[0], "s") if first.size == 1 else interval(first, "s")
+    more = f", bounces for {quantity(bounce.max(), 's')}" if bounce.any() else ""
+    return f"{verb} {extent} after {event}{more}"
