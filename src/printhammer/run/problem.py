@@ -260,7 +260,7 @@ class Problem:
 
     @property
     def linkage_scale(self) -> float:
-        """Flux linkage of the coil at a typical current, Wb: the scale of thresholds for a coil at rest."""
+        """Flux linkage of the coil at a typical current, Wb: unit of the threshold for "no current"."""
         return float(self.constants[layout.LINKAGE_SCALE])
 
     def room(self, count: int) -> FloatArray:

@@ -57,7 +57,7 @@ def start_of(
         event that can be followed. For a curve: the index of a point, "first" or "last"; by default the first
         point.
     regime : Regime, optional
-        For a file: the regime, which is not stored there (hammer and periodic drive).
+        For a file: the regime (hammer and periodic drive), which the file does not contain.
 
     Raises
     ------

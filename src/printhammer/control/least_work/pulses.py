@@ -45,9 +45,10 @@ _WRONG: Final = 10.0
 class PulsePlan:
     """Plan of a burst of pulses: firings so far, and the armature's state at the end of the last slot.
 
-    The widths of `waveform` are optimised; the slope limit of the task is ignored. `period`, `past` (from a
-    touch to the end of its slot), `lead` (length of the first slot) and `landing` (length of the landing) are
-    times, s. The plan begins at rest at the displacement `rest`, m.
+    The widths of `waveform` are optimised; the slope limit of the task is ignored. Arguments are times, s:
+    the slot `period`, the time `past` from a pack contact to the end of its slot, the length `lead` of the
+    first slot, and the length `landing` of the landing. The plan begins at rest at the displacement `rest`,
+    m.
 
     Raises
     ------
