@@ -20,32 +20,28 @@ ORIGIN = (
     r"convention(?:al)?s?",
     r"(?:because|since|so that)",
     r"bounds? the (?:memory|time)",
-    r"rounding(?: errors?)?",
-    r"(?:measured|tuned|simulated noise|derived from|reach(?:es)?)",
+    r"rounding errors?",
+    r"(?:measured|tuned|simulated noise|derived from)",
     r"decision \d+",
-    r"paper(?:'s)?",
+    r"(?:in|by) the paper|(?:bursts|section|year) of the paper",
+    r"the paper's (?:Figs?|hammer|value)|The paper [(]introduction",
     r"Figs?\. \d+",
     r"(?:19|20)\d\d",
     r"as (?:in|for)",
-    r"(?:standard|textbook)",
+    r"standard (?:acceleration|IEC)|textbook",
 )
 """Words that state where a value comes from; a year belongs to a citation."""
 
 DEFINITION = (
-    r"by definition",
-    r"(?:index|indices|codes?|kinds?|labels?|rows?|columns?)",
-    r"version of",
-    r"exit status",
-    r"number of the figure",
-    r"equation",
-    r"bits",
-    r"double precision",
-    r"(?:unit|units by|in a second|an inch)",
-    r"(?:golden ratio|root of)",
+    r"^(?:Integer |Status |Pack branch )?(?:codes?|kinds?|labels?|ind(?:ex|ices)|version|exit status)\b",
+    r"^(?:Default )?unit of the times|^(?:First )?row of|^Columns of|^Number of (?:additional )?columns",
+    r"^Number of the figure|\bequation \(\d|^Common units by|^Zero offset of a unit",
+    r"\bby definition\b|\bbits\b|\bdouble precision\b|\bin a second$|^An inch",
+    r"\bgolden ratio\b|\broot of\b",
 )
-"""Words that state what a value is by definition."""
+"""Patterns of statements of what a value is by definition."""
 
-REASON = re.compile(rf"\b(?:{'|'.join((*ORIGIN, *DEFINITION))})\b", re.IGNORECASE)
+REASON = re.compile(rf"\b(?:{'|'.join(ORIGIN)})\b|{'|'.join(DEFINITION)}", re.IGNORECASE)
 
 
 def is_numeric(value: ast.expr) -> bool:

@@ -67,8 +67,8 @@ _SOFT: Final = 1e-9  # Factor on the pack's constants that makes its force negli
 _UNLIKE: Final = 0.5
 """Ratio of unexplained to explained signal energy above which an estimate is flagged.
 
-Units of the hammer `impact-wire` reach a ratio of 0.4, with impact-time errors of 2 us; an unstated probe
-delay of 5 us gives 1.5, with errors of 30 us.
+Tuned: units of the hammer `impact-wire` reach a ratio of 0.4, with impact-time errors of 2 us; an unstated
+probe delay of 5 us gives 1.5, with errors of 30 us.
 """
 
 _TOO_LARGE: Final = 2.5  # Arbitrary

@@ -44,7 +44,7 @@ COLUMNS: Final = 6  # Number of columns of a table
 
 _CHUNK: Final = 1024  # Number of intervals evaluated at once, which bounds the memory; arbitrary
 _REFINED: Final = 16  # Number of intervals, those with the largest samples, to refine; arbitrary
-_ROUNDS: Final = 9  # Rounds of refinement: they reach 1e-9 of the interval
+_ROUNDS: Final = 9  # Rounds of refinement, so that a maximum is located to 1e-9 of the interval
 
 
 def table(rows: Iterable[Sequence[float]], end: float) -> FloatArray:

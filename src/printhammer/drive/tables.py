@@ -20,7 +20,7 @@ RESERVOIR: Final = 6.0
 """Codes of the kinds of segments, as described in `printhammer.drive.segments`."""
 
 ROWS: Final = 4
-"""Largest number of rows of the table of a shape, including the end."""
+"""Largest number of rows of the table of a shape, by definition of the shapes, including the end."""
 
 DECAY_TIMES: Final = 27.6310211159
 """Number of time constants after which a decaying current is cut off: -ln 1e-12; arbitrary."""

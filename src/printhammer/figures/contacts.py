@@ -16,7 +16,7 @@ from printhammer.figures.elements.style import new_figure, sign, styled
 from printhammer.run.motion import Motion
 from printhammer.run.switching.timings import Timing
 
-_TRACE: Final = 0.6  # Height of a closed contact's trace, where the rows have a spacing of 1
+_TRACE: Final = 0.6  # Height of a closed contact's trace, where the rows have a spacing of 1; arbitrary
 _ROOM: Final = 0.08  # Room above and below the motion, as a fraction of its range; arbitrary
 
 

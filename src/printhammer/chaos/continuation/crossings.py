@@ -33,7 +33,7 @@ _ROUNDS: Final = 60  # Iteration limit of the bracketing of a crossing; arbitrar
 _BRACKET: Final = 1e-5  # Arbitrary
 """Smallest bracket of a crossing, as a fraction of a step; Newton's method fails at the crossing itself."""
 _DIFFERENCE: Final = 1e-3
-"""Scaled step of the second differences; between 1e-4 and 1e-2 the kinds found in the tests are the same."""
+"""Scaled step of the second differences; tuned: 1e-4 to 1e-2 give the same kinds in the tests."""
 _FLAT: Final = 1e-6  # Arbitrary
 """Relative mixed second derivative below which the tangent of the crossing curve is undetermined."""
 _UPRIGHT: Final = 0.01

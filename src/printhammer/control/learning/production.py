@@ -28,7 +28,7 @@ SCALE: Final = 0.01
 OFFSET: Final = 25e-6
 """Prior standard deviation of the offset of a sensor's times, s, used if the sensor has no `offset`.
 
-Sound takes 20 us for 7 mm of air before a microphone."""
+Arbitrary; for comparison, sound takes 20 us for 7 mm of air before a microphone."""
 
 
 @dataclass(frozen=True)

@@ -120,8 +120,8 @@ def pattern_of(history: Sequence[int], before: Sequence[int] = ()) -> tuple[int,
 
 
 ROUNDING: Final = 1e-9  # Relative rounding tolerance of a bound; arbitrary
-# Largest width of a pulse whose current saturates at the limit, as a multiple of the hammer's own; rows of
-# the shipped hammer need 1.36, and a wider range makes the grid of starts coarser
+# Largest width of a pulse whose current saturates at the limit, as a multiple of the hammer's own; tuned:
+# rows of the shipped hammer need 1.36, and a wider range makes the grid of starts coarser
 _SATURATED: Final = 1.5
 _HALVINGS: Final = 50  # Bisections of a width: about the bits of a double's mantissa
 _FEWER: Final = 12  # Bisections of a width for a driver, each of which needs a simulation; arbitrary

@@ -41,7 +41,7 @@ MOST: Final = (ROOM - 1) // WIDTH
 """Maximum number of forces and contacts, including the spring."""
 
 FRONT, BACK = 1.0, -1.0
-"""First number of the row of a contact, by the side of the armature that touches."""
+"""First number of the row of a contact: by definition, the sign of the side of the armature that touches."""
 
 GRAVITY: Final = 9.80665
 """Standard acceleration of free fall, m/s^2: 3rd General Conference on Weights and Measures (1901)."""

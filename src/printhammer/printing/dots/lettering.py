@@ -29,9 +29,9 @@ from printhammer.errors import InputError
 from printhammer.support.arrays import BoolArray
 
 NAME: Final = "nine-wire"
-WIRES: Final = 9  # Number of wires of the built-in font: rows of a character in the font file
+WIRES: Final = 9  # Number of wires of the built-in font, by definition of the font file
 ADVANCE: Final = 6
-"""Character pitch: number of columns from the start of a character to the start of the next character."""
+"""Character pitch, by definition of the font: columns from the start of a character to the next start."""
 
 _COLUMNS: Final = 5  # Number of columns of a character
 _STEP: Final = 7  # Number of columns from character to character in the text of the font file

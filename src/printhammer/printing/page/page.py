@@ -49,7 +49,7 @@ DENSITY: Final = 1.0
 """Optical density of the single-pulse dot, an assumption: a tenth of the light is reflected."""
 
 _THICKNESS: Final = 4 / 3  # Default wire diameter, as a multiple of the wire pitch; arbitrary
-_HEIGHT: Final = 9 * 25.4e-3 / 72  # Height of a column of nine wires 1/72 in apart, m
+_HEIGHT: Final = 9 * 25.4e-3 / 72  # Height of a column of nine wires 1/72 in apart, m; arbitrary
 LINE_GAP: Final = 1 / 3
 """Gap between print lines, as a fraction of the height of the wire column; arbitrary."""
 
