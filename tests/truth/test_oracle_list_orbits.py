@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
 from tests.oracle.den_hartog import DenHartog
 from tests.oracle.list_laws import Damping, Drive, Friction, Piece, Spring, Stop, System
 from tests.oracle.list_steps import Run
 from tests.oracle.lists import simulate
+from tests.oracle.two_stops import TwoStops
 
 CLOSE = 1e-11
 
@@ -64,74 +64,29 @@ def test_a_larger_static_force_moves_the_boundary(beta: float) -> None:
     assert exact.run(boundary * (1.0 - 1e-9), static, 0.1)[0].events[0].kind == "stick"
 
 
-def symmetric_orbit(
-    stiffness: float, damping: float, amplitude: float, rate: float, restitution: float
-) -> list[tuple[float, float]]:
-    """Phases φ and speeds v of x'' + c x' + k x = A cos(w t + φ) that go from -1 to 1 in half a cycle.
-
-    Remove the steady response X cos(w t + θ): y(π/w) = -y(0) for both stops, y'(0) = v + X w sin θ and
-    y'(π/w) = v/e - X w sin θ, with y' proportional to y by the transition matrix. So v, cos θ and sin θ are
-    affine in y(0), and cos² + sin² = 1 is a quadratic equation. (Shaw, J. Appl. Mech. 52 (1985) 453; Heiman,
-    Bajaj & Sherman, J. Sound Vib. 124 (1988) 55, with k = c = 0.)
-    """
-    response = amplitude / complex(stiffness - rate**2, damping * rate)
-    size, lag = abs(response), -math.atan2(response.imag, response.real)
-    m = expm(np.array([[0.0, 1.0], [-stiffness, -damping]]) * math.pi / rate)
-    a = -(1.0 + m[0, 0]) / m[0, 1]
-    b = m[1, 0] + m[1, 1] * a
-    speed = (a + b) * restitution / (1.0 + restitution)
-    # cos θ = -(1 + y)/X, sin θ = (a - speed) y/(X w).
-    slope = (a - speed) / rate
-    orbits = []
-    for y in np.roots([1.0 + slope**2, 2.0, 1.0 - size**2]):
-        if abs(y.imag) < 1e-12 and speed * y.real > 0.0:
-            theta = math.atan2(slope * y.real / size, -(1.0 + y.real) / size)
-            orbits.append((theta + lag, float(speed * y.real)))
-    return orbits
-
-
 PAIRS = [
-    (0.0, 0.0, 9.0, 2.0, 0.6),
-    (0.0, 0.0, 2.0, 2.0, 0.6),
-    (0.0, 0.3, 9.0, 2.0, 0.6),
-    (1.0, 0.0, 6.0, 2.2, 0.5),
-    (1.0, 0.2, 5.0, 1.7, 0.8),
+    TwoStops(0.0, 0.0, 9.0, 2.0, 0.6),
+    TwoStops(0.0, 0.0, 2.0, 2.0, 0.6),
+    TwoStops(0.0, 0.3, 9.0, 2.0, 0.6),
+    TwoStops(1.0, 0.0, 6.0, 2.2, 0.5),
+    TwoStops(1.0, 0.2, 5.0, 1.7, 0.8),
 ]
-"""Stiffness, damping, amplitude, rate, restitution; the orbit of the second is stable."""
+"""The orbit of the second is stable."""
 
 
-def pair_run(
-    pair: tuple[float, float, float, float, float], phase: float, speed: float, cycles: float
-) -> Run:
-    stiffness, damping, amplitude, rate, restitution = pair
-    piece = Piece(0.0, math.inf, amplitude=amplitude, rate=rate, phase=phase + 0.5 * math.pi)
-    stops = (Stop("left", "back", -1.0, restitution), Stop("right", "front", 1.0, restitution))
-    system = System(1.0, (Spring(stiffness), Damping(damping)), (Drive((piece,)),), stops=stops, length=1.0)
-    return simulate(system, -1.0, speed, (cycles + 0.1) * 2.0 * math.pi / rate)
-
-
-def half_cycle(pair: tuple[float, float, float, float, float], phase: float, speed: float) -> np.ndarray:
-    """Derivative of (time, speed) just after an impact with respect to those after the impact before.
-
-    At (t, v) just after an impact a change (dt, dv) is dx = -v dt, dv - a dt of the motion; it goes through
-    the transition matrix, changes the time of the next impact by -dx/v and its speed by dv + a dt.
-    """
-    stiffness, damping, amplitude, rate, restitution = pair
-    m = expm(np.array([[0.0, 1.0], [-stiffness, -damping]]) * math.pi / rate)
-    before, force = speed / restitution, amplitude * math.cos(phase) + stiffness
-    after = m @ np.array([[-speed, 0.0], [damping * speed - force, 1.0]])
-    delay = -after[0] / before
-    return np.array([delay, restitution * (after[1] - (force + damping * before) * delay)])
+def pair_run(pair: TwoStops, phase: float, speed: float, cycles: float) -> Run:
+    piece = Piece(0.0, math.inf, amplitude=pair.amplitude, rate=pair.rate, phase=phase + 0.5 * math.pi)
+    stops = (Stop("left", "back", -1.0, pair.restitution), Stop("right", "front", 1.0, pair.restitution))
+    forces = (Spring(pair.stiffness), Damping(pair.damping))
+    system = System(1.0, forces, (Drive((piece,)),), stops=stops, length=1.0)
+    return simulate(system, -1.0, speed, (cycles + 0.1) * 2.0 * math.pi / pair.rate)
 
 
 @pytest.mark.parametrize("pair", PAIRS)
-def test_symmetric_orbit_between_two_stops(pair: tuple[float, float, float, float, float]) -> None:
+def test_symmetric_orbit_between_two_stops(pair: TwoStops) -> None:
     """Impacts come every half cycle; a small change of the start grows as the derivative of the map says."""
-    *_parts, rate, restitution = pair
-    half = math.pi / rate
-    orbits = [
-        orbit for orbit in symmetric_orbit(*pair) if kinds(pair_run(pair, *orbit, 1.0))[0][1] == "right"
-    ]
+    half, restitution = math.pi / pair.rate, pair.restitution
+    orbits = [orbit for orbit in pair.orbits() if kinds(pair_run(pair, *orbit, 1.0))[0][1] == "right"]
     assert orbits
     for phase, speed in orbits:
         run = pair_run(pair, phase, speed, 2.0)
@@ -146,7 +101,7 @@ def test_symmetric_orbit_between_two_stops(pair: tuple[float, float, float, floa
         gained = 0.5 * (float(last[0]) ** 2 - speed**2)
         assert sum(run.work.values()) - 4.0 * hit == pytest.approx(gained, abs=CLOSE * 4.0 * hit)
 
-        tangent = half_cycle(pair, phase, speed)
+        tangent = pair.half_cycle(phase, speed)
         # After four impacts the change is about 1e-5, whatever the multiplier.
         step = 1e-5 / max(1.0, float(np.abs(np.linalg.eigvals(tangent)).max())) ** 4
         moved = pair_run(pair, phase, speed + step, 2.0)
@@ -163,7 +118,7 @@ def test_symmetric_orbit_of_an_impact_pair() -> None:
 
     κ = (π/2) (1 + e)/(1 - e), v = -2 e A sin φ/(w (1 - e)), d the play.
     """
-    _k, _c, amplitude, rate, restitution = PAIRS[0]
+    amplitude, rate, restitution = PAIRS[0].amplitude, PAIRS[0].rate, PAIRS[0].restitution
     kappa = 0.5 * math.pi * (1.0 + restitution) / (1.0 - restitution)
     turn = math.acos(2.0 * rate**2 / (2.0 * amplitude) / math.hypot(1.0, kappa))
     expected = []
@@ -173,7 +128,7 @@ def test_symmetric_orbit_of_an_impact_pair() -> None:
             (phase, -2.0 * restitution * amplitude * math.sin(phase) / (rate * (1.0 - restitution)))
         )
     positive = sorted((phase % (2.0 * math.pi), speed) for phase, speed in expected if speed > 0.0)
-    found = sorted((phase % (2.0 * math.pi), speed) for phase, speed in symmetric_orbit(*PAIRS[0]))
+    found = sorted((phase % (2.0 * math.pi), speed) for phase, speed in PAIRS[0].orbits())
     np.testing.assert_allclose(found, positive, rtol=1e-13)
 
 
@@ -189,23 +144,23 @@ def test_bounds_of_stable_symmetric_orbits_of_an_impact_pair(restitution: float)
     c = 4.0 * kappa / math.pi**2
     bounds = (kappa - c) / math.hypot(1.0, c), math.hypot(1.0, kappa)
 
-    def pair(ratio: float) -> tuple[float, float, float, float, float]:
-        return 0.0, 0.0, rate**2 / ratio, rate, e
+    def pair(ratio: float) -> TwoStops:
+        return TwoStops(0.0, 0.0, rate**2 / ratio, rate, e)
 
     def radii(ratio: float) -> list[float]:
-        maps = [half_cycle(pair(ratio), *orbit) for orbit in symmetric_orbit(*pair(ratio))]
+        maps = [pair(ratio).half_cycle(*orbit) for orbit in pair(ratio).orbits()]
         assert [float(np.linalg.det(m)) for m in maps] == pytest.approx([e**2] * len(maps), rel=1e-10)
         return sorted(float(np.abs(np.linalg.eigvals(m)).max()) for m in maps)
 
     assert radii(bounds[0] * (1.0 + 1e-6))[0] < 1.0 < radii(bounds[0] * (1.0 - 1e-6))[0]
     assert radii(bounds[1] * (1.0 - 1e-6))[0] < 1.0
-    assert symmetric_orbit(*pair(bounds[1] * (1.0 + 1e-6))) == []
+    assert pair(bounds[1] * (1.0 + 1e-6)).orbits() == []
 
     uneven = []
     for ratio in (1.2 * bounds[0], 0.9 * bounds[0]):
         phase, speed = min(
-            symmetric_orbit(*pair(ratio)),
-            key=lambda orbit: np.abs(np.linalg.eigvals(half_cycle(pair(ratio), *orbit))).max(),
+            pair(ratio).orbits(),
+            key=lambda orbit: float(np.abs(pair(ratio).multipliers(*orbit)).max()),
         )
         times = [event.time for event in pair_run(pair(ratio), phase, speed + 1e-3, 50.0).events]
         uneven.append(abs(times[-1] - 2.0 * times[-2] + times[-3]))
