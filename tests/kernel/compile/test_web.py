@@ -19,6 +19,7 @@ from printhammer.kernel.compile.signatures import signature_of
 from printhammer.kernel.compile.specialise import ENTRIES, Kernel
 from printhammer.kernel.compile.web import build
 from printhammer.kernel.model.layout import INVERSE_MASS
+from printhammer.run.plain.entries import page_module
 from printhammer.run.problem import Problem, Record
 from printhammer.support.arrays import FloatArray
 
@@ -146,7 +147,7 @@ def assert_close(found: FloatArray, expected: FloatArray) -> None:
 def test_a_module_computes_what_machine_code_computes(name: str, tmp_path: Path) -> None:
     problem, end = problem_of(name)
     path = tmp_path / "kernel.wasm"
-    path.write_bytes(problem.kernel.web_module().content())
+    path.write_bytes(page_module(problem.kernel.laws).content())
     host = Wasmtime(path.read_bytes())
     assert host.imports == []
     times = np.linspace(0.0, end, 401)
@@ -210,7 +211,7 @@ def test_a_module_computes_many_runs(name: str, tmp_path: Path) -> None:
 
     machine = computed()
     path = tmp_path / "kernel.wasm"
-    path.write_bytes(group.kernel.web_module().content())
+    path.write_bytes(page_module(group.kernel.laws).content())
     host = Wasmtime(path.read_bytes())
     with Node(path) as node:
         for call in (host.call, node.call):

@@ -213,6 +213,10 @@ def laws_of(role: str, bindings: Bindings, for_lanes: bool) -> Module:
     return Module(role, f"{role} {for_lanes} {sources} {bindings.digests[role]}", make)
 
 
+_objects: Final[dict[str, bytes]] = {}
+"""WebAssembly objects of the functions without laws, by `Entry.sources`."""
+
+
 class Entry:
     """Entry point of the kernel for given laws; its machine code is loaded or compiled on first use.
 
@@ -297,9 +301,18 @@ class Entry:
         return self.name, self._template.name, [law.name for law in self._laws], sorted(self._choices.items())
 
     def web_object(self) -> bytes:
-        """Compile the entry point to a WebAssembly object file; return its content."""
+        """Compile the entry point to a WebAssembly object file; return its content.
+
+        The object of a function without laws is kept in memory, since the modules of all pages contain it.
+        """
+        key = repr(self.sources)
+        if key in _objects:
+            return _objects[key]
         calling = calls.calling_code(link.ENTRY, self._signature, link.CALL, bare=True)
-        return web.emit(self._linked(calling), self.name)
+        content = web.emit(self._linked(calling), self.name)
+        if not self._laws:
+            _objects[key] = content
+        return content
 
     def description(self) -> dict[str, Any]:
         """Return argument types and number of results of the entry point, for its WebAssembly module."""
