@@ -34,10 +34,11 @@ NEEDED = {
 # Examples that take minutes, and the tests that stand in for them.
 ELSEWHERE = {
     "schemes": "test_verbs.py, and the count in judging/test_schemes.py",
-    "search": "the other examples begin with a shorter one",
-    "judge": "the example of family begins with the same commands",
+    "search": "the example of predictions begins with a shorter one",
+    "judge": "test_verbs.py, with claims at no cost; the example of predictions judges too",
+    "family": "family/test_family.py, with claims at no cost; family/test_family_shipped.py judges a member",
     "base-rates": "test_verbs.py, with claims at no cost",
-    "front": "test_verbs.py, with claims at no cost; the example of family begins with the same search",
+    "front": "test_verbs.py, with claims at no cost",
     "ship": "test_verbs.py, with the stated claims",
 }
 

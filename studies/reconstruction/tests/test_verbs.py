@@ -18,6 +18,7 @@ from studies.reconstruction.judging import base_rates as rates
 from studies.reconstruction.judging import shortlist
 from studies.reconstruction.judging.judged import FIGURE_11, SLOW, STATED
 from studies.reconstruction.search import search
+from studies.reconstruction.search.search import known_starts
 from studies.reconstruction.tests.samples import constants_in
 from studies.reconstruction.verbs import EXAMPLE, VERBS
 from tests.hammers import CRUDE
@@ -107,6 +108,11 @@ def test_a_search_begins_from_another(cli: Callable, here: Path, cheap: None) ->
     with (here / "all.jsonl").open() as file:
         heading, first = json.loads(file.readline()), json.loads(file.readline())
     assert heading["starts"][0] == first["point"]
+    assert cli("search", "known.jsonl", "--from", "family", *BRIEF).status == 0
+    with (here / "known.jsonl").open() as file:
+        heading, *rows = map(json.loads, file)
+    assert heading["starts"] == [list(start) for start in known_starts("all")]
+    assert [row["point"] for row in rows[: len(heading["starts"])]] == heading["starts"][: len(rows)]
     # What leads to a prediction must not have been led by what is predicted.
     done = cli("search", "more.jsonl", "--aim", "stated", "--from", "all.jsonl", *BRIEF)
     assert done.status == 2

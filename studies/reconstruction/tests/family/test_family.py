@@ -1,6 +1,8 @@
 import csv
 import itertools
 import json
+import shlex
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,7 @@ from studies.reconstruction.family.family import csv_text, family_hammers, write
 from studies.reconstruction.family.picture import family_picture
 from studies.reconstruction.judging.judged import STATED
 from studies.reconstruction.search.space import hammer_of, template
+from studies.reconstruction.verbs import VERBS
 
 import printhammer as ph
 from printhammer.errors import InputError
@@ -91,6 +94,22 @@ def test_a_family_is_written_and_read_back(log: Path, tmp_path: Path, calls: lis
     for one, other in itertools.combinations(members, 2):
         apart = [abs(one.constants[k] / other.constants[k] - 1.0) > 0.099 for k in one.constants]
         assert sum(apart) >= 3
+
+
+def test_the_verb_writes_what_its_example_says(
+    cli: Callable[..., Any], log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, calls: list[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (verb,) = (verb for verb in VERBS if verb.name == "family")
+    words = shlex.split(verb.example.rpartition(" && ")[2])
+    name = words[words.index("family") + 1]
+    (tmp_path / name).write_bytes(log.read_bytes())
+    done = cli(*words[words.index("family") :])
+    assert done.status == 0
+    assert done.out.splitlines()[-1] == "1 hammers; wrote family"
+    assert len(calls) > 0
+    assert sorted(path.name for path in (tmp_path / "family").iterdir()) == ["family.csv", "family.json"]
+    assert len(family_hammers(tmp_path / "family")) == 1
 
 
 def test_the_table_says_the_same_as_the_json(log: Path, tmp_path: Path, calls: list[str]) -> None:
