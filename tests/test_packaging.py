@@ -45,7 +45,10 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
 
 
 def test_a_function_stays_one_when_the_package_of_its_name_is_imported(tmp_path: Path) -> None:
-    code = "import printhammer.sweep.api, printhammer as ph; print(ph.sweep.__name__, type(ph.sweep))"
+    code = (
+        "import printhammer.sweep.api, printhammer.sweep.spec, printhammer as ph;"
+        "print(ph.sweep.__name__, type(ph.sweep))"
+    )
     assert output_of(sys.executable, "-c", code, cwd=tmp_path).strip() == "sweep <class 'function'>"
 
 

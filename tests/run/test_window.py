@@ -1,7 +1,6 @@
 """The window of a run: the last dot of a slow device is struck, whatever verb runs it."""
 
 import math
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -193,11 +192,6 @@ def test_a_fast_and_a_slow_device_strike_the_same_dots_everywhere() -> None:
 
 @pytest.mark.slow
 def test_random_devices_strike_the_same_dots_everywhere() -> None:
-    # 300 were tried once; a minute on a slow machine holds some of them.
-    begun, count = time.perf_counter(), 0
-    for hammer in devices(300):
+    # 300 were tried once; half of these are shipped devices in other times, behind their rails.
+    for hammer in devices(40):
         strikes_everywhere(hammer)
-        count += 1
-        if time.perf_counter() - begun > 60.0:
-            break
-    assert count >= 10

@@ -1,8 +1,6 @@
 """Sweeps: each member is what `simulate` makes of it, whatever the engine; failures are rows."""
 
 import math
-import subprocess
-import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -266,14 +264,6 @@ def test_an_interrupt_keeps_the_blocks_that_are_done(
     ph.sweep(spec_file(), out)
     ph.sweep(spec_file(), tmp_path / "whole.zarr")
     assert bytes_of(out) == bytes_of(tmp_path / "whole.zarr")
-
-
-def test_sweep_stays_a_function_when_its_modules_are_imported(tmp_path: Path) -> None:
-    code = "import printhammer.sweep.spec, printhammer as ph; print(type(ph.sweep).__name__)"
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
-    assert done.stdout.strip() == "function"
 
 
 def test_tables_that_change_meanwhile_are_told(

@@ -194,7 +194,8 @@ def test_a_search_finds_both_orbits_of_the_bouncing_ball(gamma: float) -> None:
     exact = BouncingBall(gravity=9.80665, restitution=0.8, frequency=50.0)
     ball = made_of(backstop=rigid(0.8, position=0.0), spring=preload(-MASS * exact.gravity))
     drive = ph.SineForce(gamma * MASS * exact.gravity, exact.frequency)
-    found = ph.orbits(ball, drive=drive, longest=1)
+    # More starts would find these orbits too.
+    found = ph.orbits(ball, drive=drive, longest=1, starts=128)
     sums = np.array([one.multipliers.sum().real for one in found])
     products = np.array([one.multipliers.prod().real for one in found])
     for stable in (True, False):
