@@ -156,6 +156,7 @@ def statics_of(hammer: HammerLike) -> Statics:
         backstop,
         position=hammer.backstop.position if hammer.backstop is not None else -math.inf,
         front=hammer.pack.front if hammer.pack is not None else math.inf,
+        rigid_front=hammer.pack is not None and bool(_flag(hammer.pack, "RIGID_FRONT")),
         rigid=hammer.backstop is not None and bool(_flag(hammer.backstop, "RIGID")),
         memory=hammer.pack is not None and bool(_flag(hammer.pack, "MEMORY")),
         has_magnet=hammer.magnet is not None,

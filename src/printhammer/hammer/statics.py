@@ -57,6 +57,8 @@ class Statics(NamedTuple):
     """Front of the pack, m; infinity without a pack."""
     rigid: bool
     """Whether the backstop is rigid."""
+    rigid_front: bool
+    """Whether the front is a rigid stop."""
     memory: bool
     """Whether the force of the pack depends on its largest past indentation."""
     has_magnet: bool
@@ -110,8 +112,8 @@ def origin_of(s: Statics) -> float:
 
 
 def limits_of(s: Statics) -> tuple[float, float]:
-    """Return the range of displacements, m, that the magnet law and a rigid backstop permit."""
-    return max(s.low, s.position) if s.rigid else s.low, s.high
+    """Return the range of displacements, m, that the magnet law and rigid stops permit."""
+    return max(s.low, s.position) if s.rigid else s.low, min(s.high, s.front) if s.rigid_front else s.high
 
 
 def reach_of(far: float, s: Statics) -> tuple[float, float]:
@@ -120,7 +122,7 @@ def reach_of(far: float, s: Statics) -> tuple[float, float]:
     origin = origin_of(s)
     if not math.isnan(s.platen):
         high = min(high, s.platen)
-    elif s.front < math.inf:
+    elif s.front < math.inf and not s.rigid_front:
         # A pack without thickness is searched to a depth equal to the distance of its front from the origin.
         depth = abs(s.front - origin) if math.isnan(s.thickness) else s.thickness
         high = min(high, s.front + depth)
@@ -157,9 +159,10 @@ def spacing(x: float) -> float:
 
 
 def is_stable(x: float, before: float, after: float, s: Statics) -> bool:
-    """Whether the force points to a root from both sides; a rigid backstop replaces the lower side."""
-    held = before > 0.0 or (s.rigid and x == limits_of(s)[0])
-    return held and after < 0.0
+    """Whether the force points to a root from both sides; a rigid stop replaces the side beyond it."""
+    low, high = limits_of(s)
+    held = before > 0.0 or (s.rigid and x == low)
+    return held and (after < 0.0 or (s.rigid_front and x == high))
 
 
 def put_cluster(anchor: float, sign: float, limit: float, grid: Any, count: int) -> int:
@@ -249,8 +252,9 @@ def rest_position(s: Statics, work: Work, out: Any) -> int:
         if pressing < 0.0:
             out[0], out[1] = s.position if s.rigid else compressed(0.0, first, s), first
             return CRUSHED if math.isnan(out[0]) else RESTS
-        if s.has_magnet:
-            # Without any force, such as a plunger without a spring, the armature stays at the backstop.
+        if s.has_magnet or (s.rigid_front and pressing == 0.0):
+            # Without any force, as for a plunger without a spring or a gear in its play, the armature stays
+            # at the backstop.
             out[0], out[1] = s.position, pressing
             return RESTS if pressing == 0.0 else LIFTED
     if not first < last:
@@ -272,6 +276,9 @@ def rest_position(s: Statics, work: Work, out: Any) -> int:
         if abs(x - origin_of(s)) < nearest:
             nearest = abs(x - origin_of(s))
             out[0] = x
+    if nearest == math.inf and s.rigid_front and free_force(s.front, 0.0, s) > 0.0:
+        out[0] = s.front
+        return RESTS
     return RESTS if nearest < math.inf else UNSTABLE
 
 

@@ -9,6 +9,7 @@ import math
 from typing import Any
 
 MEMORY = False
+RIGID_FRONT = False
 RIGID = False
 LEVELS = False
 FRICTION = False
@@ -77,6 +78,11 @@ def pack_unloading(c: Any, x: float, v: float, q: float) -> float:
 def pack_switch(c: Any, x: float, v: float) -> float:
     """Return 1, without a sign change: the pack law has no kink inside a contact."""
     return 1.0
+
+
+def pack_rebound(c: Any, v_in: float) -> float:
+    """Return the rebound velocity of a perfectly elastic surface, -v_in, m/s."""
+    return -v_in
 
 
 def damping_force(c: Any, v: float) -> float:

@@ -16,7 +16,7 @@ _FORCES: Final = {
     "magnet": ("magnet_force",),
     "coil": (),
     "spring": ("spring_force",),
-    "pack": ("pack_loading",),
+    "pack": ("pack_loading", "pack_rebound"),
     "backstop": ("backstop_elastic", "backstop_rebound"),
     "damping": ("damping_force",),
 }

@@ -12,7 +12,7 @@ import numpy as np
 from printhammer.drive.batch import Ragged
 from printhammer.kernel.model import dots as layout
 from printhammer.kernel.model.dots import DOT
-from printhammer.kernel.model.modes import HELD, PACK_SURFACE
+from printhammer.kernel.model.modes import HELD, HELD_FREE, PACK_SURFACE
 from printhammer.kernel.readout import contacts as readout
 from printhammer.kernel.readout.sums import PARTIALS
 from printhammer.parts.spring.forces import LinearContact
@@ -265,7 +265,7 @@ class Stick(Declared):
 def sticks_of(record: Record) -> list[Stick]:
     """Return the sticking phases of a run under dry friction, in order of time."""
     nodes = record.nodes
-    held = nodes[:, 3] > HELD
+    held = (nodes[:, 3] > HELD) & (nodes[:, 3] <= HELD_FREE)
     # The last node has no step; it ends a phase only if the armature is released there.
     held[-1] = len(held) > 1 and held[-2]
     changes = np.flatnonzero(np.diff(held)) + 1

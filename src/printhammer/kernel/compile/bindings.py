@@ -19,8 +19,13 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.laws import Laws
 
 
-_CHOICES = {"pack": "MEMORY", "backstop": "RIGID", "spring": "LEVELS", "damping": "FRICTION"}
-"""Choice that the module of a part sets, by role."""
+_CHOICES = {
+    "pack": ("MEMORY", "RIGID_FRONT"),
+    "backstop": ("RIGID",),
+    "spring": ("LEVELS",),
+    "damping": ("FRICTION",),
+}
+"""Choices that the module of a part sets, by role."""
 
 
 class Bindings(NamedTuple):
@@ -63,8 +68,8 @@ def bindings_of(laws: Laws) -> Bindings:
         sources = (absent, module, *(sys.modules[other] for other in others))
         digests[role] = code_digest(inspect.getsource(each) for each in sources)
         choices[f"HAS_{role.upper()}"] = bool(name)
-        if role in _CHOICES:
-            choices[_CHOICES[role]] = bool(getattr(module, _CHOICES[role], False))
+        for choice in _CHOICES.get(role, ()):
+            choices[choice] = bool(getattr(module, choice, False))
     return Bindings(names, choices, digests, packing)
 
 

@@ -25,6 +25,7 @@ def suits(laws: Laws) -> bool:
         and not choices["RIGID"]
         and choices["HAS_PACK"]
         and choices["MEMORY"]
+        and not choices["RIGID_FRONT"]
         and not choices["LEVELS"]
         and not choices["FRICTION"]
         and laws.pack_pulls

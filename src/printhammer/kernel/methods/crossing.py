@@ -24,7 +24,7 @@ if TYPE_CHECKING:
         path_gap,
         path_may_change,
     )
-    from printhammer.kernel.model.forces import Hammer, acceleration, hold_limit
+    from printhammer.kernel.model.forces import Hammer, acceleration, hold_limit, is_on_stop
     from printhammer.kernel.model.laws import FRICTION
     from printhammer.kernel.model.pulses import Drive
 
@@ -72,11 +72,12 @@ def closes(g0: float, d0: float, g1: float, d1: float) -> int:
 def rest_gap(a: float, mode: int, hammer: Hammer, control: Control) -> float:
     """Return the event function of a rest: positive while an acceleration `a` keeps the armature at rest."""
     unit = control[1] * control[1] / control[0]
+    if is_on_stop(mode):
+        toward = a if mode == M.RESTING else -a
+        return (hold_limit(hammer) - toward) / unit if FRICTION else -toward / unit
     if FRICTION:
         limit = hold_limit(hammer)
-        return (limit - a) / unit if mode == M.RESTING else 1.0 - (a / limit) * (a / limit)
-    if mode == M.RESTING:
-        return -a / unit
+        return 1.0 - (a / limit) * (a / limit)
     return 1.0 - abs(a) / (STILL * unit)
 
 
@@ -112,7 +113,7 @@ def gap_and_change(
     gap = gap_at(which, t, x, v, electric, law, live, control)
     pause = SHARE * h
     rates = electric_rates(t, x, v, electric, law.hammer, live)
-    if M.RESTING <= law.mode <= M.HELD_FREE:
+    if law.mode >= M.RESTING:
         v, a = 0.0, 0.0
     later = gap_at(
         which, t + pause, x + pause * v, v + pause * a, moved(electric, pause, rates), law, live, control
@@ -179,7 +180,7 @@ def circuit_switch(
     h = end[0] - start[0]
     live = law.drive[0]
     result = M.NO_SWITCH
-    resting = M.RESTING <= law.mode <= M.HELD_FREE
+    resting = law.mode >= M.RESTING
     for which in range(2 if resting else 1):
         if which == PATH_GAP and not path_may_change(live):
             continue

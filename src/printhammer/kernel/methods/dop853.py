@@ -167,7 +167,7 @@ def time_slope(t: float, y: Point, law: ForceLaw) -> Point:
     if HAS_CIRCUIT:
         electric = electric_of(y)
         rates = electric_rates(t, y[1], y[2], electric, hammer, drive[0])
-        if M.RESTING <= mode <= M.HELD_FREE:
+        if mode >= M.RESTING:
             return 1.0, 0.0, 0.0, rates[0], rates[1], rates[2]
         a = acceleration(t, y[1], y[2], mode, memory, hammer, driven(drive[0], electric))
         return 1.0, y[2], a, rates[0], rates[1], rates[2]
@@ -191,7 +191,7 @@ def slope_at(y: Point, place_rate: float, rate: float, law: ForceLaw) -> Point:
     """Return the time derivative at the start of a step, reusing known rates of position and velocity."""
     if HAS_CIRCUIT:
         rates = electric_rates(y[0], y[1], y[2], electric_of(y), law.hammer, law.drive[0])
-        if M.RESTING <= law.mode <= M.HELD_FREE:
+        if law.mode >= M.RESTING:
             return 1.0, 0.0, 0.0, rates[0], rates[1], rates[2]
         return 1.0, place_rate, rate, rates[0], rates[1], rates[2]
     return 1.0, place_rate, rate

@@ -47,6 +47,7 @@ if TYPE_CHECKING:
         FORCE_DRIVE,
         FRICTION,
         HAS_CIRCUIT,
+        RIGID_FRONT,
         backstop_energy,
         backstop_viscous,
         damping_force,
@@ -168,9 +169,12 @@ def quadratures(
         for j in range(out.shape[1]):
             out[row, j] = 0.0
         if i + 1 < nodes.shape[0] and nodes[i + 1, 0] == t0 and nodes[i + 1, 1] == x0:
-            # Two nodes at the same time and place are the two sides of an impact on a rigid backstop.
+            # Two nodes at the same time and place are the two sides of an impact on a rigid surface.
             lost = 0.5 * (v0 * v0 - nodes[i + 1, 2] * nodes[i + 1, 2]) / hammer[INVERSE_MASS]
-            out[row, 3] = lost if mode != M.BACKSTOP and x0 != hammer[FRONT] else 0.0
+            if RIGID_FRONT and x0 == hammer[FRONT]:
+                out[row, 2] = lost
+            else:
+                out[row, 3] = lost if mode != M.BACKSTOP and x0 != hammer[FRONT] else 0.0
             continue
         resting = mode >= M.RESTING
         if (resting and not HAS_CIRCUIT) or ends[row] <= starts[row]:

@@ -6,6 +6,7 @@ Equation numbers refer to F. Hendriks, IBM J. Res. Develop. 27 (1983). `hammer` 
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import inlined
@@ -24,6 +25,7 @@ from printhammer.kernel.model.modes import (
     LOADING,
     RELOADING,
     RESTING,
+    RESTING_FRONT,
     UNLOADING,
 )
 
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
         HAS_DAMPING,
         HAS_PACK,
         MEMORY,
+        RIGID_FRONT,
         backstop_elastic,
         backstop_viscous,
         damping_force,
@@ -99,6 +102,29 @@ def friction(mode: int, memory: float, hammer: Hammer) -> float:
 def hold_limit(hammer: Hammer) -> float:
     """Return the largest acceleration [m/s^2] from which dry friction holds an armature at rest."""
     return float(friction_force(hammer[DAMPING:SPRING], 1.0) * hammer[INVERSE_MASS])
+
+
+@inlined
+def is_on_stop(mode: int) -> bool:
+    """Whether the armature is at rest on a rigid surface, pressed against it by the other forces."""
+    return mode == RESTING or (RIGID_FRONT and mode == RESTING_FRONT)
+
+
+@inlined
+def least_at_rest(mode: int, held: float) -> float:
+    """Return the lowest acceleration [m/s^2] with which an armature stays at rest.
+
+    `held` is the largest acceleration against which friction, or the resolution of the run, holds it.
+    """
+    return -math.inf if mode == RESTING else -held
+
+
+@inlined
+def most_at_rest(mode: int, held: float) -> float:
+    """Return the highest acceleration [m/s^2] with which an armature stays at rest, as `least_at_rest`."""
+    if RIGID_FRONT and mode == RESTING_FRONT:
+        return math.inf
+    return held
 
 
 @inlined

@@ -68,7 +68,7 @@ LAW_FUNCTIONS = {
         "magnet_current",
     ),
     "spring": ("spring_force", "spring_energy", "spring_level"),
-    "pack": ("pack_loading", "pack_memory", "pack_unloading", "pack_switch"),
+    "pack": ("pack_loading", "pack_memory", "pack_unloading", "pack_switch", "pack_rebound"),
     "backstop": (
         "backstop_elastic",
         "backstop_viscous",
@@ -98,6 +98,7 @@ HAS_BACKSTOP: bool
 HAS_DAMPING: bool
 HAS_CIRCUIT: bool
 MEMORY: bool
+RIGID_FRONT: bool
 RIGID: bool
 LEVELS: bool
 FRICTION: bool
@@ -154,6 +155,8 @@ value."""
 pack_switch: Law2
 """Sign function of the pack force: positive while the pack pushes, negative where the law would pull;
 arguments: displacement [m], velocity [m/s]."""
+pack_rebound: Law1
+"""Velocity after an impact on a rigid front [m/s]; argument: velocity before the impact [m/s], positive."""
 backstop_elastic: Law1
 """Elastic force of the backstop [N]; argument: w, the square root of the compression [m^0.5]."""
 backstop_viscous: Law2

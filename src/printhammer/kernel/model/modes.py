@@ -31,6 +31,8 @@ HELD_UNLOADING = 10
 
 HELD_FREE = 11
 """Mode: held by dry friction outside the pack; the motion is not integrated until the drive changes."""
+RESTING_FRONT = 12
+"""Mode: at rest on a rigid front. From `RESTING` on, all modes are modes of an armature at rest."""
 
 MODE_NAMES = (
     "free",
@@ -45,6 +47,7 @@ MODE_NAMES = (
     "held on the loading branch",
     "held on the unloading branch",
     "held by friction",
+    "resting on the front",
 )
 """Public names of the modes, indexed by mode code."""
 

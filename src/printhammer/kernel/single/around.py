@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         MEMORY,
         RELOAD_ALONG_UNLOADING,
         RIGID,
+        RIGID_FRONT,
         backstop_switch,
         pack_memory,
     )
@@ -49,6 +50,9 @@ def first_mode(x: float, v: float, a: float, hammer: Hammer) -> int:
             return M.RESTING if v == 0.0 and a < 0.0 else M.FREE
         if x == b and (v < 0.0 or (v == 0.0 and a < 0.0)):
             return M.BACKSTOP
+    if RIGID_FRONT:
+        rests = x >= hammer[FRONT] and v == 0.0 and a > 0.0
+        return M.RESTING_FRONT if rests else M.FREE
     if HAS_PACK and x >= hammer[FRONT]:
         if x > hammer[FRONT] and v < 0.0 and MEMORY:
             return M.UNLOADING
@@ -82,6 +86,8 @@ def sensible_step(h: float, x: float, v: float, a: float, mode: int, hammer: Ham
             h = min(h, -2.04 * v / a)
     if HAS_PACK and mode == M.FREE and x < hammer[FRONT]:
         h = min(h, 1.02 * time_to_level(hammer[FRONT] - x, v, a))
+    if RIGID_FRONT and mode == M.FREE and x == hammer[FRONT] and v < 0.0 and a > 0.0:
+        h = min(h, -2.04 * v / a)
     return h
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
         path_of,
         take_path,
     )
-    from printhammer.kernel.model.forces import Hammer, acceleration
+    from printhammer.kernel.model.forces import Hammer, acceleration, is_on_stop
     from printhammer.kernel.model.laws import FRICTION, HAS_CIRCUIT
     from printhammer.kernel.model.pulses import pass_edges
     from printhammer.kernel.single.carry import Setup
@@ -90,7 +90,7 @@ def mode_at_rest(mode: int) -> int:
         return M.HELD_LOADING
     if mode in (M.UNLOADING, M.RELOADING):
         return M.HELD_UNLOADING
-    return M.RESTING if mode == M.RESTING else M.HELD_FREE
+    return mode if is_on_stop(mode) else M.HELD_FREE
 
 
 @inlined

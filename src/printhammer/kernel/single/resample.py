@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from printhammer.kernel.compile.compiling import compiled, entry
+from printhammer.kernel.compile.compiling import compiled, entry, inlined
 from printhammer.kernel.model import modes as M
 from printhammer.kernel.model.circuit import BLOCKED
 from printhammer.kernel.model.layout import (
@@ -47,6 +47,7 @@ if TYPE_CHECKING:
         HAS_CIRCUIT,
         HAS_PACK,
         MEMORY,
+        RIGID_FRONT,
         backstop_elastic,
         backstop_viscous,
         damping_force,
@@ -70,6 +71,12 @@ def memory_of(mode: int, kept: float, hammer: Hammer) -> float:
     if HAS_PACK and MEMORY and mode in (M.UNLOADING, M.RELOADING, M.HELD_UNLOADING):
         return pack_memory(hammer[PACK:BACKSTOP_PART], kept)
     return kept if FRICTION else 0.0
+
+
+@inlined
+def is_held(mode: int) -> bool:
+    """Whether the armature is at rest off backstop and rigid stops: in the pack, or held by dry friction."""
+    return M.HELD < mode <= M.HELD_FREE
 
 
 @compiled
@@ -192,7 +199,7 @@ def resample(
         if FRICTION:
             memory = memory_of(mode, kept, hammer)
             out[row, 8] += friction(mode, memory, hammer)
-            if mode > M.HELD:
+            if is_held(mode):
                 out[row, 8] = -acceleration(t, x, 0.0, mode, memory, hammer, drive) / hammer[INVERSE_MASS]
         out[row, 9] = mode
         if HAS_CIRCUIT:
@@ -254,6 +261,8 @@ def peaks_of(
 ) -> tuple[float, float, float]:
     """Return the time of the largest depth [s], the largest depth [m] and the peak force [N] of a contact."""
     surface = int(contact[0])
+    if RIGID_FRONT and surface == M.PACK_SURFACE:
+        return contact[1], 0.0, math.nan
     begin = int(contact[5])
     end = begin
     best = (begin, 0)

@@ -70,7 +70,9 @@ def friction_ends(
     samples, is another sample.
     """
     mode, memory, hammer, drive = law
-    size = highest if math.isinf(lowest) else highest - lowest
+    size = highest - lowest
+    if math.isinf(size):
+        size = highest if math.isinf(lowest) else -lowest
     start = acceleration(t, x, 0.0, mode, memory, hammer, drive)
     while True:
         half = acceleration(t + 0.5 * pause, x, 0.0, mode, memory, hammer, drive)

@@ -15,7 +15,13 @@ from printhammer.kernel.single.carry import Setup
 
 if TYPE_CHECKING:
     from printhammer.kernel.model.circuit import driven, enter_piece
-    from printhammer.kernel.model.forces import acceleration, hold_limit
+    from printhammer.kernel.model.forces import (
+        acceleration,
+        hold_limit,
+        is_on_stop,
+        least_at_rest,
+        most_at_rest,
+    )
     from printhammer.kernel.model.laws import FRICTION, HAS_CIRCUIT, pack_memory
     from printhammer.kernel.model.pulses import pass_edges
     from printhammer.kernel.single.around import failure, first_mode, out_of_bounds
@@ -67,7 +73,7 @@ def begin(state: State, setup: Setup, contacts: Any) -> None:
     state[C.FREE_STEP], state[C.PACK_STEP] = 0.02 * time_scale, 0.005 * time_scale
     state[C.CONTACT_STEP] = 0.05
     state[C.STEP] = state[C.PACK_STEP] if mode in (M.LOADING, M.UNLOADING) else state[C.FREE_STEP]
-    if mode in (M.LOADING, M.UNLOADING, M.RELOADING):
+    if mode in (M.LOADING, M.UNLOADING, M.RELOADING, M.RESTING_FRONT):
         state[C.TOUCHED] = open_contact(contacts, 0, M.PACK_SURFACE, t, v, 0, True)
     elif mode in (M.BACKSTOP, M.BACKSTOP_RELEASED, M.RESTING):
         state[C.TOUCHED] = open_contact(contacts, 0, M.BACKSTOP_SURFACE, t, v, 0, True)
@@ -153,7 +159,8 @@ def run(posed: Any, t_end: float, nodes: Any, contacts: Any, state: Any) -> tupl
             state[C.ENTERED] = 1.0
             continue
         held = hold_limit(hammer) if FRICTION else 0.0
-        if mode == M.RESTING and state[C.ACCELERATION] > held:
+        a = state[C.ACCELERATION]
+        if is_on_stop(mode) and (a < least_at_rest(mode, held) or a > most_at_rest(mode, held)):
             close_contact(contacts, int(state[C.TOUCHED]), state[C.TIME], 0.0)
             state[C.MODE] = M.FREE
             relabel_node(nodes, int(state[C.USED]), M.FREE)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import inlined
@@ -16,7 +15,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.methods.contact import advance_contact
     from printhammer.kernel.methods.landing import advance
     from printhammer.kernel.model.circuit import driven, electric_rates, is_quiet, moved
-    from printhammer.kernel.model.forces import hold_limit
+    from printhammer.kernel.model.forces import hold_limit, is_on_stop, least_at_rest, most_at_rest
     from printhammer.kernel.model.laws import FRICTION, HAS_CIRCUIT, MEMORY
     from printhammer.kernel.single.around import (
         contact_unit,
@@ -57,12 +56,12 @@ def take_step(state: State, setup: Setup, t_next: float, nodes: Any) -> tuple[in
     """
     mode, control = int(state[C.MODE]), setup.control
     still = stillness(control)
-    rests = mode == M.RESTING or (
+    rests = is_on_stop(mode) or (
         state[C.VELOCITY] == 0.0 and abs(state[C.ACCELERATION]) <= still and mode in BRANCHES
     )
     if FRICTION and state[C.VELOCITY] == 0.0:
         accelerate_at_rest(state, setup)
-        rests = mode == M.RESTING or abs(state[C.ACCELERATION]) <= hold_limit(setup.hammer)
+        rests = is_on_stop(mode) or abs(state[C.ACCELERATION]) <= hold_limit(setup.hammer)
         if not rests:
             rests = set_off(state, setup, nodes)
     if mode == M.BACKSTOP:
@@ -191,11 +190,11 @@ def wait(state: State, setup: Setup, t_next: float, still: float, nodes: Any) ->
     pause = t_next - t
     if state[C.FIRST] < state[C.LAST] and not HAS_CIRCUIT:
         pause = min(pause, state[C.WAIT])
-    least, most = (-math.inf, 0.0) if mode == M.RESTING else (-still, still)
+    held = 0.0 if is_on_stop(mode) else still
     if FRICTION:
-        most = hold_limit(setup.hammer)
-        least = -math.inf if mode == M.RESTING else -most
-    if mode != M.RESTING:
+        held = hold_limit(setup.hammer)
+    least, most = least_at_rest(mode, held), most_at_rest(mode, held)
+    if not is_on_stop(mode):
         relabel_node(nodes, int(state[C.USED]), mode_at_rest(mode))
     branch = mode_at_rest(mode) if FRICTION else mode
     law = ForceLaw(branch, state[C.MEMORY_NOW], setup.hammer, driven(setup.train.live, electric_of(state)))
@@ -206,7 +205,7 @@ def wait(state: State, setup: Setup, t_next: float, still: float, nodes: Any) ->
         ended, pause = rest_ends(t, x, pause, least, most, law)
         state[C.WAIT] = (
             C.SHORTEST_WAIT * time_scale
-            if ended or mode == M.RESTING
+            if ended or is_on_stop(mode)
             else min(2.0 * state[C.WAIT], time_scale)
         )
     switch = M.EDGE if pause == t_next - t else M.NO_SWITCH
@@ -214,7 +213,7 @@ def wait(state: State, setup: Setup, t_next: float, still: float, nodes: Any) ->
     state[C.ACCELERATION] = acceleration_in(mode, 0.0, state, setup)
     if not ended and switch == M.NO_SWITCH:
         return M.HOLDS
-    if ended and not FRICTION and mode != M.RESTING and not goes_on_in(state[C.ACCELERATION], mode):
+    if ended and not FRICTION and not is_on_stop(mode) and not goes_on_in(state[C.ACCELERATION], mode):
         reverse(state, setup)
         state[C.ACCELERATION] = acceleration_in(int(state[C.MODE]), 0.0, state, setup)
     return switch
@@ -225,7 +224,7 @@ def step_at_rest(state: State, setup: Setup, t_next: float, nodes: Any) -> int:
     """Integrate the coil circuit for one step, armature at rest; return the event that ends the step."""
     mode, x = int(state[C.MODE]), state[C.POSITION_NOW]
     held = mode
-    if mode != M.RESTING:
+    if not is_on_stop(mode):
         held = mode_at_rest(mode)
         relabel_node(nodes, int(state[C.USED]), held)
     if int(state[C.STARTED]) != held:
@@ -237,7 +236,7 @@ def step_at_rest(state: State, setup: Setup, t_next: float, nodes: Any) -> int:
     state[C.TIME], state[C.STEP] = end[0], h
     keep_electric(electric, state)
     state[C.ACCELERATION] = acceleration_in(mode, 0.0, state, setup)
-    ended = switch == M.REST_ENDED and mode != M.RESTING
+    ended = switch == M.REST_ENDED and not is_on_stop(mode)
     if ended and not FRICTION and not goes_on_in(state[C.ACCELERATION], mode):
         reverse(state, setup)
     return switch

@@ -7,14 +7,21 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import inlined
 from printhammer.kernel.model import modes as M
-from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, POSITION
+from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION
 from printhammer.kernel.model.transitions import FOLLOWING
 from printhammer.kernel.single import carry as C
 
 if TYPE_CHECKING:
     from printhammer.kernel.model.circuit import next_path
     from printhammer.kernel.model.forces import hold_limit
-    from printhammer.kernel.model.laws import FRICTION, HAS_CIRCUIT, RIGID, backstop_rebound
+    from printhammer.kernel.model.laws import (
+        FRICTION,
+        HAS_CIRCUIT,
+        RIGID,
+        RIGID_FRONT,
+        backstop_rebound,
+        pack_rebound,
+    )
     from printhammer.kernel.single.carry import Setup
     from printhammer.kernel.single.phases import (
         State,
@@ -51,7 +58,7 @@ def after_step(switch: int, state: State, setup: Setup, nodes: Any, contacts: An
         if switch == M.REACHED_BACKSTOP:
             reach_backstop(state, setup, nodes, contacts)
         elif switch == M.REACHED_FRONT:
-            reach_front(state, setup, contacts)
+            reach_front(state, setup, nodes, contacts)
         elif FRICTION and switch == M.REVERSAL and int(state[C.MODE]) in (M.FREE, M.PACK_RELEASED):
             # The next step decides whether the armature is held, or slides back.
             state[C.VELOCITY] = 0.0
@@ -102,30 +109,46 @@ def reach_backstop(state: State, setup: Setup, nodes: Any, contacts: Any) -> Non
     """Update the run state at a touch of the backstop: contact or, on a rigid backstop, rebound or rest."""
     open_now(M.BACKSTOP_SURFACE, state, contacts)
     if RIGID:
-        hammer = setup.hammer
-        note_node(M.FREE, state[C.MEMORY_NOW] if FRICTION else 0.0, state, setup, nodes)
-        v = backstop_rebound(hammer[BACKSTOP_PART:MAGNET], state[C.VELOCITY])
-        state[C.VELOCITY] = v
-        if FRICTION:
-            state[C.MEMORY_NOW] = 1.0
-        a = acceleration_in(M.FREE, v, state, setup)
-        if FRICTION and v == 0.0:
-            a = acceleration_in(M.RESTING, 0.0, state, setup) - hold_limit(hammer)
-        if a < 0.0 and v * v <= -2.0 * a * 1e-12 * setup.control[0]:
-            state[C.VELOCITY] = 0.0
-            state[C.MODE] = M.RESTING
-        else:
-            close_now(state, contacts)
+        v = backstop_rebound(setup.hammer[BACKSTOP_PART:MAGNET], state[C.VELOCITY])
+        rebound(v, 1.0, M.RESTING, state, setup, nodes, contacts)
     else:
         follow(M.REACHED_BACKSTOP, state)
         state[C.ROOT] = 0.0
 
 
 @inlined
-def reach_front(state: State, setup: Setup, contacts: Any) -> None:
-    """Update the run state when the armature reaches the pack front; begin a contact on inward motion."""
+def rebound(
+    v: float, away: float, resting: int, state: State, setup: Setup, nodes: Any, contacts: Any
+) -> None:
+    """Update the run state at an impact on a rigid surface: velocity `v`, or rest in the mode `resting`.
+
+    `away` is the direction from the surface, 1 or -1.
+    """
+    hammer = setup.hammer
+    note_node(M.FREE, state[C.MEMORY_NOW] if FRICTION else 0.0, state, setup, nodes)
+    state[C.VELOCITY] = v
+    if FRICTION:
+        state[C.MEMORY_NOW] = away
+    a = away * acceleration_in(M.FREE, v, state, setup)
+    if FRICTION and v == 0.0:
+        a = away * acceleration_in(resting, 0.0, state, setup) - hold_limit(hammer)
+    if a < 0.0 and v * v <= -2.0 * a * 1e-12 * setup.control[0]:
+        state[C.VELOCITY] = 0.0
+        state[C.MODE] = resting
+    else:
+        close_now(state, contacts)
+
+
+@inlined
+def reach_front(state: State, setup: Setup, nodes: Any, contacts: Any) -> None:
+    """Update the run state when the armature reaches the front: rebound, or a contact on inward motion."""
     v = max(state[C.VELOCITY], 0.0)
     state[C.VELOCITY] = v
+    if RIGID_FRONT:
+        open_now(M.PACK_SURFACE, state, contacts)
+        v = pack_rebound(setup.hammer[PACK:BACKSTOP_PART], v)
+        rebound(v, -1.0, M.RESTING_FRONT, state, setup, nodes, contacts)
+        return
     # A touch with zero velocity begins a contact only if the forces push the armature into the pack.
     if v > 0.0 or acceleration_in(M.FREE, v, state, setup) > 0.0:
         open_now(M.PACK_SURFACE, state, contacts)

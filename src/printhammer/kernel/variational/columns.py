@@ -24,7 +24,7 @@ from printhammer.kernel.methods.dop853_tableau import FULL_A as A
 from printhammer.kernel.methods.dop853_tableau import FULL_B as B
 from printhammer.kernel.methods.dop853_tableau import STAGES
 from printhammer.kernel.model.layout import INVERSE_MASS, POSITION
-from printhammer.kernel.model.modes import BACKSTOP, HELD_FREE, LOADING, RELOADING, RESTING, UNLOADING
+from printhammer.kernel.model.modes import BACKSTOP, LOADING, RELOADING, RESTING, UNLOADING
 from printhammer.kernel.variational import layout as V
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def column_rates(
     """Write to `rates` the derivatives of displacement (or w), velocity, time and tangent columns at `y`."""
     hammer, drive, scales = setting.hammer, driven(setting.drive, electric_in(y)), setting.scales
     v = y[1]
-    if HAS_CIRCUIT and RESTING <= mode <= HELD_FREE:
+    if HAS_CIRCUIT and mode >= RESTING:
         rates[:] = 0.0
         rates[V.TIME] = 1.0
         add_circuit(rates, y, columns.shape[1], y[0], False, setting)
@@ -128,7 +128,7 @@ def longest_step(mode: int, memory: float, peak: float, work: Any, setting: Sett
 
     The steps of the run may be longer, since they resolve only the motion itself, which is slow near rest.
     """
-    if HAS_CIRCUIT and RESTING <= mode <= HELD_FREE:
+    if HAS_CIRCUIT and mode >= RESTING:
         rate = circuit_pace(work[V.START, 0], work[V.START], setting)
         return LONGEST_PHASE / rate if rate > 0.0 else math.inf
     slopes = force_slopes(work[V.START], mode, memory, peak, work[V.MEMORIES], setting)

@@ -45,6 +45,7 @@ if TYPE_CHECKING:
         HAS_PACK,
         LEVELS,
         PACK_PULLS,
+        RIGID_FRONT,
         backstop_elastic,
         backstop_energy,
         backstop_rebound,
@@ -53,6 +54,7 @@ if TYPE_CHECKING:
         damping_force,
         magnet_force,
         pack_memory,
+        pack_rebound,
         pack_switch,
         spring_force,
         spring_level,
@@ -236,14 +238,20 @@ def contact_changes(w: float, v: float, k: int, forcing: Forcing) -> tuple[float
 
 
 @compiled
-def rebound_change(v_in: float, k: int, forcing: Forcing) -> float:
-    """Return the derivative of the rebound velocity of a rigid backstop with respect to constant k."""
+def rebound_change(front: bool, v_in: float, k: int, forcing: Forcing) -> float:
+    """Return the derivative of the velocity after an impact with respect to constant k.
+
+    `front` states the rigid surface: the front or else the backstop.
+    """
     varied, of_hammer = forcing.varied, forcing.of_hammer
     change = 0.0
-    if of_hammer[k] & V.BACKSTOP_MOVES:
+    if of_hammer[k] & (V.PACK_MOVES if front else V.BACKSTOP_MOVES):
         for i in range(POINTS[CENTRAL]):
-            c = varied[k, V.MIDDLE + int(OFFSETS[CENTRAL, i])][BACKSTOP_PART:MAGNET]
-            change += WEIGHTS[CENTRAL, i] * backstop_rebound(c, v_in)
+            c = varied[k, V.MIDDLE + int(OFFSETS[CENTRAL, i])]
+            if RIGID_FRONT and front:
+                change += WEIGHTS[CENTRAL, i] * pack_rebound(c[PACK:BACKSTOP_PART], v_in)
+            else:
+                change += WEIGHTS[CENTRAL, i] * backstop_rebound(c[BACKSTOP_PART:MAGNET], v_in)
     return float(change / V.SPACING)
 
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.methods.contact import contact_rate, length_of
     from printhammer.kernel.methods.dop853 import contact_step
     from printhammer.kernel.model.circuit import driven, path_of
-    from printhammer.kernel.model.forces import Hammer, acceleration, value_at
+    from printhammer.kernel.model.forces import Hammer, acceleration, is_on_stop, value_at
     from printhammer.kernel.model.laws import (
         ELECTRIC_ROW,
         FORCED,
@@ -32,9 +32,10 @@ if TYPE_CHECKING:
         HAS_CIRCUIT,
         HAS_PACK,
         MEMORY,
+        RIGID_FRONT,
     )
     from printhammer.kernel.model.pulses import Drive
-    from printhammer.kernel.single.resample import memory_of
+    from printhammer.kernel.single.resample import is_held, memory_of
     from printhammer.kernel.variational.circuit import (
         couples,
         current_slopes,
@@ -111,6 +112,8 @@ def place_of_rest(t: float, node: Any, k: int, columns: Any, setting: Setting) -
     x, mode, moves = node[1], int(node[3]), forcing.moves
     if mode == M.RESTING:
         return float(moves[k, POSITION])
+    if RIGID_FRONT and mode == M.RESTING_FRONT:
+        return float(moves[k, FRONT])
     drive = driven(live, electric_at_node(node))
     value = value_at(t, x, hammer, drive)
     with_value = force_with_value(x, value, hammer, drive, forcing)
@@ -168,7 +171,7 @@ def rest(t: float, t_to: float, node: Any, columns: Any, setting: Setting) -> fl
     Returns the logarithm of a factor that has been divided out of the columns.
     """
     grown = 0.0
-    if FRICTION and int(node[3]) > M.HELD:
+    if FRICTION and is_held(int(node[3])):
         # Dry friction holds the neighbouring motion at its own place.
         for k in range(columns.shape[1]):
             columns[1, k] = 0.0
@@ -179,7 +182,7 @@ def rest(t: float, t_to: float, node: Any, columns: Any, setting: Setting) -> fl
             if FORCED:
                 place = place_of_rest(t_to, node, k, columns, setting)
             columns[0, k], columns[1, k] = place, 0.0
-            columns[PEAK, k] = 0.0 if int(node[3]) == M.RESTING else place
+            columns[PEAK, k] = 0.0 if is_on_stop(int(node[3])) else place
         return grown
     if FORCED:
         for k in range(columns.shape[1]):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from printhammer.kernel.compile.compiling import compiled
+from printhammer.kernel.compile.compiling import compiled, inlined
 from printhammer.kernel.model import modes as M
 from printhammer.kernel.model.layout import (
     BACKSTOP_PART,
@@ -17,11 +17,20 @@ from printhammer.kernel.model.layout import (
     FRONT,
     INVERSE_MASS,
     MAGNET,
+    PACK,
     POSITION,
     Train,
 )
 from printhammer.kernel.model.transitions import AT_FRONT, AT_PEAK, JUMPS, NO_JUMP, TURN
-from printhammer.kernel.variational.layout import BACKSTOP_LOSS, COIL, DRIVE, ENERGIES, ENERGY, PEAK
+from printhammer.kernel.variational.layout import (
+    BACKSTOP_LOSS,
+    COIL,
+    DRIVE,
+    ENERGIES,
+    ENERGY,
+    PACK_LOSS,
+    PEAK,
+)
 from printhammer.kernel.variational.slopes import CENTRAL, OFFSETS, WEIGHTS
 
 if TYPE_CHECKING:
@@ -44,11 +53,13 @@ if TYPE_CHECKING:
         HAS_PACK,
         MEMORY,
         RIGID,
+        RIGID_FRONT,
         backstop_rebound,
         magnet_force,
+        pack_rebound,
     )
     from printhammer.kernel.model.pulses import Drive, drive_value, piece_value
-    from printhammer.kernel.single.resample import branch_of, memory_of
+    from printhammer.kernel.single.resample import branch_of, is_held, memory_of
     from printhammer.kernel.variational.circuit import electric_at_node
     from printhammer.kernel.variational.forcing import rebound_change
     from printhammer.kernel.variational.layout import Setting
@@ -87,22 +98,33 @@ def add_energies(columns: Any, k: int, later: float, before: Any, behind: Any) -
         columns[ENERGY + i, k] += (before[i] - behind[i]) * later
 
 
+@inlined
+def rebound_at(front: bool, v_in: float, hammer: Hammer) -> float:
+    """Return the velocity after an impact on the rigid surface, the front or the backstop [m/s]."""
+    if RIGID_FRONT and front:
+        return pack_rebound(hammer[PACK:BACKSTOP_PART], v_in)
+    return backstop_rebound(hammer[BACKSTOP_PART:MAGNET], v_in)
+
+
 @compiled
 def is_rebound(node: Any, after: Any) -> bool:
-    """Whether two nodes are the states before and after an impact on a rigid backstop."""
-    return RIGID and node[0] == after[0] and int(node[3]) == M.FREE and node[2] < 0.0 and after[2] >= 0.0
+    """Whether two nodes are the states before and after an impact on a rigid surface."""
+    v_in, v_out = node[2], after[2]
+    turned = (RIGID and v_in < 0.0 <= v_out) or (RIGID_FRONT and v_in > 0.0 >= v_out)
+    return turned and node[0] == after[0] and int(node[3]) == M.FREE
 
 
 @compiled
 def pass_rebound(node: Any, after: Any, columns: Any, setting: Setting) -> None:
-    """Propagate the tangent columns through an impact on a rigid backstop."""
+    """Propagate the tangent columns through an impact on a rigid surface."""
     hammer, drive, forcing = setting.hammer, driven(setting.drive, electric_at_node(after)), setting.forcing
-    c = hammer[BACKSTOP_PART:MAGNET]
     v_in, v_out = node[2], after[2]
-    spacing = -SPEED_SPACING * v_in
+    front = RIGID_FRONT and v_in > 0.0
+    surface, loss = (FRONT, PACK_LOSS) if front else (POSITION, BACKSTOP_LOSS)
+    spacing = SPEED_SPACING * abs(v_in)
     slope = (
-        8.0 * (backstop_rebound(c, v_in + spacing) - backstop_rebound(c, v_in - spacing))
-        - (backstop_rebound(c, v_in + 2.0 * spacing) - backstop_rebound(c, v_in - 2.0 * spacing))
+        8.0 * (rebound_at(front, v_in + spacing, hammer) - rebound_at(front, v_in - spacing, hammer))
+        - (rebound_at(front, v_in + 2.0 * spacing, hammer) - rebound_at(front, v_in - 2.0 * spacing, hammer))
     ) / (12.0 * spacing)
     before_it, behind_it = (node[4], after[4]) if FRICTION else (0.0, 0.0)
     a = acceleration(node[0], node[1], v_in, M.FREE, before_it, hammer, drive)
@@ -110,24 +132,24 @@ def pass_rebound(node: Any, after: Any, columns: Any, setting: Setting) -> None:
     jump = acceleration(node[0], node[1], v_out, M.FREE, behind_it, hammer, drive) - a if HAS_DAMPING else 0.0
     for k in range(columns.shape[1]):
         if FORCED:
-            columns[0, k] -= forcing.moves[k, POSITION]
+            columns[0, k] -= forcing.moves[k, surface]
         earlier = columns[0, k] / v_in
         if FORCED:
             before = powers_at(node, M.FREE, 0.0, v_in, hammer, drive)
             behind = powers_at(node, M.FREE, 0.0, v_out, hammer, drive)
             add_energies(columns, k, -earlier, before, behind)
-            columns[BACKSTOP_LOSS, k] += v_in * (columns[1, k] - a * earlier) / hammer[INVERSE_MASS]
+            columns[loss, k] += v_in * (columns[1, k] - a * earlier) / hammer[INVERSE_MASS]
         columns[0, k] = earlier * v_out
         columns[1, k] = slope * columns[1, k] + (1.0 - slope) * a * earlier
         if HAS_DAMPING:
             columns[1, k] += jump * earlier
         if FORCED:
-            columns[1, k] += rebound_change(v_in, k, forcing)
-            columns[BACKSTOP_LOSS, k] -= v_out * (columns[1, k] - (a + jump) * earlier) / hammer[INVERSE_MASS]
+            columns[1, k] += rebound_change(front, v_in, k, forcing)
+            columns[loss, k] -= v_out * (columns[1, k] - (a + jump) * earlier) / hammer[INVERSE_MASS]
             # The energy lost at the impact is proportional to the mass.
             lost = 0.5 * (v_in * v_in - v_out * v_out) / hammer[INVERSE_MASS]
-            columns[BACKSTOP_LOSS, k] -= lost * forcing.moves[k, INVERSE_MASS] / hammer[INVERSE_MASS]
-            columns[0, k] += forcing.moves[k, POSITION]
+            columns[loss, k] -= lost * forcing.moves[k, INVERSE_MASS] / hammer[INVERSE_MASS]
+            columns[0, k] += forcing.moves[k, surface]
 
 
 @compiled
@@ -219,15 +241,15 @@ def pass_friction(node: Any, after: Any, columns: Any, setting: Setting) -> tupl
         Whether the node is one of these events, and whether the motion is differentiable there.
     """
     mode, following = int(node[3]), int(after[3])
-    if MEMORY and max(mode, following) > M.HELD and branch_of(following) == M.UNLOADING:
+    if MEMORY and (is_held(mode) or is_held(following)) and branch_of(following) == M.UNLOADING:
         # The armature stands at the maximum at which a new unloading branch begins.
         for k in range(columns.shape[1]):
             columns[PEAK, k] = columns[0, k] if after[4] == after[1] else columns[PEAK, k]
-    if following > M.HELD:
+    if is_held(following):
         for k in range(columns.shape[1]):
             columns[1, k] = 0.0
         return True, True
-    if mode > M.HELD:
+    if is_held(mode):
         return True, pass_release(node, after, columns, setting)
     if mode == following and node[4] * after[4] < 0.0 and after[2] == 0.0:
         return True, pass_reversal(node, after, mode, following, columns, setting)

@@ -54,6 +54,7 @@ if TYPE_CHECKING:
         HAS_PACK,
         MEMORY,
         RIGID,
+        RIGID_FRONT,
         backstop_elastic,
         magnet_force,
         magnet_inductance,
@@ -127,9 +128,11 @@ def statics_at(constants: Any, limits: Any) -> Statics:
     `limits` are the range of the law of the magnet, m, the position of the platen and the thickness of the
     pack, m, NaN without one, and the mass, kg.
     """
-    rigid, memory, has_magnet = False, False, False
+    rigid, rigid_front, memory, has_magnet = False, False, False, False
     if RIGID:
         rigid = True
+    if RIGID_FRONT:
+        rigid_front = True
     if MEMORY:
         memory = True
     if HAS_MAGNET:
@@ -152,6 +155,7 @@ def statics_at(constants: Any, limits: Any) -> Statics:
         position,
         front,
         rigid,
+        rigid_front,
         memory,
         has_magnet,
         limits[0],
