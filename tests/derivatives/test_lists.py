@@ -53,3 +53,46 @@ def test_sensitivities_follow_the_contacts(law: str, stiffness: float, within: f
         own = result.derivatives[:, rows, result.constants.index(key)]
         scale = np.abs(result.dots[:, rows]) / value
         assert np.abs((own - expected) / scale).max() < within, key
+
+
+STOPPED = ("flight_time", "impact_speed", "net_loss", "return_time", "return_speed")
+
+
+def between_stops() -> ph.Hammer:
+    """Armature with damping between two rigid stops, with a contact on its way to the front."""
+    hammer = relay("linear", 3e3).replace("damping", {"law": "viscous", "coefficient": 0.05})
+    return hammer.replace("pack", {"law": "rigid", "front": 0.5e-3, "restitution": 0.4})
+
+
+def stopped_dots(hammer: ph.Hammer) -> tuple[np.ndarray, float]:
+    drive = ph.PulseTrain(hammer.waveform, period=3e-3, pulses=2)
+    result = ph.sensitivities(hammer, drive, tolerance=1e-14, constants=["mass"])
+    rows = [result.quantities.index(name) for name in STOPPED]
+    return result.dots[:, rows], float(result.run[result.run_quantities.index("pack_loss")])
+
+
+def test_sensitivities_between_two_rigid_stops() -> None:
+    hammer = between_stops()
+    result = ph.sensitivities(hammer, ph.PulseTrain(hammer.waveform, period=3e-3, pulses=2), tolerance=1e-13)
+    assert result.ok
+    rows = [result.quantities.index(name) for name in STOPPED]
+    loss = result.run_quantities.index("pack_loss")
+    for key in ("mass", "pack.front", "pack.restitution", "backstop.restitution", "damping.coefficient"):
+        value = hammer.constants[key].si
+        step = 1e-4 * value
+        moved = [(weight, *stopped_dots(hammer.replace(key, value + k * step))) for k, weight in STEPS]
+        expected = sum(weight * dots for weight, dots, _loss in moved) / (12.0 * step)
+        column = result.constants.index(key)
+        scale = np.abs(result.dots[:, rows]) / value
+        assert np.isfinite(expected).all()
+        assert np.abs((result.derivatives[:, rows, column] - expected) / scale).max() < 1e-7, key
+        lost = sum(weight * one for weight, _dots, one in moved) / (12.0 * step)
+        own = float(result.run_derivatives[loss, column])
+        assert own == pytest.approx(lost, abs=1e-6 * float(result.run[loss]) / value), key
+
+
+def test_quantities_that_a_rigid_front_does_not_have() -> None:
+    hammer = between_stops()
+    result = ph.sensitivities(hammer, ph.PulseTrain(hammer.waveform))
+    for name in ("peak_force", "contact_time"):
+        assert np.isnan(result.derivatives[:, result.quantities.index(name)]).all()

@@ -19,8 +19,13 @@ END = 6e-3
 STROKE = 1e-3
 
 
-def draw(rng: np.random.Generator, *, dry: bool = False) -> tuple[ph.Hammer, ph.PulseTrain, System]:
-    """Return a hammer with a rigid backstop at 0, its drive, and the same system for the oracle."""
+def draw(
+    rng: np.random.Generator, *, dry: bool = False, front: bool = False
+) -> tuple[ph.Hammer, ph.PulseTrain, System]:
+    """Return a hammer with a rigid backstop at 0, its drive, and the same system for the oracle.
+
+    With `dry`, the hammer has dry friction; with `front`, also a rigid stop on the paper side.
+    """
 
     def log(low: float, high: float) -> float:
         return float(low * (high / low) ** rng.random())
@@ -57,6 +62,11 @@ def draw(rng: np.random.Generator, *, dry: bool = False) -> tuple[ph.Hammer, ph.
         if rng.random() < 0.3:
             terms["force.seal"] = {"law": "friction", "kinetic": 0.05}
             frictions.append(Friction(0.05, 0.05, "seal"))
+    stops = [Stop("backstop", "back", 0.0, restitution)]
+    if front:
+        place, bounce = float(rng.uniform(0.5, 1.0)) * STROKE, float(rng.uniform(0.0, 0.9))
+        hammer = hammer.replace("pack", {"law": "rigid", "front": place, "restitution": bounce})
+        stops.append(Stop("front", "front", place, bounce))
     for key, term in terms.items():
         hammer = hammer.replace(key, term)
     period, pulses = width + log(0.2e-3, 2e-3), 3
@@ -64,9 +74,8 @@ def draw(rng: np.random.Generator, *, dry: bool = False) -> tuple[ph.Hammer, ph.
         Piece(n * period, n * period + width, amplitude=amplitude, rate=math.pi / width)
         for n in range(pulses)
     )
-    stop = Stop("backstop", "back", 0.0, restitution)
     system = System(
-        mass, tuple(forces), (Drive(pieces),), tuple(frictions), contacts=tuple(contacts), stops=(stop,)
+        mass, tuple(forces), (Drive(pieces),), tuple(frictions), contacts=tuple(contacts), stops=tuple(stops)
     )
     return hammer, ph.PulseTrain(hammer.waveform, period=period, pulses=pulses), system
 
@@ -78,15 +87,17 @@ def horizon(system: System, x: float, v: float, times: np.ndarray, truth: Run) -
     return int(np.argmax(apart)) if apart.any() else times.size
 
 
-def check(seed: int, count: int, *, dry: bool = False) -> tuple[int, int]:
-    """Compare random hammers; return the numbers of closings and of sticking phases compared."""
-    rng = np.random.default_rng([38, seed, 1] if dry else [38, seed])
-    closings = sticks = 0
+def check(seed: int, count: int, *, dry: bool = False, front: bool = False) -> tuple[int, int, int]:
+    """Compare random hammers; return the numbers of closings, sticking phases and impacts compared."""
+    rng = np.random.default_rng([38, seed, 1 + 2 * front] if dry or front else [38, seed])
+    closings = sticks = impacts = 0
     times = np.linspace(0.0, END, 121)
+    # At 1e-12, one of 160 hammers, with 18 closings of Hertz contacts, differs by 1.1e-8 strokes.
+    tolerance = 1e-13 if front else 1e-12
     for _ in range(count):
-        hammer, drive, system = draw(rng, dry=dry)
+        hammer, drive, system = draw(rng, dry=dry, front=front)
         x, v = float(rng.uniform(0.05, 0.3)) * STROKE, float(rng.uniform(-0.5, 0.5))
-        motion = ph.simulate(hammer, drive, duration=END, times=times, state=(x, v), tolerance=1e-12)
+        motion = ph.simulate(hammer, drive, duration=END, times=times, state=(x, v), tolerance=tolerance)
         truth = simulate(system, x, v, END)
         stop = horizon(system, x, v, times, truth)
         assert abs(motion.energy.residual) < 1e-8 * motion.energy.throughput
@@ -100,10 +111,11 @@ def check(seed: int, count: int, *, dry: bool = False) -> tuple[int, int]:
             closings += len(found)
         # Bounces slower than the speed below are left to the definition of rest of either side.
         hits = [e.time for e in truth.events if e.kind == "impact" and abs(e.v) > 1e-3 and e.time < end]
-        blows = [each.t_in for each in motion.contacts if (each.v_out or 0.0) > 1e-3 and each.t_in < end]
+        blows = [each.t_in for each in motion.contacts if abs(each.v_out or 0.0) > 1e-3 and each.t_in < end]
         np.testing.assert_allclose(blows, hits, rtol=0.0, atol=1e-10)
+        impacts += len(blows)
         sticks += check_sticks(motion, truth, end)
-    return closings, sticks
+    return closings, sticks, impacts
 
 
 def check_sticks(motion: Motion, truth: Run, end: float) -> int:
@@ -138,7 +150,7 @@ def test_many_random_lists(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_random_lists_with_dry_friction(seed: int) -> None:
-    closings, sticks = check(seed, 6, dry=True)
+    closings, sticks, _impacts = check(seed, 6, dry=True)
     assert closings > 0
     assert sticks > 3
 
@@ -146,6 +158,17 @@ def test_random_lists_with_dry_friction(seed: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(100, 105))
 def test_many_random_lists_with_dry_friction(seed: int) -> None:
-    closings, sticks = check(seed, 50, dry=True)
+    closings, sticks, _impacts = check(seed, 50, dry=True)
     assert closings > 50
     assert sticks > 25
+
+
+@pytest.mark.parametrize("dry", [False, True])
+def test_random_lists_between_two_stops(dry: bool) -> None:
+    assert check(2, 8, dry=dry, front=True)[2] > 10
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(200, 204))
+def test_many_random_lists_between_two_stops(seed: int) -> None:
+    assert check(seed, 40, dry=seed % 2 == 1, front=True)[2] > 60

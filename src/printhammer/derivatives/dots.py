@@ -16,6 +16,7 @@ import numpy as np
 
 from printhammer.derivatives.flow import Flow, flow, pack_push_changes, pack_push_rate, surface_moves
 from printhammer.derivatives.parameters import Parameter
+from printhammer.hammer.static_force import law_of
 from printhammer.results import Declared, part, scalar
 from printhammer.run.contacts import Contact
 from printhammer.run.motion import Motion
@@ -67,8 +68,10 @@ def struck_dots(motion: Motion, problem: Problem, record: Record) -> list[Struck
     contacts = motion.contacts
     for row in _touches(contacts):
         contact = contacts[row]
-        t_peak = _peak_time(problem, record, contact)
-        t_force = _force_time(problem, record, contact, t_peak)
+        t_peak = t_force = contact.t_in
+        if contact.peak_force is not None:
+            t_peak = _peak_time(problem, record, contact)
+            t_force = _force_time(problem, record, contact, t_peak)
         struck.append(Struck(contact.firing or 0, row, _back(contacts, row), t_peak, t_force))
     return struck
 
@@ -197,10 +200,12 @@ def changes_of(
     marks = np.unique([0.0, end, *(dot.t_peak for dot in struck), *(dot.t_force for dot in struck)])
     nodes: set[int] = set()
     for dot in struck:
-        nodes.add(int(record.contacts[dot.touch, 5]))
-        t_out = motion.contacts[dot.touch].t_out
-        if t_out is not None:
-            nodes.add(int(np.searchsorted(times, t_out, side="left")))
+        touch, contact = int(record.contacts[dot.touch, 5]), motion.contacts[dot.touch]
+        nodes.add(touch)
+        if contact.peak_force is None:
+            nodes.add(touch + 1)
+        elif contact.t_out is not None:
+            nodes.add(int(np.searchsorted(times, contact.t_out, side="left")))
         if dot.back is not None:
             nodes.add(int(record.contacts[dot.back, 5]))
     chosen = sorted(nodes)
@@ -241,11 +246,41 @@ class _Look:
         fired = np.array([parameter.firings[dot.index] for parameter in self.wanted])
         touch = self.flow.passed[self.rows[int(self.record.contacts[dot.touch, 5])], 0]
         later = self.later(touch, "pack", contact.v_in)
-        row = self.problem.resample(self.record, np.array([contact.t_in]))[0]
         changes: dict[str, Any] = {
             "flight_time": later - fired,
-            "impact_speed": touch[1] + _acceleration(self.problem, row, 5) * later,
+            "impact_speed": touch[1] + self._approach(contact, 5) * later,
         }
+        if contact.peak_force is None:
+            # At a rigid front the dot has no depth and no force; the impact lies between two nodes.
+            after = self.flow.passed[self.rows[int(self.record.contacts[dot.touch, 5]) + 1], 1]
+            changes["net_loss"] = changes["loading_work"] = after[_PACK_LOSS] - touch[_PACK_LOSS]
+        else:
+            changes |= self._in_pack(dot, contact, changes["impact_speed"], later, touch)
+        if dot.back is not None:
+            back = contacts[dot.back]
+            touch = self.flow.passed[self.rows[int(self.record.contacts[dot.back, 5])], 0]
+            later = self.later(touch, "backstop", back.v_in)
+            changes["return_time"] = later - fired
+            changes["return_speed"] = -(touch[1] + self._approach(back, 6, 7) * later)
+        return changes
+
+    def _approach(self, contact: Contact, *without: int) -> float:
+        """Compute the acceleration at a touch, m/s^2, before an impact if the surface is rigid."""
+        row = self.problem.resample(self.record, np.array([contact.t_in]))[0]
+        if contact.peak_force is None:
+            damping, constants = law_of(self.problem.hammer, self.problem.hammer.damping, "damping_force")
+            row[8] = damping(constants, contact.v_in)
+        return _acceleration(self.problem, row, *without)
+
+    def _in_pack(
+        self, dot: Struck, contact: Contact, speed: FloatArray, later: FloatArray, touch: FloatArray
+    ) -> dict[str, FloatArray]:
+        """Compute the derivatives of depth, force, work, loss and contact time of a dot on a pack.
+
+        `speed` and `later` are the derivatives of speed, m/s, and time of the touch, s, and `touch` the
+        columns before the touch.
+        """
+        changes: dict[str, FloatArray] = {}
         state, at_peak = self.columns(dot.t_peak)
         changes["indentation"] = at_peak[0] - surface_moves(self.wanted)["pack"]
         changes["loading_work"] = at_peak[_PACK_LOSS] - touch[_PACK_LOSS]
@@ -254,7 +289,7 @@ class _Look:
         if dot.t_force == contact.t_in:
             # The largest force occurs at the touch.
             total[0] = surface_moves(self.wanted)["pack"]
-            total[1] = changes["impact_speed"]
+            total[1] = speed
         changes["peak_force"] = pack_push_changes(self.problem, self.wanted, state, total)
         if contact.t_out is None:
             gone = self.columns(float(self.record.nodes[-1, 0]))[1]
@@ -263,11 +298,4 @@ class _Look:
             leave, gone = self.flow.passed[self.rows[node]]
             changes["contact_time"] = self.later(leave, "pack", contact.v_out or math.nan) - later
         changes["net_loss"] = gone[_PACK_LOSS] - touch[_PACK_LOSS]
-        if dot.back is not None:
-            back = contacts[dot.back]
-            touch = self.flow.passed[self.rows[int(self.record.contacts[dot.back, 5])], 0]
-            later = self.later(touch, "backstop", back.v_in)
-            row = self.problem.resample(self.record, np.array([back.t_in]))[0]
-            changes["return_time"] = later - fired
-            changes["return_speed"] = -(touch[1] + _acceleration(self.problem, row, 6, 7) * later)
         return changes

@@ -243,9 +243,9 @@ def _build(
     return contents
 
 
-def _check_friction(backstop: Part | None) -> None:
+def _check_friction(backstop: BackstopPart | None) -> None:
     """Raise InputError for an elastic backstop: its contact is integrated without dry friction."""
-    if backstop is not None and not getattr(import_module(backstop.module), "RIGID", False):
+    if backstop is not None and not backstop.rigid:
         expected = "rigid beside dry friction, or a [[contact]] with side = 'back' in its place"
         raise InputError.of("backstop.law", backstop.law, expected)
 

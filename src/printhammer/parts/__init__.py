@@ -15,7 +15,8 @@ coil      none: its circuit is the kernel's, `printhammer.kernel.model.circuit`
 spring    ``spring_force(c, x)``, ``spring_energy(c, x)``; a law whose slope jumps also ``LEVELS`` = True and
           ``spring_level(c, k)``, the position of the k-th jump
 pack      ``MEMORY``, ``pack_loading(c, x, v)``, ``pack_memory(c, peak)``, ``pack_unloading(c, x, v, q)``,
-          ``pack_switch(c, x, v)``
+          ``pack_switch(c, x, v)``; a rigid stop instead ``RIGID_FRONT`` = True and
+          ``pack_rebound(c, v_in)``
 backstop  ``RIGID``, ``backstop_rebound(c, v_in)``, or with w = sqrt(b - x) ``backstop_elastic(c, w)``,
           ``backstop_viscous(c, w, v)``, ``backstop_energy(c, w)``, ``backstop_switch(c, w, v)``
 damping   ``damping_force(c, v)``; with dry friction also ``FRICTION`` = True and ``friction_force(c, k)``,
@@ -32,7 +33,7 @@ argument      meaning
 ``peak``      displacement of the latest local maximum inside this contact of the pack, m
 ``q``         result of ``pack_memory`` for this peak
 ``w``         sqrt(b - x), root of the compression of the backstop, m^0.5
-``v_in``      velocity before an impact, m/s, negative
+``v_in``      velocity before an impact, m/s, positive at the front, negative at the backstop
 ============  ===============================================================================================
 
 Forces are in N, positive toward the paper. The force is minus the slope of the energy, J; for the magnet, at

@@ -138,12 +138,19 @@ class SpringPart(Part):
 class PackPart(Part):
     """Base class of ribbon and paper packs: `pack_loading`, `pack_memory`, `pack_unloading` and `MEMORY`.
 
+    A rigid stop has `RIGID_FRONT` and `pack_rebound` instead.
+
     A subclass has the constant `front`, the displacement at which the armature first touches the pack, m.
     """
 
     role: ClassVar[str] = "pack"
 
     front: float
+
+    @property
+    def rigid(self) -> bool:
+        """Whether the front is a rigid stop, at which the armature rebounds without a pack force."""
+        return bool(self.function("RIGID_FRONT"))
 
 
 class BackstopPart(Part):
@@ -156,6 +163,11 @@ class BackstopPart(Part):
     role: ClassVar[str] = "backstop"
 
     position: float
+
+    @property
+    def rigid(self) -> bool:
+        """Whether the backstop is rigid: the armature rebounds without a contact time."""
+        return bool(self.function("RIGID"))
 
 
 class DampingPart(Part):

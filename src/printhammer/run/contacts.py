@@ -283,7 +283,8 @@ def extrema(problem: Problem, record: Record, sign: float) -> tuple[FloatArray, 
     """Locate all local maxima of `sign` * displacement; return their times, s, and displacements, m."""
     nodes = record.nodes
     before, after = sign * nodes[:-1, 2], sign * nodes[1:, 2]
-    rows = np.flatnonzero((before > 0.0) & (after <= 0.0) & (nodes[1:, 0] > nodes[:-1, 0]))
+    # The two nodes of an impact on a rigid surface, at the same time, are an extremum, too.
+    rows = np.flatnonzero((before > 0.0) & (after <= 0.0))
     low, high = nodes[rows, 0].copy(), nodes[rows + 1, 0].copy()
     for _ in range(_BISECTIONS if len(rows) else 0):
         middle = 0.5 * (low + high)

@@ -6,7 +6,6 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict
 from functools import cached_property
-from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Literal
@@ -278,9 +277,7 @@ class Motion(Result, fields=False):
 
     @cached_property
     def _contact_rows(self) -> FloatArray:
-        rigid = self.hammer.backstop is not None and bool(
-            getattr(import_module(self.hammer.backstop.module), "RIGID", False)
-        )
+        rigid = self.hammer.backstop is not None and self.hammer.backstop.rigid
         return contact_rows(self._problem, self._record, self._increments, rigid)
 
     @cached_property

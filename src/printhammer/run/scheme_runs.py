@@ -57,6 +57,10 @@ class SchemeProblem(Problem):
                 file=hammer.path,
                 key="damping",
             )
+        if hammer.pack is not None and hammer.pack.rigid:
+            raise InputError.of(
+                "pack.law", hammer.pack.law, "a pack with a force for the schemes of 1983", file=hammer.path
+            )
         if drive.quantity == "voltage":
             raise InputError(
                 "the drive is a voltage", key="drive", expected="a current or a force for the schemes of 1983"
@@ -123,7 +127,7 @@ class SchemeProblem(Problem):
 
     @property
     def _rigid(self) -> bool:
-        return bool(getattr(self._modules.get("backstop"), "RIGID", False))
+        return self.hammer.backstop is not None and self.hammer.backstop.rigid
 
     def _nodes(self, t: FloatArray, x: FloatArray, v: FloatArray) -> FloatArray:
         """Convert step ends to nodes, each with the mode of motion that the schemes assign to its state."""

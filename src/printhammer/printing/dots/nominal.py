@@ -53,6 +53,8 @@ def nominal(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: floa
             key="pack",
             expected="a pack, on which a pulse prints a dot",
         )
+    if hammer.pack is not None and hammer.pack.rigid:
+        raise InputError.of("pack.law", hammer.pack.law, "a pack whose force prints a dot", file=hammer.path)
     motion = simulate(
         hammer, PulseTrain(pulse), duration=wait_of(hammer, pulse), points=2, tolerance=tolerance
     )
