@@ -34,6 +34,7 @@ from printhammer.parts.magnet.reluctance import ReluctanceMagnet
 from printhammer.parts.magnet.table import TableMagnet
 from printhammer.parts.pack.dashpot import DashpotPack
 from printhammer.parts.pack.power import PowerPack
+from printhammer.parts.pack.rigid import RigidFront
 from printhammer.parts.spring.cubic import CubicSpring
 from printhammer.parts.spring.linear import LinearSpring, PreloadSpring
 from printhammer.support.constants import options, quantities
@@ -52,6 +53,7 @@ ARGUMENTS = {
     "pack_memory": 2,
     "pack_unloading": 4,
     "pack_switch": 3,
+    "pack_rebound": 2,
     "backstop_elastic": 2,
     "backstop_viscous": 3,
     "backstop_energy": 2,
@@ -87,6 +89,7 @@ EXAMPLES: list[Part] = [
     DashpotPack(stiffness=1e5, damping=2.0, front=1.5e-4),
     HertzBackstop(position=5e-5, stiffness=1.2e9, damping=4e8),
     ElastomerBackstop(position=5e-5, stiffness=8e7, relaxation_time=2e-5),
+    RigidFront(front=1.5e-4, restitution=0.4),
     RigidBackstop(position=5e-5, restitution=0.4),
     ViscousDamping(coefficient=0.5),
     Winding(resistance=3.0, inductance=2e-3),
@@ -120,6 +123,7 @@ def test_absent_has_every_law_with_its_arguments() -> None:
     absent = import_module("printhammer.parts.absent")
     assert absent.MEMORY is False
     assert absent.RIGID is False
+    assert absent.RIGID_FRONT is False
     for name, count in ARGUMENTS.items():
         assert len(inspect.signature(getattr(absent, name)).parameters) == count
 
@@ -128,7 +132,7 @@ def test_absent_parts_do_nothing() -> None:
     absent = import_module("printhammer.parts.absent")
     for name, count in ARGUMENTS.items():
         ones = dict.fromkeys(("pack_switch", "backstop_switch", "magnet_current"), 1.0)
-        expected = {**ones, "backstop_rebound": 0.5}.get(name, 0.0)
+        expected = {**ones, "backstop_rebound": 0.5, "pack_rebound": 0.5}.get(name, 0.0)
         assert getattr(absent, name)(None, *[-0.5] * (count - 1)) == expected
 
 

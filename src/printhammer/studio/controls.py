@@ -127,7 +127,8 @@ def describe(hammer: Hammer) -> dict[str, Any]:
         `rail` (default rail driver, or None), `combined` (controls that change several constants),
         `waveform` (shape and constants, or None), `start` (entries of the initial state that differ from the
         default), `places` (positions), the nouns `strike`, `struck` and `mover`, `views` (those listed in
-        the hammer file), `rigid` (whether the backstop is rigid), and `dry` (whether dry friction acts).
+        the hammer file), `rigid` and `rigid_front` (whether backstop and front are rigid), and `dry` (whether
+        dry friction acts).
     """
     constants = []
     for key, constant in hammer.constants.items():
@@ -148,7 +149,8 @@ def describe(hammer: Hammer) -> dict[str, Any]:
         "struck": hammer.struck,
         "mover": hammer.mover,
         "views": list(hammer.views),
-        "rigid": hammer.backstop is not None and hammer.backstop.law == "rigid",
+        "rigid": hammer.backstop is not None and hammer.backstop.rigid,
+        "rigid_front": hammer.pack is not None and hammer.pack.rigid,
         "dry": isinstance(hammer.damping, DryFriction),
     }
 

@@ -62,11 +62,6 @@ def magnet_packed(q: Any, origin: float, c: Any) -> int:
     return 1
 
 
-def magnet_domain(q: Any, ends: Any) -> None:
-    """Write the displacement range of the law, m: unlimited."""
-    ends[0], ends[1] = -math.inf, math.inf
-
-
 @register
 class MovingCoilMagnet(MagnetPart):
     """Force constant k of a moving coil."""

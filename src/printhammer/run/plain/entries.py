@@ -110,6 +110,9 @@ def numbers_of(hammer: Hammer) -> Numbers:
 def _numbers_of(part: Part, origin: float) -> tuple[tuple[str | None, ...], tuple[float, ...]]:
     if part.function(f"{part.role}_packed") is not None:
         numbers, names = part.numbers(), part.names()
+        if isinstance(part, MagnetPart) and part.function("magnet_domain") is None:
+            # The function that stands in for a missing one reads the range from the last two numbers.
+            numbers = (*numbers, *part.domain)
         keys = (f"{part.role}.{name}" for name in names)
         return (*keys, *(None,) * (len(numbers) - len(names))), numbers
     # Fixed numbers: a table, or a law of the user's own.
