@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Callable
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -111,6 +112,26 @@ def test_answers_about_a_relay_speak_of_closings(cli: Callable[..., Any], words:
     assert done.status == 0
     assert not re.search(r"\b(dots?|print(s|ed)?|paper|engraved)\b", done.out + done.err)
     assert words[0] == "strobe" or "closing" in done.out
+
+
+def test_the_summary_and_the_files_of_a_relay_state_its_switching_times(
+    cli: Callable[..., Any], tmp_path: Path
+) -> None:
+    table, picture = tmp_path / "timings.csv", tmp_path / "timings.svg"
+    done = cli("run", "relay-5v", "--timings", table, "--timings", picture)
+    assert done.status == 0
+    for said in (
+        "contact make",
+        "contact break",
+        "after switch-on",
+        "after switch-off",
+        "bounces for",
+    ):
+        assert said in " ".join(done.out.split())
+    assert "operate_time [s]" in table.read_text("utf-8")
+    assert "Time" in picture.read_text("utf-8")
+    short = cli("run", "relay-5v", "--duration", "19 ms")
+    assert "before the release of make and break" in " ".join(short.out.split())
 
 
 def test_pictures_and_pages_of_a_relay_speak_of_closings() -> None:

@@ -86,9 +86,15 @@ def plot_timings(motion: Motion, *, until: float | None = None) -> Figure:
 
 def _trace(ax: Axes, motion: Motion, name: str, row: int, end: float, time: Scale) -> None:
     """Draw the state of a contact against time as a rectangular trace, high where it is closed."""
-    edges, levels = [motion.start], [0.0]
-    for each in motion.closings:
-        if each.contact == name:
+    own = [each for each in motion.closings if each.contact == name]
+    is_closed = bool(own) and own[0].initial
+    edges: list[float] = [] if is_closed else [motion.start]
+    levels: list[float] = [] if is_closed else [0.0]
+    for each in own:
+        if each.initial:
+            edges += [each.t_in, each.t_out or end, each.t_out or end]
+            levels += [_TRACE, _TRACE, 0.0]
+        else:
             edges += [each.t_in, each.t_in, each.t_out or end, each.t_out or end]
             levels += [0.0, _TRACE, _TRACE, 0.0]
     if levels[-1] == 0.0 and edges[-1] < end:
@@ -109,4 +115,4 @@ def _mark(ax: Axes, timing: Timing, row: int, time: Scale) -> None:
         if bounce > 0.0:
             said += f", bounce {time.shown(bounce):.2g} {time.sign}"
         at = float(time.shown(event + delay + bounce))
-        marks.beside(ax, said, (at, row + _TRACE), (3.0, 2.0), color=style.INK, bbox=marks.HALO, zorder=4.0)
+        marks.beside(ax, said, (at, row + _TRACE), (3.0, 3.0), color=style.INK, zorder=4.0)

@@ -17,8 +17,8 @@ from printhammer.identify.datasheet.build import (
     fit_magnet,
     forces_of,
     hammer_of,
-    implausible,
 )
+from printhammer.identify.datasheet.plausible import SATURATION, implausible, missed_limits
 from printhammer.identify.datasheet.sheet import DataSheet, read_sheet
 from printhammer.parts.magnet import reluctance as law
 from printhammer.parts.magnet.reluctance import MU0, ReluctanceMagnet
@@ -180,6 +180,13 @@ def test_a_shipped_device_is_made_of_its_sheet(name: str) -> None:
         (("why", '{ colour = "red" }'), "why.colour: no such key: expected a key of this sheet"),
         (("driver", '{ shape = "sawtooth" }'), "driver.shape = 'sawtooth': expected one of"),
         (("name", '""'), "name = '': expected text in quotes"),
+        (("make_contact", '{ gap = "4 mm" }'), "make_contact.force is missing"),
+        (("break_contact", '{ force = "1 N" }'), "break_contact.overtravel is missing"),
+        (
+            ("make_contact", '{ gap = "5 mm", force = "1 N" }'),
+            "make_contact.gap = 5 mm: expected less than the",
+        ),
+        (("bounce_time", '"4 ms"'), "make_contact is missing"),
     ],
 )
 def test_what_is_no_sheet_is_refused(change: tuple[str, str | None], said: str, tmp_path: Path) -> None:
@@ -209,3 +216,58 @@ def test_a_pole_that_the_device_cannot_hold_is_named(tmp_path: Path) -> None:
 def test_the_shipped_devices_are_plausible(name: str, tmp_path: Path) -> None:
     sheet = sheet_of(SHEETS.joinpath(f"{name}.toml").read_text("utf-8"), tmp_path)
     assert implausible(sheet, hammer_of(sheet)[1].part) == []
+
+
+def test_a_pole_wider_than_its_device_is_named(tmp_path: Path) -> None:
+    area = hammer_of(sheet_of(PLAIN, tmp_path))[1].part.pole_area
+    width = 2e3 * math.sqrt(area / math.pi)
+    for size, count in ((0.99 * width, 1), (1.01 * width, 0)):
+        sheet = sheet_of(f'{PLAIN}size = "{size} mm"', tmp_path)
+        assert len(implausible(sheet, hammer_of(sheet)[1].part)) == count
+
+
+def test_a_force_beyond_saturated_iron_is_named(tmp_path: Path) -> None:
+    """A pole face of area A carries at most B A, and holds B^2 A / (2 mu0)."""
+    for factor, count in ((0.99, 1), (1.01, 0)):
+        # The area at which the largest force of the sheet, 85.9 N, saturates the pole.
+        area = factor * 85.9 * 2.0 * MU0 / SATURATION**2
+        sheet = sheet_of(f'{PLAIN}pole_diameter = "{2e3 * math.sqrt(area / math.pi)} mm"', tmp_path)
+        found = [each for each in implausible(sheet, hammer_of(sheet)[1].part) if "saturated" in each]
+        assert len(found) == count
+
+
+CONTACTS = """
+spring = { preload = "0.5 N", stiffness = "100 N/m" }
+make_contact = { gap = "4 mm", force = "1.5 N" }
+break_contact = { overtravel = "0.2 mm", force = "0.2 N" }
+rating = "16 A at 250 V AC"
+on_time = "40 ms"
+"""
+
+
+def test_contacts_become_springs_between_their_gap_and_the_end_of_the_stroke(tmp_path: Path) -> None:
+    hammer = made_of(PLAIN + CONTACTS, tmp_path)
+    assert hammer.constants["contact.make.position"].si == pytest.approx(4e-3)
+    assert hammer.constants["contact.make.stiffness"].si == pytest.approx(1.5 / 0.75e-3, rel=1e-5)
+    assert hammer.constants["contact.make.stiffness"].status == "derived"
+    assert hammer.constants["contact.break.position"].status == "datasheet"
+    assert hammer.constants["contact.break.stiffness"].si == pytest.approx(0.2 / 0.2e-3, rel=1e-5)
+    assert "16 A at 250 V AC" in hammer.note
+    # The work of the magnet, which determines the stiffness of the stop, excludes that of the contacts.
+    bare = made_of(PLAIN + CONTACTS.replace('"1.5 N"', '"1e-9 N"').replace('"0.2 N"', '"1e-9 N"'), tmp_path)
+    work = 0.5 * 1.5 * 0.75e-3 - 0.5 * 0.2 * 0.2e-3
+    spared = bare.constants["pack.stiffness"].si - hammer.constants["pack.stiffness"].si
+    left = 0.25e-3 + hammer.constants["magnet.residual_gap"].si
+    assert spared == pytest.approx(2.0 * work / (0.25 * left) ** 2, rel=1e-2)
+
+
+def test_switching_times_are_compared_with_the_limits(tmp_path: Path) -> None:
+    sheet = sheet_of(PLAIN + CONTACTS, tmp_path)
+    assert missed_limits(sheet, hammer_of(sheet)[0]) == []
+    wide = 'operate_time = "1 s"\nrelease_time = "1 s"\nbounce_time = "1 s"'
+    sheet = sheet_of(f"{PLAIN}{CONTACTS}{wide}", tmp_path)
+    assert missed_limits(sheet, hammer_of(sheet)[0]) == []
+    sheet = sheet_of(f'{PLAIN}{CONTACTS}operate_time = "1 ms"', tmp_path)
+    missed = missed_limits(sheet, hammer_of(sheet)[0])
+    assert len(missed) == 2
+    assert all("operate time" in each for each in missed)

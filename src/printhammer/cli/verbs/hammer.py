@@ -200,7 +200,8 @@ def from_datasheet(
         return Answer()
     if sheet is None:
         raise InputError("SHEET is missing", key="SHEET", expected="a data sheet; --example NAME prints one")
-    from printhammer.identify.datasheet.build import hammer_of, implausible
+    from printhammer.identify.datasheet.build import hammer_of
+    from printhammer.identify.datasheet.plausible import implausible, missed_limits
     from printhammer.identify.datasheet.sheet import read_sheet
     from printhammer.results import Cells, Grid, Summary
 
@@ -211,7 +212,7 @@ def from_datasheet(
             f"{sheet}: the fit misses a force by {100.0 * magnet.misfit:.2g} %: the poles are not flat, or"
             " the sheet has a typing error"
         )
-    for sentence in implausible(read, magnet.part):
+    for sentence in (*implausible(read, magnet.part), *missed_limits(read, made)):
         warn(f"{sheet}: {sentence}")
     gaps, printed = zip(*read.force, strict=True)
     forces = [

@@ -145,6 +145,11 @@ def name_lines(ax: Axes, hammer: Hammer, shown: Scale) -> None:
             for left in np.linspace(1.0 - _LINE_NAME[0], 0.0, 60).tolist()
         ]
         (left, bottom), _covered = freest(points, _LINE_NAME, corners)
+        # Keep the names of further lines clear of this name.
+        across, up = (np.linspace(0.0, 1.0, 9) * size for size in _LINE_NAME)
+        points = np.concatenate(
+            [points, np.stack(np.meshgrid(left + across, bottom + up), -1).reshape(-1, 2)]
+        )
         beside(
             ax,
             name,

@@ -5,6 +5,9 @@ The armature rests at the backstop at 0 and is pulled through the stroke to its 
 restitution of the sheet and is so stiff that the work of the magnet indents it by a quarter of the remaining
 gap.
 
+Contacts are linear springs: a make contact between its gap and the end of the stroke, a break contact that
+the armature lifts from its place at rest.
+
 The magnet follows the reluctance law. A sheet has a few forces at one current, whereas the law has seven
 constants, so the fit is a maximum a posteriori estimate: every constant but the pole area has a log-normal
 prior typical of such devices, and the sum of squared misfits of forces, inductance and priors is minimised. A
@@ -196,45 +199,14 @@ def _classify(
     )
 
 
-IRON: Final = 7860.0  # Density of iron, kg/m^3; textbook value
-_HEAVY: Final = 3.0  # Ratio of required to stated armature mass above which a fit is implausible; arbitrary
-
-
-def implausible(sheet: DataSheet, part: ReluctanceMagnet) -> list[str]:
-    """List the physically implausible properties of a fitted magnet, one sentence each.
-
-    Two properties are checked:
-
-    - Mass: an iron disc that covers the fitted pole area, taken as a circle, and carries the flux to its rim
-      is a quarter of the circle's diameter thick. The disc must not be much heavier than the armature.
-    - Energy: the driver must be able to supply the field energy at full gap, L I^2 / 2, within one pulse. I
-      is the current at which the sheet specifies the forces, and a pulse supplies at most rail voltage times
-      I times on-time.
-    """
-    found = []
-    diameter = 2.0 * math.sqrt(part.pole_area / math.pi)
-    least, mass = IRON * part.pole_area * 0.25 * diameter, sheet.si("mass")
-    if "pole_diameter" not in sheet.entries and least > _HEAVY * mass:
-        found.append(
-            f"the fitted pole area is {1e4 * part.pole_area:.3g} cm2: an iron armature for it weighs at least"
-            f" {1e3 * least:.3g} g, but the sheet states {1e3 * mass:.3g} g; check force, gap and current"
-        )
-    current = sheet.si("current", sheet.si("rail") / sheet.si("resistance"))
-    field = 0.5 * law.magnet_inductance(part.packed(0.0), 0.0, 0.0) * current**2
-    supplied = sheet.si("rail") * current * sheet.si("on_time")
-    if field > supplied:
-        found.append(
-            f"the field energy at {current:.3g} A is {1e3 * field:.3g} mJ, but a pulse supplies at most"
-            f" {1e3 * supplied:.3g} mJ: check force, gap, current and on_time"
-        )
-    return found
-
-
 RESTITUTION: Final = 0.3
 """Assumed coefficient of restitution of a stop: steel on steel, with a thin film between the surfaces."""
 
 INDENTATION: Final = 0.25
 """Fraction of the remaining gap by which the magnet's work indents the struck object; assumed."""
+
+CONTACTS: Final = (("make_contact", "front", "gap"), ("break_contact", "back", "overtravel"))
+"""Contacts of a data sheet: table, side of the armature, and key of the position of the contact."""
 
 _GRID: Final = 200  # Number of sampled displacements from rest to the front of the pack; arbitrary
 
@@ -272,6 +244,7 @@ def _hammer_of(sheet: DataSheet) -> tuple[Hammer, SheetMagnet]:
         "magnet": _magnet(sheet, magnet),
         "coil": {"resistance": sheet.constant("resistance")},
         "spring": _spring(sheet, magnet, current),
+        **_contacts(sheet),
         "pack": _pack(sheet, magnet, current),
         "backstop": {
             "law": "rigid",
@@ -294,7 +267,8 @@ def _head(sheet: DataSheet, magnet: SheetMagnet, current: float) -> str:
         f" force{'s' if points > 1 else ''} at {current:.3g} A within {100.0 * magnet.misfit:.2g} %. Assumed"
         " values are typical of such devices, not properties of this one."
     )
-    note = " ".join([sheet.texts.get("note", ""), said]).strip()
+    rating = f"The contacts are rated {sheet.texts['rating']}." if "rating" in sheet.texts else ""
+    note = " ".join(filter(None, [sheet.texts.get("note", ""), rating, said])).strip()
     lines = textwrap.wrap(note, 110, break_long_words=False)
     document = tomlkit.document()
     document.update({"format": FORMAT, "name": sheet.texts["name"]})
@@ -364,12 +338,13 @@ def _spring(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, 
     if not stated:
         return None
     pull = law.magnet_force(magnet.part.packed(0.0), 0.0, current)
-    preload = sheet.si("spring.preload", 0.0)
-    if preload >= pull:
+    # At rest, the break contact carries a part of the preload.
+    preload, lifted = sheet.si("spring.preload", 0.0), sheet.si("break_contact.force", 0.0)
+    if preload - lifted >= pull:
         raise InputError.of(
             "spring.preload",
             preload,
-            f"less than the {pull:.3g} N of the magnet at full gap and {current:.3g} A",
+            f"less than the {pull + lifted:.3g} N of the magnet at full gap and {current:.3g} A",
             written=f"{preload:g}",
             unit="N",
         )
@@ -383,6 +358,39 @@ def _spring(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, 
     # The preload is negative: the spring pushes the armature toward the backstop.
     table["preload"]["value"] = plain(-float(table["preload"]["value"]))
     return table
+
+
+def _contacts(sheet: DataSheet) -> dict[str, Any]:
+    """Return the tables of the contacts of the sheet, by key of the hammer file."""
+    tables: dict[str, Any] = {}
+    for name, side, place in CONTACTS:
+        if f"{name}.force" in sheet.entries:
+            status, source = _derived_from(sheet, name, "contact force over its travel")
+            key = f"{name}.{place}"
+            tables[f"contact.{name.removesuffix('_contact')}"] = {
+                "law": "linear",
+                "side": side,
+                "position": sheet.constant(key),
+                "stiffness": _made(sheet.si(f"{name}.force") / _travel(sheet, name), "N/m", status, source),
+            }
+    return tables
+
+
+def _travel(sheet: DataSheet, name: str) -> float:
+    """Return the distance over which a contact is pressed, m: its overtravel."""
+    overtravel = sheet.si("break_contact.overtravel")
+    return sheet.si("stroke") - sheet.si("make_contact.gap") if name == "make_contact" else overtravel
+
+
+def _contact_forces(sheet: DataSheet, x: FloatArray) -> FloatArray:
+    """Compute the forces of the contacts at displacements, N, positive toward the backstop."""
+    total = np.zeros_like(x)
+    for name, side, place in CONTACTS:
+        if f"{name}.force" in sheet.entries:
+            sign = 1.0 if side == "front" else -1.0
+            depth = np.maximum(sign * (x - sheet.si(f"{name}.{place}")), 0.0)
+            total += sign * sheet.si(f"{name}.force") / _travel(sheet, name) * depth
+    return total
 
 
 def _restitution(sheet: DataSheet) -> dict[str, Any]:
@@ -419,7 +427,7 @@ def _work(sheet: DataSheet, magnet: SheetMagnet, front: float, current: float) -
     c = magnet.part.packed(0.0)
     x = np.linspace(0.0, front, _GRID)
     pull = np.array([law.magnet_force(c, place, current) for place in x.tolist()])
-    held = sheet.si("spring.preload", 0.0) + sheet.si("spring.stiffness", 0.0) * x
+    held = sheet.si("spring.preload", 0.0) + sheet.si("spring.stiffness", 0.0) * x + _contact_forces(sheet, x)
     work = float(np.trapezoid(pull - held, x))
     if work <= 0.0:
         raise InputError.of(

@@ -17,6 +17,10 @@ These keys are required. Optional keys:
 - `spring`, with `preload` at rest and `stiffness`; `target`, the distance to the struck object, if it is not
   at the end of the stroke; `stop`, with the `restitution` of both ends, or with `stiffness` and `damping` of
   the struck object;
+- `make_contact`, with the `gap` at rest and the `force` at the end of the stroke, `break_contact`, with the
+  `force` at rest and the `overtravel` until the contact opens, and the `rating` of the contacts, as a text;
+- `operate_time`, `release_time` and `bounce_time`, which the contacts must not exceed, and `size`, the
+  smallest side or diameter of the device; they are compared with the hammer;
 - `on_time`; `driver`, a waveform table without its voltage; `title`, `note` and `strike`, the noun for the
   result of a pulse.
 
@@ -38,7 +42,7 @@ from printhammer.support.constants import shown
 from printhammer.support.files import read_text
 from printhammer.units import describe, split, to_si
 
-TEXTS: Final = {"name": True, "source": True, "title": False, "note": False, "strike": False}
+TEXTS: Final = {"name": True, "source": True, "title": False, "note": False, "strike": False, "rating": False}
 """Text keys of a data sheet, and whether each key is required."""
 
 QUANTITIES: Final = {
@@ -53,14 +57,23 @@ QUANTITIES: Final = {
     "residual_gap": ("m", False),
     "target": ("m", False),
     "on_time": ("s", False),
+    "size": ("m", False),
+    "operate_time": ("s", False),
+    "release_time": ("s", False),
+    "bounce_time": ("s", False),
 }
 """Quantities of a data sheet: the SI unit of each, and whether the quantity is required."""
 
 TABLES: Final = {
     "spring": {"preload": "N", "stiffness": "N/m"},
     "stop": {"restitution": "1", "stiffness": "N/m", "damping": "N s/m"},
+    "make_contact": {"gap": "m", "force": "N"},
+    "break_contact": {"overtravel": "m", "force": "N"},
 }
 """Tables of a data sheet, each with its quantities and their SI units."""
+
+LIMITS: Final = ("operate_time", "release_time", "bounce_time")
+"""Quantities of a data sheet that limit the switching times of its contacts."""
 
 _ZERO: Final = ("end_gap", "spring.preload", "spring.stiffness", "stop.restitution", "stop.damping")
 _OTHERS: Final = ("force", "inductance", "driver", "assumed", "why")
@@ -277,6 +290,25 @@ def _check(sheet: DataSheet) -> None:
         raise InputError.of("stop.restitution", restitution, "1 or less", written=f"{restitution:g}")
     if ("stop.stiffness" in sheet.entries) != ("stop.damping" in sheet.entries):
         raise InputError("stop: expected both stiffness and damping, or neither", key="stop")
+    for name in ("make_contact", "break_contact"):
+        missing = [key for key in TABLES[name] if f"{name}.{key}" not in sheet.entries]
+        if len(missing) == 1:
+            raise InputError(
+                f"{name}.{missing[0]} is missing", key=f"{name}.{missing[0]}", expected="a quantity"
+            )
+    for key in ("make_contact.gap", "break_contact.overtravel"):
+        if sheet.si(key, 0.0) >= sheet.si("stroke"):
+            entry, stroke = sheet.entries[key], sheet.entries["stroke"]
+            raise InputError.of(
+                key,
+                entry.si,
+                f"less than the stroke of {stroke.value:g} {stroke.unit}",
+                written=f"{entry.value:g} {entry.unit}",
+            )
+    if any(name in sheet.entries for name in LIMITS) and "make_contact.force" not in sheet.entries:
+        raise InputError(
+            "make_contact is missing", key="make_contact", expected="the contact of the stated times"
+        )
     if sheet.si("target", 0.0) > sheet.si("stroke"):
         target, stroke = sheet.entries["target"], sheet.entries["stroke"]
         raise InputError(

@@ -144,7 +144,7 @@ def timing_facts(timings: Sequence[Timing], end: float) -> list[FactRow]:
             _phrase(back, "switch-off", [(each.release_time, each.release_bounce) for each in own]),
         ]
         largest = quantity(max(each.largest_force for each in own), "N")
-        rows.append((f"{own[0].kind} contact {name}", ", ".join([*told, f"up to {largest}"])))
+        rows.append((f"contact {name}", ", ".join([*told, f"up to {largest}"])))
     last = max((each.firing for each in timings), default=-1)
     held = [each for each in timings if each.firing == last and _is_held(each)]
     if held:
