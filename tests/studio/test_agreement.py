@@ -212,8 +212,8 @@ def test_a_page_fires_records_and_drivers_of_the_coil(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("dry", [False, True])
-def test_a_page_follows_forces_and_contacts(tmp_path: Path, dry: bool) -> None:
+@pytest.mark.parametrize(("dry", "front"), [(False, False), (True, False), (False, True)])
+def test_a_page_follows_forces_and_contacts(tmp_path: Path, dry: bool, front: bool) -> None:
     contact = {"law": "hertz", "side": "front", "position": 0.3e-3, "stiffness": 1e5}
     hammer = ph.Hammer.build(1e-3, name="listed").replace(
         {
@@ -225,13 +225,14 @@ def test_a_page_follows_forces_and_contacts(tmp_path: Path, dry: bool) -> None:
     )
     if dry:
         hammer = hammer.replace("force.guide", {"law": "friction", "kinetic": 0.1, "static": 0.3})
-    assert describe(hammer)["dry"] == dry
+    if front:
+        hammer = hammer.replace("pack", {"law": "rigid", "front": 0.4e-3, "restitution": 0.6})
+    assert (describe(hammer)["dry"], describe(hammer)["rigid_front"]) == (dry, front)
     wave = {"shape": "half-sine", "amplitude": 3.0, "width": 1.5e-3, "quantity": "force"}
     state = {**STATE, "hammer": "listed", "waveform": wave, "rate": 300.0, "pulses": 3}
-    assert [control["key"] for control in describe(hammer)["constants"]] == [
-        "backstop.position",
-        "backstop.restitution",
-    ]
+    stops = ["backstop.position", "backstop.restitution"]
+    stops = ["pack.front", "pack.restitution", *stops] if front else stops
+    assert [control["key"] for control in describe(hammer)["constants"]] == stops
     with Engine(Shelf(hammer, only=True), tmp_path) as engine:
         curve = engine.work("curves", state)[0]
     drive = ph.PulseTrain(
