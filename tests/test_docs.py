@@ -90,7 +90,9 @@ def test_every_public_name_is_in_the_reference() -> None:
 @pytest.mark.parametrize(
     "page", [page for page in PAGES if BLOCK.search(page.read_text("utf-8"))], ids=lambda path: path.stem
 )
-def test_the_code_on_a_page_runs(page: Path, tmp_path: Path) -> None:
+def test_the_code_on_a_page_runs(
+    page: Path, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
     (tmp_path / "my-hammer.toml").write_text(ph.load("hendriks-1983").to_toml(), "utf-8")
     script = "\n".join(BLOCK.findall(page.read_text("utf-8")))
     for many, few in FEWER.get(page.stem, {}).items():
@@ -102,7 +104,8 @@ def test_the_code_on_a_page_runs(page: Path, tmp_path: Path) -> None:
         env={
             **os.environ,
             "PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'examples'}",
-            "MPLCONFIGDIR": str(tmp_path),
+            # Matplotlib lists the fonts once for all pages.
+            "MPLCONFIGDIR": str(tmp_path_factory.getbasetemp() / "matplotlib"),
         },
         capture_output=True,
         text=True,

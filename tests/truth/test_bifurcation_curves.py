@@ -4,6 +4,7 @@ x'' + 0.04 x' + x = -1 + F cos(w t), rigid stop at 0 with the restitution 0.9, o
 periods of the force. The doublings at w = 0.81 and 0.95001 and the fold at 0.799 are published values.
 """
 
+import functools
 import math
 from pathlib import Path
 
@@ -39,6 +40,7 @@ def sine(omega: float, force: float) -> ph.SineForce:
     return ph.SineForce(force, omega / TURN, phase=0.5 * math.pi)
 
 
+@functools.cache
 def branch_of(omega: float, force: float, guess: tuple[float, float], width: float, most: int) -> Branch:
     """The branch through the orbit with one impact in two periods, its section half a period behind that."""
     (impact,) = orbit = CASE.orbit(omega, force, [guess], 2)
@@ -253,7 +255,7 @@ def test_what_a_point_of_a_curve_costs(monkeypatch: pytest.MonkeyPatch) -> None:
         return evaluate(system, whole, other)
 
     monkeypatch.setattr(ImpactSystem, "__call__", counted)
-    branch = branch_of(0.85, 0.325, (3.19, 0.34), 0.02, 10)
+    branch = branch_of.__wrapped__(0.85, 0.325, (3.19, 0.34), 0.02, 10)
     curve = ph.bifurcation_curve(branch, "rate", BOUNDS, event="period doubling", first=FORCES)
     assert calls < 8 * len(curve)
 
