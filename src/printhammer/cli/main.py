@@ -123,6 +123,13 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     run_program(app, "printhammer", arguments)
 
 
+def _advice(message: str, error: Exception) -> str:
+    """Return how to select the hammer, after an extra argument of a verb that has the option --hammer."""
+    command = getattr(getattr(error, "ctx", None), "command", None)
+    flags = [flag for option in getattr(command, "params", ()) for flag in option.opts]
+    return "; --hammer selects the hammer" if "unexpected extra" in message and "--hammer" in flags else ""
+
+
 def run_program(program: typer.Typer, name: str, arguments: Sequence[str] | None = None) -> NoReturn:
     """Run a command-line program on arguments, by default sys.argv[1:]; exit with the program's status."""
     allow_any_text()
@@ -137,7 +144,7 @@ def run_program(program: typer.Typer, name: str, arguments: Sequence[str] | None
     except _REFUSED as error:
         # Without arguments typer has shown the help, and the message is empty.
         if message := getattr(error, "format_message", str)().strip():
-            complain(f"{message.rstrip('.')} (see --help)")
+            complain(f"{message.rstrip('.')}{_advice(message, error)} (see --help)")
         sys.exit(BAD_INPUT)
     except OSError as error:
         # For example a path that is too long, or a full disk.

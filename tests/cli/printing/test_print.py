@@ -114,3 +114,18 @@ def test_a_run_that_stops_is_told(cli: Callable, tmp_path: Path) -> None:
 )
 def test_bad_input_is_one_sentence(refused: Callable, words: tuple[str, ...], said: str) -> None:
     refused("print", *words, *HAMMER, said=said)
+
+
+def test_the_name_of_a_hammer_as_a_text_is_reported(cli: Callable, tmp_path: Path) -> None:
+    file = tmp_path / "own.toml"
+    file.write_text(CRUDE.read_text(encoding="utf-8"), encoding="utf-8")
+    for text in ("relay-5v", str(file)):
+        done = cli("print", text)
+        assert done.status == 2
+        assert done.err.count("warning:") == 1
+        assert f"--hammer {text}" in " ".join(done.err.split())
+    assert "--pattern" in done.err
+    for words in (("relay-5v", "--hammer", "relay-5v"), ("relay", *HAMMER), (tmp_path / "no.toml",)):
+        assert "warning" not in cli("print", *words).err
+    assert "--hammer selects the hammer" in cli("print", "relay-5v", "HELLO", "--rate", "10 Hz").err
+    assert "--hammer" not in cli("run", "relay-5v", "HELLO").err

@@ -11,6 +11,7 @@ from printhammer.cli import options as opt
 from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, ended_early, rate_text, verb
 from printhammer.cli.screen import render
+from printhammer.cli.terminal import warn
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
@@ -332,6 +333,7 @@ def print_(
     from printhammer.printing.page.page import head_of, print_page
     from printhammer.printing.page.pattern import BITMAPS
 
+    _warn_of_hammer(text, hammer)
     if rate is None:
         raise InputError(
             "--rate is missing",
@@ -370,6 +372,18 @@ def print_(
         files={"out": Content(save, page.plot), **views, "save": Content(asked.save)},
         complaints=ended_early(page.status.ravel()),
     )
+
+
+def _warn_of_hammer(text: str | None, hammer: Hammer) -> None:
+    """Print a warning if the text to print is the name of a hammer or of a file, as other verbs expect."""
+    from printhammer.hammer.hammer import shipped
+
+    if text is None or text in (hammer.name, hammer.path):
+        return
+    if text in shipped():
+        warn(f"{text} is printed as a text; --hammer {text} selects the hammer")
+    elif text.lower().endswith(".toml") and Path(text).is_file():
+        warn(f"{text} is printed as a text; --hammer {text} loads a hammer, --pattern {text} a dot pattern")
 
 
 def _pattern(
