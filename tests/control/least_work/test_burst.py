@@ -306,3 +306,17 @@ def test_pulses_without_a_width_are_refused(monkeypatch: pytest.MonkeyPatch) -> 
             shape="pulses",
             largest="2 A",
         )
+
+
+def test_a_missing_part_and_a_missing_current_are_refused_in_one_sentence() -> None:
+    for name, faults in {
+        "pot-magnet": ("a voltage", "no spring"),
+        "relay-5v": ("a voltage",),
+        "bouncing-ball": ("no magnet", "no pack"),
+        "tung-shaw-1988": ("a force", "no magnet"),
+    }.items():
+        with pytest.raises(ph.InputError) as refusal:
+            ph.least_work(ph.load(name))
+        assert all(fault in str(refusal.value) for fault in faults)
+        assert refusal.value.file == ph.load(name).path
+        assert refusal.value.key == ("magnet" if name == "bouncing-ball" else "waveform")

@@ -27,7 +27,7 @@ from printhammer.control.pulses import current_bound, steepest_rise
 from printhammer.drive.input import read_count, read_number, read_positive
 from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.trains import PulseTrain
-from printhammer.drive.waveforms.shapes import Sampled
+from printhammer.drive.waveforms.shapes import Sampled, Waveform
 from printhammer.errors import InputError, PrinthammerError
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.hammer.hammer import Hammer
@@ -345,6 +345,24 @@ class LeastWork(Result, rows="node"):
         return frame(columns, ("node",), plain(self.attributes))
 
 
+def _current_of(hammer: Hammer) -> Waveform:
+    """Return the current pulse of a hammer; raise InputError that names every missing part and current."""
+    waveform = hammer.waveform
+    absent = [role for role in ("magnet", "spring", "backstop", "pack") if getattr(hammer, role) is None]
+    faults = [f"the hammer has no {' and no '.join(absent)}"] if absent else []
+    expected = ["magnet, spring, backstop and pack"] if absent else []
+    if waveform is not None and waveform.quantity != "current":
+        faults.insert(0, f"the waveform is a {waveform.quantity}")
+        expected.append(
+            "a current: the burst is planned in currents, which a driver of the coil does not set"
+        )
+    if faults:
+        key = "waveform" if len(faults) > len(absent[:1]) else absent[0]
+        text = f"{hammer.path}: {' and '.join(faults)}"
+        raise InputError(text, file=hammer.path, key=key, expected=", and ".join(expected))
+    return pulse_of(hammer)
+
+
 _SEARCH: Final = Effort(1e-9)
 
 
@@ -412,19 +430,7 @@ def least_work(
     if shape not in SHAPES:
         raise InputError.of("shape", shape, f"one of {', '.join(SHAPES)}")
     apart = None if spacing is None else read_positive(spacing, "s", "spacing")
-    for role in ("magnet", "spring", "backstop", "pack"):
-        if getattr(hammer, role) is None:
-            raise InputError(
-                f"{hammer.path}: the hammer has no {role}", file=hammer.path, key=role, expected="all parts"
-            )
-    waveform = pulse_of(hammer)
-    if waveform.quantity != "current":
-        raise InputError(
-            f"{hammer.path}: the waveform is a {waveform.quantity}",
-            file=hammer.path,
-            key="waveform",
-            expected="a current: the burst is planned in currents, which a driver of the coil does not set",
-        )
+    waveform = _current_of(hammer)
     top = current_bound(hammer, largest, "largest")
     steepest = steepest_rise(waveform) if slew is None else read_number(slew, "A/s", "slew")
     if shape == "pulses":
