@@ -49,6 +49,20 @@ def readings(law: LearningLaw, late: float = 0.0) -> tuple[Readings, Readings]:
     )
 
 
+def test_the_rate_is_optional(monkeypatch: pytest.MonkeyPatch) -> None:
+    class PreparedError(Exception):
+        pass
+
+    def prepared(_hammer: ph.Hammer, rate: float, **_more: object) -> None:
+        raise PreparedError(rate)
+
+    monkeypatch.setattr("printhammer.control.learning.learn.law_for", prepared)
+    for given, rate in ((None, RATE), ("900 Hz", 900.0)):
+        with pytest.raises(PreparedError) as stopped:
+            ph.learn(nominal(), rate=given)
+        assert stopped.value.args == (rate,)
+
+
 def believed(law: LearningLaw, spread: float) -> Belief:
     """Return a belief in the nominal hammer, all constants of which are known to some standard deviation."""
     size = law.production.size

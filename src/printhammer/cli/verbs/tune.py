@@ -280,7 +280,6 @@ def learn(
     import numpy as np
 
     from printhammer.control.learning.learn import learn as learned
-    from printhammer.control.learning.preparation import default_rate
     from printhammer.control.learning.sensor import ImpactSensor
     from printhammer.control.pulses import current_bound
     from printhammer.hammer.hammer import load
@@ -303,10 +302,8 @@ def learn(
     else:
         opt.check_unset({"signal-noise": signal_noise}, "--signal as well")
     driven = None if unit is None else load(unit)
-    largest = passed["largest_current"] = current_bound(hammer, passed.get("largest_current"))
-    driver = passed.setdefault("driver", "switch" if pulse_of(hammer).quantity == "current" else "own")
-    if "rate" not in passed:
-        passed["rate"] = f"{default_rate(hammer, driver, largest):.4g} Hz"
+    passed["largest_current"] = current_bound(hammer, passed.get("largest_current"))
+    passed.setdefault("driver", "switch" if pulse_of(hammer).quantity == "current" else "own")
     with job.progress_bar("learning") as tell:
         result = learned(hammer, driven, sensor=ImpactSensor(**readings), progress=tell, **passed)
     likely = 100.0 * result.certainty[-1]

@@ -11,7 +11,7 @@ import numpy as np
 from printhammer.control.learning.law import COMPARED, JUDGED, PRINTED, RUNS, SURE, LearningLaw
 from printhammer.control.learning.learner import Learner
 from printhammer.control.learning.lines import DOTS, LINE, Press, printed
-from printhammer.control.learning.preparation import DOUBT, FORGETTING, MEMBERS, law_for
+from printhammer.control.learning.preparation import DOUBT, FORGETTING, MEMBERS, default_rate, law_for
 from printhammer.control.learning.sensor import ImpactSensor
 from printhammer.control.pulses import LARGEST_CURRENT
 from printhammer.control.table.compensation import CompensationTable
@@ -306,7 +306,7 @@ def learn(
     hammer: Hammer,
     unit: Hammer | None = None,
     *,
-    rate: float | str,
+    rate: float | str | None = None,
     driver: str = "switch",
     sensor: ImpactSensor | None = None,
     variability: Variability | None = None,
@@ -344,8 +344,9 @@ def learn(
         The nominal hammer, the only hammer that the learner knows.
     unit : Hammer, optional
         The unit to calibrate; by default drawn from the variability with the seed.
-    rate : float or str
-        Slots per second, Hz, or text with a unit.
+    rate : float or str, optional
+        Slots per second, Hz, or text with a unit; by default 1275 Hz divided by the time scale of the device,
+        but at least 1.25 times the rate up to which the device settles between pulses.
     driver, limits, history, reach, largest_current
         As for `printhammer.tune`; the default driver is a fast switch. With the driver "own", for a hammer
         whose coil is switched by a driver, advance and on-time are learned.
@@ -371,8 +372,8 @@ def learn(
     Learning
         The learned table, and the dots of the unit before, during and after learning.
     """
-    speed = read_positive(rate, "Hz", "rate")
     largest = read_positive(largest_current, "A", "largest_current")
+    speed = default_rate(hammer, driver, largest) if rate is None else read_positive(rate, "Hz", "rate")
     count = read_count(members, "members")
     if not 100 <= count <= 5000:
         raise InputError.of("members", count, "100 to 5000", written=str(count))

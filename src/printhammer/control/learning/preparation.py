@@ -42,12 +42,12 @@ def default_rate(hammer: Hammer, driver: str, largest_current: float) -> float:
     """Compute the default slot rate of learning, Hz, at which successive pulses of the device interact.
 
     The rate is 1275 Hz divided by the time scale of the device, but at least 1.25 times the rate whose period
-    is the settling time of a single pulse.
+    is the settling time of a single pulse; rounded to four digits.
     """
     driven = driven_by(hammer, driver, largest_current)
     pulse, _widest = print_pulse(driven, largest_current)
     settled = single_of(driven, pulse, DISPLAY_TOLERANCE).settled
-    return max(scaled_rate(hammer, _RATE), _ABOVE / settled)
+    return float(f"{max(scaled_rate(hammer, _RATE), _ABOVE / settled):.4g}")
 
 
 def law_for(
