@@ -1,18 +1,22 @@
 """The window of a run: the last dot of a slow device is struck, whatever verb runs it."""
 
+import json
 import math
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from tests import hammers
 
 import printhammer as ph
 from printhammer.control.learning.lines import Press, Rung
 from printhammer.control.table.task import Task, single_of
-from printhammer.drive.waveforms.shapes import HalfSine
+from printhammer.drive.waveforms.shapes import HalfSine, Rectangle
 from printhammer.parts.backstop.rigid import RigidBackstop
+from printhammer.parts.damping import ViscousDamping
 from printhammer.parts.pack.dashpot import DashpotPack
 from printhammer.parts.spring.linear import PreloadSpring
 from printhammer.printing.dots.nominal import nominal, single_pulses
@@ -21,7 +25,7 @@ from printhammer.printing.page.pattern import Pattern
 from printhammer.run.effort import Effort
 from printhammer.run.plain.posing import CYCLE
 from printhammer.run.waits import waits_of
-from printhammer.run.window import Single, is_enough, least_wait, wait_of
+from printhammer.run.window import Single, is_enough, last_wait, least_wait, wait_of
 from printhammer.sweep.members import Base, Maker
 
 
@@ -93,7 +97,99 @@ def test_a_device_that_does_not_strike_or_settle_is_not_waited_for_without_end()
     bouncing = device(1e-3).replace({"backstop.restitution": 1.0, "pack.front": 0.1})
     push = bouncing.waveform.scaled(4.0)
     assert CYCLE < wait_of(bouncing, push) < 1.1
-    assert wait_of(hammers.made_of(spring=PreloadSpring(preload=0.0, stiffness=100.0)), push) == CYCLE
+    free = hammers.made_of(spring=PreloadSpring(preload=0.0, stiffness=100.0))
+    assert last_wait(free, push) <= wait_of(free, push) < 2.0 * last_wait(free, push)
+    for hammer in (bouncing, free):
+        motion = ph.simulate(hammer, ph.PulseTrain(push))
+        assert "not at rest" in motion.unsettled
+        assert motion.unsettled in json.loads(motion.to_json())["unsettled"]
+        assert "at the end" in str(motion.summary())
+        assert not ph.simulate(hammer, ph.PulseTrain(push), duration="1 ms").unsettled
+
+
+def oscillators(count: int) -> Iterator[tuple[float, float, float, float, float]]:
+    """Mass, kg, damping, N s/m, stiffness, N/m, of linear oscillators; force, N, and width, s, of a pulse."""
+    random = np.random.default_rng(38)
+    for _ in range(count):
+        mass, time, quality, width = 10.0 ** random.uniform([-4.0, -4.0, -1.0, -4.0], [-1.0, -1.5, 1.5, -1.5])
+        stiffness = mass / time**2
+        yield mass, math.sqrt(mass * stiffness) / quality, stiffness, random.uniform(0.1, 5.0), width
+
+
+def test_a_linear_oscillator_is_waited_for_until_its_exact_motion_has_settled() -> None:
+    at_bound = 0
+    for mass, damping, stiffness, force, width in oscillators(25):
+        hammer = hammers.made_of(
+            mass,
+            spring=PreloadSpring(preload=0.0, stiffness=stiffness),
+            damping=ViscousDamping(coefficient=damping),
+        )
+        push = Rectangle(amplitude=force, width=width, rise=0.0, decay=0.0, quantity="force")
+        wait, least = wait_of(hammer, push), least_wait(push)
+        assert waits_of([hammer, hammer], [push, push]).tolist() == [wait, wait]
+        # Displacement and velocity of the exact motion during and after the force.
+        system = np.array([[0.0, 1.0], [-stiffness / mass, -damping / mass]])
+        away = np.array([force / stiffness, 0.0])
+        thrown = [away - expm(system * t) @ away for t in np.linspace(0.0, width, 400)]
+        after = np.linspace(0.0, wait - width, 4000)
+        step, state = expm(system * after[1]), thrown[-1]
+        swung = [state, *(state := step @ state for _ in after[1:])]
+        times = np.concatenate([np.linspace(0.0, width, 400), width + after])
+        x, v = np.concatenate([thrown, swung]).T
+
+        def is_at_rest(end: float, part: float, x: Any = x, v: Any = v, times: Any = times) -> bool:
+            reach = np.abs(x[times <= end]).max()
+            at = np.searchsorted(times, end * (1.0 - 1e-12))
+            return bool(abs(x[at]) <= part * reach and abs(v[at]) * end / 3.0 <= part * reach)
+
+        if wait >= last_wait(hammer, push) and not is_at_rest(wait, 0.049):
+            at_bound += 1
+            assert ph.simulate(hammer, ph.PulseTrain(push)).unsettled
+        else:
+            assert is_at_rest(wait, 0.051)
+        if wait > least:
+            assert not is_at_rest(0.5 * wait, 0.04)
+    assert 0 < at_bound < 20
+
+
+def listed(random: np.random.Generator, *, dry: bool) -> tuple[ph.Hammer, HalfSine]:
+    """A mass between a backstop and a contact spring, with weight and friction but no pack; its pulse."""
+    mass, stiffness = 10.0 ** random.uniform([-4.0, 1.0], [-2.0, 3.0])
+    way = 10.0 ** random.uniform(-4.0, -2.5)
+    held = 0.2 * stiffness * way + 2.0 * mass * 9.81
+    # Dry friction may exceed the force of the spring, and hold the armature anywhere.
+    kinetic = random.uniform(0.1, 1.2) * held
+    viscous = ViscousDamping(coefficient=0.3 * math.sqrt(mass * stiffness))
+    hammer = hammers.made_of(
+        mass,
+        spring=PreloadSpring(preload=-held, stiffness=stiffness),
+        backstop=RigidBackstop(position=0.0, restitution=random.uniform(0.0, 0.7)),
+        damping=None if dry else viscous,
+    )
+    make = {"law": "linear", "side": "front", "position": 0.6 * way, "stiffness": 10.0 * stiffness}
+    guide = {"law": "friction", "kinetic": kinetic, "static": 1.2 * kinetic}
+    listed = {"force.weight": {"law": "gravity", "angle": "60 deg"}, "contact.make": make}
+    time = math.sqrt(2.0 * mass * way / (4.0 * held))
+    push = HalfSine(amplitude=5.0 * held, width=time, quantity="force")
+    return hammer.replace({**listed, **({"force.guide": guide} if dry else {})}), push
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("dry", [False, True])
+def test_a_device_with_contacts_and_without_a_pack_is_waited_for(dry: bool) -> None:
+    random = np.random.default_rng(3801)
+    for _ in range(25):
+        hammer, push = listed(random, dry=dry)
+        motion = ph.simulate(hammer, ph.PulseTrain(push))
+        assert motion.ok
+        if motion.unsettled:
+            assert motion.end >= last_wait(hammer, push)
+            continue
+        longer = ph.simulate(hammer, ph.PulseTrain(push), duration=4.0 * motion.end)
+        reach = np.abs(longer.x - hammer.rest).max()
+        place = longer.x[-1]
+        assert dry or place == pytest.approx(hammer.rest, abs=1e-3 * reach)
+        assert np.abs(longer.x[longer.t >= motion.end] - place).max() <= 0.1 * reach
 
 
 def press(hammer: ph.Hammer, rate: float) -> Press:

@@ -18,10 +18,13 @@ import printhammer as ph
 from printhammer.drive.trains import Drive
 from printhammer.drive.waveforms.shapes import SHAPES, Sampled, Waveform
 from printhammer.hammer.hammer import Hammer, shipped
+from printhammer.parts.damping import ViscousDamping
+from printhammer.parts.spring.linear import PreloadSpring
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.run.motion import Motion
 from printhammer.run.problem import Problem
 from printhammer.run.simulate import end_of_run
+from printhammer.run.window import unsettled
 from printhammer.studio import Shelf, bounds
 from printhammer.studio.coil import open_constants
 from printhammer.studio.controls import describe
@@ -90,7 +93,9 @@ def run_of(state: State, nudge: float = 0.0) -> Motion:
     problem = Problem(hammer, drive, (hammer.rest, 0.0), 0.0, DISPLAY_TOLERANCE)
     problem.max_steps = bounds.MOST_STEPS
     record = problem.run(end)
-    return Motion(problem, record, end, record.nodes[:, 0].copy(), "default")
+    motion = Motion(problem, record, end, record.nodes[:, 0].copy(), "default")
+    motion.unsettled = "" if sine else unsettled(problem, record)
+    return motion
 
 
 def horizon_of(motion: Motion, other: Motion) -> float:
@@ -167,6 +172,7 @@ def check_state(engine: Engine, state: State) -> str:
     if math.isfinite(horizon):
         return f"{before} dots"
     assert (curve["status"], curve["steps"]) == (motion.status, motion.steps)
+    assert bool(curve["message"]) == bool(motion.message or motion.unsettled)
     ledger = motion.energy
     for name, value in shown["energy"].items():
         expected = getattr(ledger, name)
@@ -242,8 +248,45 @@ def test_a_page_follows_forces_and_contacts(tmp_path: Path, dry: bool, front: bo
     record = problem.run(end_of_run(hammer, drive, None))
     motion = Motion(problem, record, float(record.nodes[-1, 0]), record.nodes[:, 0].copy(), "default")
     assert len(motion.closings) >= 2
-    assert (curve["status"], curve["steps"]) == ("ok", motion.steps)
+    assert (curve["status"], curve["steps"], curve["message"]) == ("ok", motion.steps, "")
     check_curves(motion, curve, math.inf)
+
+
+def oscillators(count: int) -> list[ph.Hammer]:
+    """Linear oscillators without a pack, the first without damping."""
+    rng = np.random.default_rng(38)
+    made = []
+    for k in range(count):
+        stiffness, quality = 10.0 ** rng.uniform(1.0, 4.0), 10.0 ** rng.uniform(-1.0, 1.5)
+        damping = 0.0 if k == 0 else math.sqrt(1e-3 * stiffness) / quality
+        made.append(
+            ph.Hammer.build(
+                1e-3,
+                name=f"oscillator-{k}",
+                spring=PreloadSpring(preload=0.0, stiffness=stiffness),
+                damping=ViscousDamping(coefficient=damping),
+            )
+        )
+    return made
+
+
+@pytest.mark.slow
+def test_a_page_waits_for_an_oscillator_without_a_pack(tmp_path: Path) -> None:
+    wave = {"shape": "half-sine", "amplitude": 3.0, "quantity": "force"}
+    hammers, settled = oscillators(12), 0
+    with Engine(Shelf(*hammers, only=True), tmp_path) as engine:
+        for k, hammer in enumerate(hammers):
+            width = 10.0 ** (-4.0 + k % 3)
+            own = {"waveform": {**wave, "width": width}, "rate": 20.0, "pulses": 2}
+            curve = engine.work("curves", {**STATE, "hammer": hammer.name, **own})[0]
+            fired = SHAPES["half-sine"](amplitude=3.0, width=width, quantity="force")
+            drive = ph.PulseTrain(fired, rate=20.0, pulses=2)
+            motion = ph.simulate(hammer, drive, tolerance=DISPLAY_TOLERANCE)
+            assert curve["status"] == "ok"
+            assert curve["data"]["t"][-1] == pytest.approx(motion.end, rel=1e-12)
+            assert bool(curve["message"]) == bool(motion.unsettled)
+            settled += not motion.unsettled
+    assert 0 < settled < 12
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from itertools import pairwise
 from typing import Any, Final, Literal
 
@@ -17,6 +18,7 @@ from printhammer.kernel.readout import contacts as readout
 from printhammer.kernel.readout.sums import PARTIALS
 from printhammer.parts.spring.forces import LinearContact
 from printhammer.results import Declared, Result, column, part, scalar
+from printhammer.results.declare import columns_of
 from printhammer.run.problem import Problem, Record
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
@@ -346,3 +348,12 @@ def _closed_steps(inside: FloatArray, inward: FloatArray) -> BoolArray:
     first, last = inside[:-1], inside[1:]
     there = (first == 0.0) & (last == 0.0)
     return np.asarray((first > 0.0) | (last > 0.0) | (there & (inward[:-1] > 0.0)))
+
+
+def named(row: Dot | Contact) -> dict[str, Any]:
+    """Return a dot or contact as a dictionary with names such as "flight_time_s"."""
+    units = {name: note.unit for name, note in columns_of(type(row)).items()}
+    return {
+        f"{key}_{units[key].replace('/', '_per_')}" if units[key] else key: value
+        for key, value in asdict(row).items()
+    }

@@ -41,6 +41,7 @@ from printhammer.run.contacts import (
     contacts_of,
     dots_of,
     extrema,
+    named,
     sticks_of,
 )
 from printhammer.run.energy import CoilWork, Ledger, coil_work_of, increments_of, ledger_of
@@ -80,6 +81,9 @@ class Motion(Result, fields=False):
     All quantities are computed on first access from the recorded steps, with the integrator itself, never by
     interpolation; nothing depends on the output grid.
     """
+
+    unsettled = ""
+    """Sentence about an armature not at rest at the end of the window; empty for a run with a duration."""
 
     def __init__(self, problem: Problem, record: Record, end: float, times: FloatArray, scheme: str) -> None:
         self._problem = problem
@@ -360,6 +364,8 @@ class Motion(Result, fields=False):
             ("status", f"{state}, {self.end * 1e3:.4g} ms in {self.steps} steps"),
             ("dots", f"{len(self.dots) - lost} struck{missing}"),
         ]
+        if self.unsettled:
+            rows.append(("at the end", styled("poor", f"{self.unsettled}; a duration sets a longer run")))
         times, x = self.maxima
         if len(x):
             top = int(x.argmax())
@@ -472,11 +478,12 @@ class Motion(Result, fields=False):
         content = {
             "status": self.status,
             "message": self.message,
+            "unsettled": self.unsettled,
             "end_s": self.end,
             "steps": self.steps,
             "peak": None if top is None else {"t_s": float(times[top]), "x_m": float(x[top])},
-            "dots": [_named(dot) for dot in self.dots],
-            "contacts": [_named(contact) for contact in self.contacts],
+            "dots": [named(dot) for dot in self.dots],
+            "contacts": [named(contact) for contact in self.contacts],
             "energy": {f"{key}_J": value for key, value in asdict(self.energy).items()},
             "constants": {
                 key: {"value": constant.si, "unit": constant.si_unit, "status": constant.status}
@@ -486,12 +493,3 @@ class Motion(Result, fields=False):
             "provenance": self.provenance,
         }
         return json.dumps(content, indent=2, allow_nan=False) + "\n"
-
-
-def _named(row: Dot | Contact) -> dict[str, Any]:
-    """Return a dot or contact as a dictionary with names such as "flight_time_s"."""
-    units = {name: note.unit for name, note in columns_of(type(row)).items()}
-    return {
-        f"{key}_{units[key].replace('/', '_per_')}" if units[key] else key: value
-        for key, value in asdict(row).items()
-    }

@@ -20,7 +20,7 @@ from printhammer.results import Declared, part, scalar
 from printhammer.run.motion import Motion
 from printhammer.run.problem import TOLERANCE, Problem, Stretch, check_tolerance
 from printhammer.run.start import initial_state, read_state, state_beyond
-from printhammer.run.window import end_of
+from printhammer.run.window import end_of, unsettled
 from printhammer.support.arguments import checked
 from printhammer.support.arrays import FloatArray
 
@@ -99,6 +99,8 @@ def simulate(
     record = problem.run(end)
     reached = float(record.nodes[-1, 0])
     motion = Motion(problem, record, end, _grid(problem, reached, points, times), scheme)
+    if duration is None:
+        motion.unsettled = unsettled(problem, record)
     if ledger:
         _ = motion.energy
     return motion

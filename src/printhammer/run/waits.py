@@ -16,11 +16,13 @@ from printhammer.run.window import (
     MOST_STEPS,
     TOLERANCE,
     Single,
+    has_flight,
     has_window,
     is_enough,
     last_wait,
     least_wait,
     longest_of,
+    wait_of,
 )
 from printhammer.support.arrays import FloatArray
 
@@ -30,7 +32,9 @@ def waits_of(
 ) -> FloatArray:
     """Compute the time from last firing to end of each run, s, like `wait_of`, but with ensembles.
 
-    One hammer and one waveform for each run, shape (runs,); equal objects are simulated once.
+    One hammer and one waveform for each run, shape (runs,); equal objects are simulated once. Devices whose
+    armature does not rest clear of a pack are simulated singly: the work of a member is then little beside
+    that of finding its rest position.
     """
     places: dict[tuple[int, int], int] = {}
     pairs: list[tuple[Hammer, Waveform]] = []
@@ -43,7 +47,12 @@ def waits_of(
         which.append(places[key])
     waits = np.array([least_wait(waveform) for _hammer, waveform in pairs])
     last = np.full(len(pairs), np.nan)
-    left = [i for i, pair in enumerate(pairs) if has_window(*pair)]
+    left = []
+    for i, (hammer, waveform) in enumerate(pairs):
+        if has_window(hammer, waveform) and has_flight(hammer):
+            left.append(i)
+        else:
+            waits[i] = wait_of(hammer, waveform)
     while left:
         drives = {id(pairs[i][1]): PulseTrain(pairs[i][1]) for i in left}
         result = Ensemble(

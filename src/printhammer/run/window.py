@@ -5,6 +5,12 @@ switched off; it is doubled until it contains `FLIGHTS` flight times of the sing
 at rest. The last dot of a run is then complete, including its extra contacts. The window of the paper's
 hammer, with a flight time of 0.28 ms, is 4 ms. For many devices, see `printhammer.run.waits`.
 
+An armature is at rest when its distance from the rest position is below a fraction of a length. The length is
+the distance from rest to the pack if the armature rests clear of a pack, otherwise the reach of the pulse:
+the largest distance from rest at the steps of the integrator after a single pulse. An armature that stands
+still throughout the second half of a window, as dry friction can hold it, is at rest at any displacement.
+`unsettled` describes an armature that is not at rest at the end of a run.
+
 The same pulse gives the time scale of a device: default times, stated for the paper's hammer, are multiplied
 by the time scale, and default rates are divided by it.
 """
@@ -14,18 +20,25 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
+import numpy as np
+
 from printhammer.drive.trains import Drive, PulseTrain
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
-from printhammer.kernel.model.modes import OK
-from printhammer.run.plain.posing import CYCLE, flight_of, is_window, last_window, least_window
-from printhammer.run.problem import Problem, scales_of
+from printhammer.kernel.model.modes import HELD, OK
+from printhammer.run.plain.posing import CYCLE, FLIGHTS, flight_of, is_window, last_window, least_window
+from printhammer.run.problem import Problem, Record, scales_of
 from printhammer.run.supply import waveforms_of
+from printhammer.support.arrays import FloatArray
 
 TOLERANCE: Final = 5e-7
 """Tolerance of the single pulse, whose outcome is only compared with thresholds; arbitrary."""
 MOST_STEPS: Final = 500_000  # Largest number of steps of a single pulse; arbitrary
+# Smallest reach, as a fraction of the typical displacement; arbitrary, above the error of the single pulse
+_LEAST_REACH: Final = 1e-4
+THRESHOLDS: Final = {"least_reach": _LEAST_REACH, "flights": FLIGHTS, "held": HELD}
+"""For a page: smallest reach, smallest window in flights, mode above which friction holds the armature."""
 _MOST_KEPT: Final = 512  # Number of cached windows at which the cache is emptied; arbitrary
 
 _FLIGHT: Final = 0.28e-3  # Flight time of the paper's hammer, for which default rates and times are stated, s
@@ -43,12 +56,14 @@ class Window(NamedTuple):
 
 
 class Single(NamedTuple):
-    """Outcome of a single pulse at the end of a window: completion, flight time, distance from rest."""
+    """Outcome of a single pulse at the end of a window: completion, flight time, final state, reach."""
 
     ok: bool
     flight: float  # Flight time, s; NaN without a dot
     x: float
     v: float
+    reach: float = math.nan  # Largest distance from rest, m; NaN if the hammer `has_flight`
+    still: bool = False  # Whether the velocity is zero throughout the second half of the window
 
 
 def least_wait(waveform: Waveform) -> float:
@@ -122,34 +137,72 @@ def longest_of(drive: Drive) -> Waveform:
 
 
 def has_window(hammer: Hammer, waveform: Waveform) -> bool:
-    """Whether a single pulse determines the window: the hammer has a pack, and rests clear of the pack."""
-    if hammer.front is None or not math.isfinite(waveform.support):
+    """Whether single pulses determine the window: the waveform ends, and the hammer has a rest position."""
+    if not math.isfinite(waveform.support):
         return False
     try:
-        return hammer.rest < hammer.front
+        return math.isfinite(hammer.rest)
     except InputError:
         return False
+
+
+def has_flight(hammer: Hammer) -> bool:
+    """Whether the armature rests clear of a pack, to which a pulse can throw it."""
+    return hammer.front is not None and hammer.rest < hammer.front
+
+
+def _reach(hammer: Hammer, nodes: FloatArray, way: float) -> float:
+    """Return the largest distance from rest in a record, m; `way` is the typical displacement, m."""
+    return max(float(np.abs(nodes[:, 1] - hammer.rest).max()), _LEAST_REACH * way)
 
 
 def _single(hammer: Hammer, drive: Drive, end: float) -> Single:
     problem = Problem(hammer, drive, (hammer.rest, 0.0), 0.0, TOLERANCE)
     problem.max_steps = MOST_STEPS
     record = problem.run(end)
-    return Single(
-        record.status == OK,
-        flight_of(record.contacts),
-        float(record.nodes[-1, 1]),
-        float(record.nodes[-1, 2]),
-    )
+    ok, nodes = record.status == OK, record.nodes
+    x, v = float(nodes[-1, 1]), float(nodes[-1, 2])
+    if has_flight(hammer):
+        return Single(ok, flight_of(record.contacts), x, v)
+    still = ok and not nodes[nodes[:, 0] >= 0.5 * end, 2].any()
+    return Single(ok, math.nan, x, v, _reach(hammer, nodes, problem.scales[0]), still)
 
 
 def is_enough(hammer: Hammer, seen: Single, wait: float) -> bool:
     """Whether a window spans `FLIGHTS` flight times and ends with the armature at rest."""
-    assert hammer.front is not None
-    return is_window(seen.ok, seen.flight, seen.x, seen.v, hammer.rest, hammer.front, wait)
+    rest, front = hammer.rest, hammer.front
+    if not math.isnan(seen.reach):
+        front = rest + seen.reach
+    assert front is not None
+    return seen.still or is_window(seen.ok, seen.flight, seen.x, seen.v, rest, front, wait)
 
 
 def last_wait(hammer: Hammer, waveform: Waveform) -> float:
     """Return the upper bound on the window, s, at which the search by doubling stops."""
     way, speed = scales_of(hammer, PulseTrain(waveform), (hammer.rest, 0.0))
     return last_window(least_wait(waveform), way, speed)
+
+
+def unsettled(problem: Problem, record: Record) -> str:
+    """Describe in one sentence an armature that is not at rest at the end of a run; empty if at rest.
+
+    The run, under a finite drive, ends with the window of the device. The sentence states the distance from
+    rest and the velocity, which exceed the thresholds of `is_enough`.
+    """
+    hammer, nodes = problem.hammer, record.nodes
+    x, v = float(nodes[-1, 1]), float(nodes[-1, 2])
+    if record.status != OK or (len(nodes) > 1 and nodes[-2, 3] > HELD):
+        return ""
+    pulse = longest_of(problem.drive)
+    if not has_window(hammer, pulse):
+        return "the hammer has no rest position that the armature could reach by the end of the run"
+    window, rest, front = _window_of(hammer, pulse), hammer.rest, hammer.front
+    if front is None or not has_flight(hammer):
+        front = rest + _reach(hammer, nodes, problem.scales[0])
+    span = window.wait if math.isnan(window.flight) else FLIGHTS * window.flight
+    if is_window(True, math.nan, x, v, rest, front, span):
+        return ""
+    return (
+        f"the armature is not at rest at the end of the run: {x - rest:.4g} m from its rest position,"
+        f" at {v:.4g} m/s"
+    )

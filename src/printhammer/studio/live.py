@@ -26,6 +26,7 @@ from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.run.plain.entries import numbers_of, page_module
 from printhammer.run.plain.page import REFUSALS
 from printhammer.run.problem import TOLERANCE, constants_of, fresh_carry, laws_of
+from printhammer.run.window import THRESHOLDS
 from printhammer.studio import bounds
 from printhammer.studio.bundle import deltas, inside, merged, page_files, sources, style
 from printhammer.studio.controls import SINE, describe, units_of, vocabulary
@@ -134,6 +135,7 @@ def _limits() -> dict[str, Any]:
     named["LINE"] = _line()
     named |= {"DISPLAY_TOLERANCE": DISPLAY_TOLERANCE, "TOLERANCE": TOLERANCE, "REFUSALS": REFUSALS}
     named["DECAYS"] = DECAYS
+    named["WINDOW"] = THRESHOLDS
     return named
 
 

@@ -1,5 +1,5 @@
 // Pictures of the single run of a state: its curves, its dots, its energies.
-import { endOf, firingsOf, pose, resample, run, slotsOf } from "./problem.js";
+import { endOf, firingsOf, pose, resample, run, slotsOf, unsettledOf } from "./problem.js";
 
 const CURVES = ["x", "v", "drive", "u", "F magnet", "F spring", "F pack", "F backstop", "F damping", "F drag", "F drive", "F total"];
 const DOT = ["fired_at", "struck", "flight_time", "impact_speed", "peak_force", "indentation", "contact_time", "loading_work", "net_loss", "extra_contacts"];
@@ -45,7 +45,7 @@ function motion(kernel, posed, record, hammer, fired, limits) {
   const column = (k) => Float32Array.from(inside, (_, row) => table[row * posed.columns + k]);
   const data = { t, ...Object.fromEntries(rows), "strobe t": inside, "strobe x": column(0), "strobe v": column(1) };
   return {
-    kind: "motion", status: record.status, message: messageOf(hammer.described.name, record), places: posed.places, quantity: hammer.quantity, peak: largest.values[0],
+    kind: "motion", status: record.status, message: messageOf(hammer.described.name, record) || unsettledOf(kernel, posed, record, limits), places: posed.places, quantity: hammer.quantity, peak: largest.values[0],
     fired, steps: record.steps, pulse: posed.pulse, ...(hammer.circuit ? { supply: posed.peak } : {}), ...(posed.sine ? { sine: posed.sine } : {}), data,
   };
 }

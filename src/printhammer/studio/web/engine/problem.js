@@ -124,7 +124,8 @@ function prepare(kernel, hammer, state, limits) {
   device.rest = restOf(kernel, hammer, constants, ends, limits);
   const carry = hammer.carry.map(Number).with(hammer.placeOfRest, device.rest);
   const alone = { ...device, carry, replace: about.values[ABOUT.replaces] !== 0 };
-  device.wait = isSine(state) ? 1 / state.rate : waitOf(kernel, { ...alone, ...scalesOf(kernel, hammer, device)(NaN, limits.DISPLAY_TOLERANCE) }, about);
+  const scaled = scalesOf(kernel, hammer, device)(NaN, limits.DISPLAY_TOLERANCE);
+  Object.assign(device, isSine(state) ? { wait: 1 / state.rate, flight: NaN } : runWindowOf(kernel, { ...alone, ...scaled }, about, limits));
   const [times, values] = [kernel.array("f", SHOWN), kernel.array("f", SHOWN)];
   kernel.call("map_rates", 0, about.values[ABOUT.shown], times);
   kernel.call("pulse_values", pieces, times, values);
@@ -159,20 +160,52 @@ function restOf(kernel, hammer, constants, ends, limits) {
   return out.values[0];
 }
 
-/** The time from the last firing to the end of a run, s: long enough for a single pulse to come to rest. */
-function waitOf(kernel, posed, about) {
+/** Whether the armature rests clear of a pack, to which a pulse can throw it. */
+const hasFlight = ({ places, rest }) => places.front !== null && rest < places.front;
+
+/** The front of the pack, or the position at the reach of a pulse if there is no flight, m; see printhammer/run/window.py. */
+function frontOf(posed, nodes, limits) {
+  if (hasFlight(posed)) return posed.places.front;
+  let reach = limits.WINDOW.least_reach * posed.scales[0];
+  for (let at = 1; at < nodes.values.length; at += posed.width) reach = Math.max(reach, Math.abs(nodes.values[at] - posed.rest));
+  return posed.rest + reach;
+}
+
+/** Whether the armature stands still at all steps of a record that end after a time, s. */
+function isStill({ width }, { values }, after) {
+  for (let at = 0; at < values.length; at += width) if (values[at] >= after && values[at + 2] !== 0) return false;
+  return true;
+}
+
+/** The window of a device: the time from the last firing to the end of a run, s, in which a single pulse comes to rest; and its flight time, s. */
+function runWindowOf(kernel, posed, about, limits) {
   return kernel.temporarily(() => {
     const out = kernel.array("f", 1);
-    const [asked] = kernel.call("window", about, posed.rest, posed.places.front ?? NaN, out);
-    let [wait] = out.values;
-    if (!asked) return wait;
-    const places = kernel.copy("f", [posed.rest, posed.places.front, ...posed.scales, wait]);
-    for (;;) {
+    const flies = hasFlight(posed);
+    const [asked] = kernel.call("window", about, posed.rest, flies ? posed.places.front : Infinity, out);
+    const [least] = out.values;
+    if (!asked) return { wait: least, flight: NaN };
+    for (let wait = least; ; wait *= 2) {
       const { code, contacts, nodes } = run(kernel, posed, [0], wait, SINGLE);
-      const [enough] = kernel.call("is_window", code, contacts, nodes, places, wait, out);
-      if (enough) return wait;
-      wait *= 2;
+      const places = kernel.copy("f", [posed.rest, frontOf(posed, nodes, limits), ...posed.scales, least]);
+      const [enough] = kernel.call("is_window", code, flies ? contacts : cut(contacts, 0), nodes, places, wait, out);
+      if (enough || (!flies && isStill(posed, nodes, wait / 2))) return { wait, flight: out.values[0] };
     }
+  });
+}
+
+/** Describe an armature that is not at rest at the end of a run in one sentence; empty if at rest. */
+export function unsettledOf(kernel, posed, { code, contacts, nodes }, limits) {
+  const { rest, width, wait, flight, scales } = posed;
+  const { values } = nodes;
+  if (code || posed.sine || (values.length > width && values.at(3 - 2 * width) > limits.WINDOW.held)) return "";
+  const [x, v] = [values.at(1 - width), values.at(2 - width)];
+  return kernel.temporarily(() => {
+    const places = kernel.copy("f", [rest, frontOf(posed, nodes, limits), ...scales, Infinity]);
+    const span = Number.isNaN(flight) ? wait : limits.WINDOW.flights * flight;
+    const [settled] = kernel.call("is_window", code, cut(contacts, 0), nodes, places, span, kernel.array("f", 1));
+    const [far, fast] = [x - rest, v].map((number) => Number(number.toPrecision(4)));
+    return settled ? "" : `the armature is not at rest at the end of the run: ${far} m from its rest position, at ${fast} m/s`;
   });
 }
 
