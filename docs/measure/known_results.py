@@ -99,6 +99,30 @@ def shaw_holmes(
     return float(event.value)
 
 
+def shaken(amplitude: float, omega: float) -> ph.SineForce:
+    """Return a force with the time course of a cosine."""
+    return ph.SineForce(amplitude, omega / (2.0 * math.pi), phase="90 deg")
+
+
+def two_stops(
+    name: str, omega: float, amplitude: float, phase: float, state: tuple[float, float], kind: str
+) -> float:
+    """Return a bifurcation point of the orbits with one impact at each of two stops in a period."""
+    bounds = (0.98 * amplitude, 1.015 * amplitude)
+    drive = shaken(amplitude, omega)
+    branch = ph.continuation(ph.load(name), "drive.amplitude", bounds, drive=drive, state=state, phase=phase)
+    (event,) = [event for event in branch.events if event.kind == kind]
+    return float(event.value)
+
+
+def two_stops_product(
+    name: str, omega: float, amplitude: float, phase: float, state: tuple[float, float]
+) -> float:
+    """Return the product of the multipliers of an orbit with one impact at each of two stops."""
+    regime = Regime.of(ph.load(name), drive=shaken(amplitude, omega), phase=phase)
+    return float(orbit(regime, state).multipliers.prod().real)
+
+
 @cache
 def doublings() -> list[float]:
     """Return the amplitudes of the table, cm, at successive period doublings of the ball."""
@@ -145,11 +169,6 @@ def rocking() -> ph.Motion:
 def rocking_angle(impacts: int) -> float:
     """Return the largest angle after a number of impacts."""
     return float(rocking().maxima[1][impacts - 1])
-
-
-def shaken(amplitude: float, omega: float) -> ph.SineForce:
-    """Return a force with the time course of a cosine."""
-    return ph.SineForce(amplitude, omega / (2.0 * math.pi), phase="90 deg")
 
 
 def dry(amplitude: float, omega: float, static: float, cycles: float) -> ph.Motion:
@@ -204,6 +223,8 @@ HOUSNER = "Housner (1963), formula"
 RECIPES = "Dankowicz and Schilder (2013), closed form"
 DEN_HARTOG = "Den Hartog (1931), closed form"
 SHAW_FRICTION = "Den Hartog (1931) and Shaw (1986), closed form"
+PAIR = "model of Heiman, Bajaj and Sherman (1988), closed form"
+SHAW_STOPS = "model of Shaw (1985), closed form"
 HOLMES = "equation of Holmes (1979), quoted to three digits"
 
 CASES = (
@@ -370,6 +391,60 @@ CASES = (
         "-0.2",
         SHARP,
         left_at_rest,
+    ),
+    *(
+        Known(
+            "impact-pair",
+            f"w = 1, one impact at each stop in a period: A of the {kind}",
+            PAIR,
+            printed,
+            SHARP,
+            lambda kind=kind, start=start: two_stops("impact-pair", 1.0, *start, kind),
+        )
+        for kind, printed, start in (
+            ("fold", "0.207584130386", (0.20862, 0.0174, (-0.20737, 0.6449))),
+            ("pitchfork", "0.769240969485", (0.76539, 0.827, (-0.35599, 0.39041))),
+        )
+    ),
+    Known(
+        "impact-pair",
+        "w = 1, A = 0.5, one impact at each stop in a period: product of the multipliers",
+        PAIR,
+        "0.0625",
+        SHARP,
+        lambda: two_stops_product("impact-pair", 1.0, 0.5, 0.8514, (-0.29749, 0.49059)),
+    ),
+    *(
+        Known(
+            "shaw-1985",
+            f"w = {omega}, one impact at each stop in a period: F of the {kind}",
+            SHAW_STOPS,
+            printed,
+            SHARP,
+            lambda omega=omega, kind=kind, start=start: two_stops("shaw-1985", omega, *start, kind),
+        )
+        for omega, kind, printed, start in (
+            (1.5, "fold", "0.195487104485", (0.19646, 0.99, (-0.05219, 1.15355))),
+            (1.5, "pitchfork", "1.939830051794", (1.93013, 0.772, (-0.13071, 0.63229))),
+            (2.6, "fold", "0.608338280822", (0.61138, 0.9938, (-0.06936, 1.75958))),
+            (2.6, "pitchfork", "5.046716002264", (5.02148, 0.779, (-0.1283, 1.04549))),
+        )
+    ),
+    Known(
+        "shaw-1985",
+        "w = 1.5, one impact at each stop in a period: product of the multipliers",
+        SHAW_STOPS,
+        "0.269428231709",
+        SHARP,
+        lambda: two_stops_product("shaw-1985", 1.5, 1.93013, 0.772, (-0.13071, 0.63229)),
+    ),
+    Known(
+        "shaw-1985",
+        "w = 1.5, without impact: F of the grazing of both stops",
+        SHAW_STOPS,
+        "1.258967831201",
+        SHARP,
+        lambda: grazing("shaw-1985", 1.5, 0.6, (0.5, 1.4)),
     ),
     Known(
         "dankowicz-schilder-2013",

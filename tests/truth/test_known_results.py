@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from tests.hammers import PACKS, STOP, compare, drives, interpreted, made_of, rigid
 from tests.oracle.den_hartog import DenHartog
+from tests.oracle.two_stops import TwoStops
 from tests.truth.impact_orbits import BouncingBall, DampedImpacts
 
 import printhammer as ph
@@ -103,6 +104,29 @@ def test_closed_forms_of_the_table_for_dry_friction() -> None:
     assert known("den-hartog-1931", "product") == pytest.approx(product, abs=1e-12)
     # Half a swing about the displacement 0.3, and half a swing about -0.3.
     assert known("den-hartog-1931", "rest") == pytest.approx(1.0 - 4.0 * friction, abs=1e-12)
+
+
+def test_closed_forms_of_the_table_for_two_stops() -> None:
+    pair, e = ph.load("impact-pair"), 0.5
+    assert pair.pack.restitution == pair.backstop.restitution == e
+    exact = TwoStops(0.0, 0.0, 0.5, 1.0, e)
+    assert known("impact-pair", "fold") == pytest.approx(exact.fold, abs=1e-12)
+    assert known("impact-pair", "pitchfork") == pytest.approx(exact.pitchfork, abs=1e-12)
+    # The impact pair has explicit formulas, which the note of its file states.
+    kappa = 0.5 * math.pi * (1.0 + e) / (1.0 - e)
+    c = 4.0 * kappa / math.pi**2
+    assert exact.fold == pytest.approx(1.0 / math.hypot(1.0, kappa), rel=1e-14)
+    assert exact.pitchfork == pytest.approx(math.hypot(1.0, c) / (kappa - c), rel=1e-14)
+    assert known("impact-pair", "product") == pytest.approx(e**4, abs=1e-12)
+    for omega in (1.5, 2.6):
+        exact = TwoStops(1.0, 0.1, 1.0, omega, 0.8)
+        assert known("shaw-1985", f"w = {omega}", "fold") == pytest.approx(exact.fold, abs=1e-12)
+        assert known("shaw-1985", f"w = {omega}", "pitchfork") == pytest.approx(exact.pitchfork, abs=1e-12)
+    exact = TwoStops(1.0, 0.1, 1.93013, 1.5, 0.8)
+    assert known("shaw-1985", "grazing") == pytest.approx(exact.grazing, abs=1e-12)
+    product = np.prod(exact.multipliers(*exact.orbits()[0]) ** 2).real
+    assert product == pytest.approx(0.8**4 * math.exp(-0.1 * 2.0 * math.pi / 1.5), rel=1e-12)
+    assert known("shaw-1985", "product") == pytest.approx(product, abs=1e-12)
 
 
 @pytest.mark.parametrize("a", [2.7, 2.9, 3.0488, 3.4])

@@ -106,6 +106,8 @@ OPENINGS: Final[dict[str, dict[str, Any]]] = {
     "dankowicz-schilder-2013": _shaken(0.12, 1.0, -_QUARTER, 0.6, 2.0),
     "duffing-holmes": _shaken(0.3, 1.0, _QUARTER, 0.5, 2.0),
     "den-hartog-1931": _shaken(0.5, 0.7, _QUARTER, 0.5, 2.0),
+    "impact-pair": _shaken(0.5, 1.0, 0.0, 0.6, 1.5),
+    "shaw-1985": _shaken(1.5, 1.5, _QUARTER, 0.8, 3.0),
     "housner-1963": _PUSHES,
     "braille-embosser": {"rate": 20.0, "pulses": 3, "low": 10.0, "high": 60.0},
     "dot-peen": {"rate": 40.0, "pulses": 5, "low": 10.0, "high": 160.0},
