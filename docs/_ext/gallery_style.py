@@ -44,6 +44,7 @@ ORDER = (
     "tung_shaw",
     "duffing",
     "rocking_block",
+    "impact_pair",
     "own_part",
 )
 """Names of the examples in teaching order."""
