@@ -137,9 +137,10 @@ def states(problem: Problem, end: float, times: FloatArray) -> tuple[FloatArray,
 
 
 def assert_close(found: FloatArray, expected: FloatArray) -> None:
-    """Check agreement to 1e-12 of the range of each column."""
+    """Check agreement to 1e-12 of the range of each column; a contact at the end has no velocity out."""
     for column, right in zip(found.T, expected.T, strict=True):
-        np.testing.assert_allclose(column, right, rtol=0.0, atol=1e-12 * np.abs(right).max(initial=1e-300))
+        size = np.nanmax(np.abs(right), initial=1e-300)
+        np.testing.assert_allclose(column, right, rtol=0.0, atol=1e-12 * size)
 
 
 @pytest.mark.slow
