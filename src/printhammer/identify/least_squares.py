@@ -485,12 +485,12 @@ def _is_exact(data: FloatArray, residuals: FloatArray) -> bool:
 
 def _inside(jacobian: FloatArray, residuals: FloatArray, variance: FloatArray, used: BoolArray) -> BoolArray:
     """Mask of the rows whose residuals are consistent with the noise."""
-    from scipy.stats import norm
+    from scipy.special import ndtri
 
     root = np.sqrt(variance)
     rows = jacobian / root[:, None]
     freedom = int(used.sum()) - rows.shape[1]
     free = np.ones(len(root))
     free[used] = np.maximum(1.0 - leverage(rows[used]), 0.1) if freedom > 0 else 1.0
-    limit = float(norm.isf(0.5 * _FALSE_OUTLIERS / len(root)))
+    limit = -float(ndtri(0.5 * _FALSE_OUTLIERS / len(root)))
     return np.abs(residuals) <= limit * root * np.sqrt(free)

@@ -97,7 +97,7 @@ def variance_of(
     components; only the used rows count, with a correction for the fitted `parameters`. With `clipped`, large
     residuals are clipped, for use while the outliers are unknown.
     """
-    from scipy.stats import chi2
+    from scipy.special import chdtr, chdtrc
 
     g, r2 = spread[used], residuals[used] ** 2
     size = g.mean(axis=0)
@@ -107,7 +107,7 @@ def variance_of(
     theta = np.full(g.shape[1], (first or float(r2.mean())) / g.shape[1])
     limit = _CLIP * _CLIP
     # Mean of a squared standard normal number that is clipped at the limit.
-    mean = float(chi2.cdf(limit, 3) + limit * chi2.sf(limit, 1)) if clipped else 1.0
+    mean = float(chdtr(3, limit) + limit * chdtrc(1, limit)) if clipped else 1.0
     share = len(r2) / (len(r2) - parameters) if len(r2) > parameters else 1.0
     for _ in range(500):
         v = g @ theta

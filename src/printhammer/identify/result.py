@@ -453,9 +453,9 @@ def with_error(fit: Fit, key: str, error: float, slopes: list[float]) -> Fit:
 
 def student(degrees_of_freedom: float) -> float:
     """Return the half-width of a 95 % interval of Student's t, in standard errors."""
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
-    return float(t.ppf(0.5 + 0.5 * CONFIDENCE, degrees_of_freedom))
+    return float(stdtrit(degrees_of_freedom, 0.5 + 0.5 * CONFIDENCE))
 
 
 def _check_agreement(hammer: Hammer, key: str, text: str) -> None:

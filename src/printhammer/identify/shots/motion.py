@@ -49,7 +49,7 @@ _OFF: Final = 5.0  # Number of standard errors above which a deviation is report
 
 def tested(shots: Sequence[Shot], solution: Solution, count: int) -> tuple[float, str]:
     """Test the residuals against the noise of the records (F-test); return p-value and rejection reason."""
-    from scipy.stats import f
+    from scipy.special import fdtrc
 
     p_value, worst = 1.0, ""
     for shot, scale, out, shown in zip(
@@ -66,7 +66,7 @@ def tested(shots: Sequence[Shot], solution: Solution, count: int) -> tuple[float
             continue
         number = int((~out).sum())
         ratio = scale / (_LARGER * noise)
-        tail = float(f.sf(ratio**2, max(number - count, 1), _DEGREES * len(shot.x)))
+        tail = float(fdtrc(max(number - count, 1), _DEGREES * len(shot.x), ratio**2))
         if tail < p_value:
             p_value = tail
             left = np.where(out, 0.0, np.abs(shot.x - shown))

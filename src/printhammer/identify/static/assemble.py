@@ -74,7 +74,7 @@ def judge(
 
 def term_p_value(solution: Solution, term: FloatArray) -> float:
     """Compute the p-value of one additional term in the linearised fit; NaN if the term is collinear."""
-    from scipy.stats import t
+    from scipy.special import stdtr
 
     root = np.sqrt(solution.variance[solution.used])
     errors = solution.residuals[solution.used] / root
@@ -88,7 +88,7 @@ def term_p_value(solution: Solution, term: FloatArray) -> float:
     covariance, freedoms = sandwich(rows, errors - rows[: len(errors)] @ need)
     if not covariance[-1, -1] > 0.0:
         return math.nan
-    return 2.0 * float(t.sf(abs(need[-1]) / math.sqrt(covariance[-1, -1]), freedoms[-1]))
+    return 2.0 * float(stdtr(freedoms[-1], -abs(need[-1]) / math.sqrt(covariance[-1, -1])))
 
 
 def runs_p_value(values: FloatArray) -> float:
@@ -97,7 +97,7 @@ def runs_p_value(values: FloatArray) -> float:
     The number of runs is compared with its normal approximation, two-sided (A. Wald and J. Wolfowitz, Ann.
     Math. Statist. 11 (1940) 147); NaN for fewer than 8 residuals of either sign.
     """
-    from scipy.stats import norm
+    from scipy.special import ndtr
 
     signs = values[values != 0.0] > 0.0
     n, above = len(signs), int(signs.sum())
@@ -107,7 +107,7 @@ def runs_p_value(values: FloatArray) -> float:
     runs = 1 + int(np.count_nonzero(signs[1:] != signs[:-1]))
     pairs = 2.0 * above * below
     mean, variance = pairs / n + 1.0, pairs * (pairs - n) / (n * n * (n - 1.0))
-    return float(2.0 * norm.sf(abs(runs - mean) / math.sqrt(variance)))
+    return float(2.0 * ndtr(-abs(runs - mean) / math.sqrt(variance)))
 
 
 def ratio_p_value(values: FloatArray) -> float:
@@ -117,14 +117,14 @@ def ratio_p_value(values: FloatArray) -> float:
     variance 4 (n - 2) / (n^2 - 1) (J. von Neumann, Ann. Math. Statist. 12 (1941) 367); NaN for fewer than 8
     values.
     """
-    from scipy.stats import norm
+    from scipy.special import ndtr
 
     n = len(values)
     square = float(values @ values)
     if n < 8 or not square > 0.0:
         return math.nan
     ratio = float(np.sum(np.diff(values) ** 2)) / square * n / (n - 1.0)
-    return float(norm.cdf((ratio - 2.0) / math.sqrt(4.0 * (n - 2.0) / (n * n - 1.0))))
+    return float(ndtr((ratio - 2.0) / math.sqrt(4.0 * (n - 2.0) / (n * n - 1.0))))
 
 
 def stretch_p_value(signs: FloatArray) -> float:
