@@ -233,7 +233,8 @@ def test_a_page_follows_forces_and_contacts(tmp_path: Path, dry: bool, front: bo
         hammer = hammer.replace("force.guide", {"law": "friction", "kinetic": 0.1, "static": 0.3})
     if front:
         hammer = hammer.replace("pack", {"law": "rigid", "front": 0.4e-3, "restitution": 0.6})
-    assert (describe(hammer)["dry"], describe(hammer)["rigid_front"]) == (dry, front)
+    # Without a magnet no voltage drives the device, so that its exponents exist under dry friction, too.
+    assert (describe(hammer)["dry"], describe(hammer)["rigid_front"]) == (False, front)
     wave = {"shape": "half-sine", "amplitude": 3.0, "width": 1.5e-3, "quantity": "force"}
     state = {**STATE, "hammer": "listed", "waveform": wave, "rate": 300.0, "pulses": 3}
     stops = ["backstop.position", "backstop.restitution"]

@@ -130,7 +130,7 @@ def describe(hammer: Hammer) -> dict[str, Any]:
         `waveform` (shape and constants, or None), `start` (entries of the initial state that differ from the
         default), `places` (positions), the nouns `strike`, `struck` and `mover`, `views` (those listed in
         the hammer file), `rigid` and `rigid_front` (whether backstop and front are rigid), and `dry` (whether
-        dry friction acts).
+        dry friction acts and the hammer has a magnet: a voltage may then drive the coil, without exponents).
     """
     constants = []
     for key, constant in hammer.constants.items():
@@ -153,7 +153,7 @@ def describe(hammer: Hammer) -> dict[str, Any]:
         "views": list(hammer.views),
         "rigid": hammer.backstop is not None and hammer.backstop.rigid,
         "rigid_front": hammer.pack is not None and hammer.pack.rigid,
-        "dry": isinstance(hammer.damping, DryFriction),
+        "dry": isinstance(hammer.damping, DryFriction) and hammer.magnet is not None,
     }
 
 
