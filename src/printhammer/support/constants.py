@@ -100,7 +100,8 @@ def quantity(
 
 
 @cache
-def quantities(model: type[BaseModel]) -> dict[str, Quantity]:
+@cache
+def quantities(model: type[BaseModel]) -> Mapping[str, Quantity]:
     """List the physical constants of a model class: `Quantity` by field name, in order of declaration."""
     notes: dict[str, Quantity] = {}
     for name, field in model.model_fields.items():
@@ -111,7 +112,8 @@ def quantities(model: type[BaseModel]) -> dict[str, Quantity]:
     return notes
 
 
-def options(model: type[BaseModel]) -> dict[str, Any]:
+@cache
+def options(model: type[BaseModel]) -> Mapping[str, Any]:
     """List the fields that are no physical constants (choices, flags, file names): annotation by name."""
     known = quantities(model)
     return {name: field.annotation for name, field in model.model_fields.items() if name not in known}
