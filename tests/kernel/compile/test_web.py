@@ -203,7 +203,8 @@ def test_a_module_computes_many_runs(name: str, tmp_path: Path) -> None:
     assert hammer.waveform is not None
     width = hammer.waveform.width
     drives = [ph.PulseTrain(hammer.waveform, period=period * width, pulses=2) for period in (4.0, 5.0, 6.0)]
-    ensemble = ph.Ensemble(hammer, drives, 11.0 * width)
+    # Rounding decides how a step ends on a kink of the contacts: the error of integration must be smaller.
+    ensemble = ph.Ensemble(hammer, drives, 11.0 * width, tolerance=1e-13)
     (group,) = ensemble.groups
 
     def computed() -> ph.EnsembleResult:
