@@ -67,8 +67,9 @@ def implausible(sheet: DataSheet, part: ReluctanceMagnet) -> list[str]:
 def missed_limits(sheet: DataSheet, hammer: Hammer) -> list[str]:
     """List the limits of operate, release and bounce time that the contacts of a hammer exceed.
 
-    The coil is switched to the rail, and then interrupted, as makers measure the release time: without a
-    diode. The bounce time is that of the contact that closes.
+    The coil is switched to the rail, and then interrupted: data sheets rarely state the circuit in which the
+    release time was measured, and a coil without a diode is assumed. The bounce time is that of the contact
+    that closes.
     """
     limits = [name for name in LIMITS if name in sheet.entries]
     if not limits:
