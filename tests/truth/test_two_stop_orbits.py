@@ -77,3 +77,23 @@ def test_beyond_the_pitchfork_the_times_between_impacts_differ(name: str, exact:
         uneven.append(abs(times[2] - 2.0 * times[1] + times[0]) * exact.rate)
     assert uneven[0] < 1e-6
     assert uneven[1] > 0.1
+
+
+def test_the_symmetry_is_lost_at_a_pitchfork() -> None:
+    """The branch of symmetric orbits crosses a branch that turns back in the amplitude."""
+    exact = CASES[0][1]
+    amplitude = exact.pitchfork
+    drive = ph.SineForce(0.995 * amplitude, 0.5 / math.pi, phase="90 deg")
+    branch = ph.continuation(
+        ph.load("impact-pair"),
+        "drive.amplitude",
+        (0.98 * amplitude, 1.01 * amplitude),
+        drive=drive,
+        state=(-0.35599, 0.39041),
+        phase=0.827,
+    )
+    assert branch.symmetry == "symmetric"
+    (event,) = branch.events
+    assert event.kind == "pitchfork"
+    assert event.value == pytest.approx(amplitude, rel=1e-9)
+    assert branch.crossing(event, most=12).symmetry == "asymmetric"

@@ -1,9 +1,8 @@
 """Crossings of two curves of fixed points: location, kind, and continuation of the crossing curve.
 
-At a crossing the corrector's matrix A = [dG/du - I, dG/dp] has a null space of two dimensions. One
-direction in it is the tangent t of the curve that was followed; q is perpendicular to it. With the left null
-vector l of A and the second derivative B of G, the tangent of the other curve is that combination of t and q
-for which the equation of the crossing, l B(z, z) = 0, holds (W. J. F. Govaerts, *Numerical Methods for
+At a crossing the corrector's matrix A = [dG/du - I, dG/dp] has a null space of two dimensions. With the
+left null vector l of A and the second derivative B of G, the tangents of the two curves are the directions z
+in it for which the equation of the crossing, l B(z, z) = 0, holds (W. J. F. Govaerts, *Numerical Methods for
 Bifurcations of Dynamical Equilibria*, SIAM 2000; H. B. Keller, in P. H. Rabinowitz (ed.), *Applications of
 Bifurcation Theory*, Academic Press 1977, 359).
 
@@ -71,42 +70,54 @@ def locate_crossing(
     return share, on_chord(one, other, (share - low) / (high - low), one.arc)
 
 
-def crossing_direction(follower: Corrector, node: Node) -> FloatArray | None:
-    """Compute the scaled tangent of the crossing curve at a crossing, shape (n + 1,); None if unknown."""
+def crossing_tangents(follower: Corrector, node: Node) -> tuple[FloatArray, FloatArray] | None:
+    """Compute the scaled tangents of the two curves at a crossing, each of shape (n + 1,).
+
+    Returns
+    -------
+    tuple or None
+        Tangent of the curve that was followed, and of the crossing curve; None if the second derivatives
+        leave the tangents undetermined.
+    """
     z = follower.point(node)
     value = follower.family(node.state, node.parameter)
     if value.trouble:
         return None
     left, _, right = np.linalg.svd(follower.derivative(value))
-    null = left[:, -1]
-    plane = right[-2:]
-    along = plane.T @ (plane @ node.tangent)
-    along /= np.linalg.norm(along)
-    aside = plane[0] - (plane[0] @ along) * along
-    if np.linalg.norm(aside) < _ASIDE:
-        aside = plane[1] - (plane[1] @ along) * along
-    aside /= np.linalg.norm(aside)
+    null, plane = left[:, -1], right[-2:]
 
     def residual(s: float, r: float) -> float:
-        at = (z + s * along + r * aside) * follower.scales
+        at = (z + s * plane[0] + r * plane[1]) * follower.scales
         there = follower.family(at[:-1], float(at[-1]))
         return np.nan if there.trouble else float(null @ ((there.image - at[:-1]) / follower.scales[:-1]))
 
-    h = _DIFFERENCE
-    square = (residual(0.0, h) - 2.0 * residual(0.0, 0.0) + residual(0.0, -h)) / h**2
+    h, here = _DIFFERENCE, residual(0.0, 0.0)
     mixed = (residual(h, h) - residual(h, -h) - residual(-h, h) + residual(-h, -h)) / (4.0 * h**2)
-    if not (np.isfinite(square) and np.isfinite(mixed)) or abs(mixed) <= _FLAT * max(1.0, abs(square)):
+    form = np.array(
+        [
+            [(residual(h, 0.0) - 2.0 * here + residual(-h, 0.0)) / h**2, mixed],
+            [mixed, (residual(0.0, h) - 2.0 * here + residual(0.0, -h)) / h**2],
+        ]
+    )
+    if not np.isfinite(form).all():
         return None
-    direction = aside - square / (2.0 * mixed) * along
-    return np.asarray(direction / np.linalg.norm(direction))
+    # The quadratic form vanishes along two directions if its eigenvalues differ in sign.
+    (low, high), axes = np.linalg.eigh(form)
+    if not (low < 0.0 < high) or np.sqrt(-low * high) <= _FLAT * max(1.0, -low, high):
+        return None
+    rows = [(axes @ np.array([np.sqrt(high), sign * np.sqrt(-low)])) @ plane for sign in (1.0, -1.0)]
+    units = [row / np.linalg.norm(row) for row in rows]
+    # The node's own tangent is that of a chord, inexact so close to the crossing.
+    followed, other = sorted(units, key=lambda unit: -abs(float(unit @ node.tangent)))
+    return followed, other
 
 
 def crossing_kind(follower: Corrector, node: Node) -> Crossing:
     """Classify a crossing by the tangents of its two curves: pitchfork, transcritical or branching."""
-    other = crossing_direction(follower, node)
-    if other is None:
+    tangents = crossing_tangents(follower, node)
+    if tangents is None:
         return "branching"
-    upright = min(abs(float(node.tangent[-1])), abs(float(other[-1]))) < _UPRIGHT
+    upright = min(abs(float(tangent[-1])) for tangent in tangents) < _UPRIGHT
     return "pitchfork" if upright else "transcritical"
 
 
@@ -130,7 +141,8 @@ def follow_crossing(
         The direction of the crossing curve is undetermined, or no fixed point lies along it.
     """
     corrector = Corrector(family, scales, steps.precision)
-    begin, row = corrector.point(node), crossing_direction(corrector, node)
+    begin, tangents = corrector.point(node), crossing_tangents(corrector, node)
+    row = None if tangents is None else tangents[1]
     amplitude = _AMPLITUDE
     while row is not None and amplitude >= _LEAST_AMPLITUDE:
         first = corrector.correct(begin + amplitude * row, row)

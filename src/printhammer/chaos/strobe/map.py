@@ -28,6 +28,8 @@ import numpy.typing as npt
 from printhammer.derivatives.states import follow
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
+from printhammer.parts.backstop.rigid import RigidBackstop
+from printhammer.parts.pack.rigid import RigidFront
 from printhammer.results import Declared, part
 from printhammer.run.contacts import touches_of
 from printhammer.run.effort import Effort
@@ -311,15 +313,26 @@ def state_later(regime: Regime, state: FloatArray, phase: float, tolerance: floa
 def mirror_image(regime: Regime, state: FloatArray, tolerance: float) -> FloatArray | None:
     """Compute the state, (m, m/s), at which the mirror image of a motion passes the section.
 
-    The mirror image, x -> -x about the hammer's origin, half a period later, is a motion of the same hammer
-    if the forces are odd, as in Duffing's equation. None if a pack, a backstop or pulses act on one side
-    only; NaN if a run ends early.
+    The mirror image, x -> -x about a center, half a period later, is a motion of the same hammer if the
+    forces are odd about the center, as in Duffing's equation. The center is the hammer's origin, or the
+    middle between two rigid stops with the same restitution. None if a pack, a backstop or pulses act on one
+    side only; NaN if a run ends early.
     """
-    hammer = regime.hammer
-    if hammer.pack is not None or hammer.backstop is not None or regime.drive is None:
+    center = _center(regime.hammer)
+    if center is None or regime.drive is None:
         return None
     half = state_later(regime, state, (regime.phase + 0.5) % 1.0, tolerance)
-    return np.array([2.0 * hammer.origin, 0.0]) - half
+    return np.array([2.0 * center, 0.0]) - half
+
+
+def _center(hammer: Hammer) -> float | None:
+    """Return the position, m, about which the contacts of a hammer are symmetric; None without one."""
+    front, backstop = hammer.pack, hammer.backstop
+    if front is None and backstop is None:
+        return hammer.origin
+    if not (isinstance(front, RigidFront) and isinstance(backstop, RigidBackstop)):
+        return None
+    return 0.5 * (front.front + backstop.position) if front.restitution == backstop.restitution else None
 
 
 def _busy(contacts: FloatArray, begin: float, end: float) -> FloatArray:
