@@ -77,6 +77,24 @@ def test_captions_claim_only_what_was_computed(modules: Path) -> None:
     assert "back to the backstop" in texts[6]
 
 
+def test_a_sinusoidal_force_has_periods_and_no_firings(modules: Path) -> None:
+    def strobe(verdict: str) -> dict[str, Any]:
+        return {"status": "ok", "verdict": {"verdict": verdict, "exponent_per_firing": 0.5}}
+
+    sine = motion(sine=1.0)
+    texts = said(
+        modules,
+        *(
+            {"view": "strobe", "frames": {"motion": sine, "strobe": strobe(verdict)}}
+            for verdict in ("period-1", "period-3", "strange", "undecided")
+        ),
+        {"view": "strobe", "frames": {"motion": motion(), "strobe": strobe("period-3")}},
+    )
+    assert not any("firing" in text for text in texts[:4])
+    assert "as many periods of the force" in texts[1]
+    assert "as many firings" in texts[4]
+
+
 def test_a_flight_too_short_and_a_dot_pushed_again_are_told_apart(modules: Path) -> None:
     soon = dots((2.8e-4, 1.0, 0.7), (6.81e-7, 1.0, 0.7), (2.5e-4, 1.0, 0.7))
     again = dots((2.8e-4, 1.0, 0.7), (2.8e-4, 1.0, 1.2))

@@ -109,14 +109,15 @@ const TEXTS = {
     return parts.length ? `${large(parts.join(", "))}${backstop > 2 * pack && places.front !== null ? ": the hardest blow prints nothing" : ""}.` : "Neither stop nor pack: the force of flight.";
   },
   phase: ({ motion }) => (motion.fired.length > 1 ? "Where the states at the firings fall together, the train repeats itself." : loopText(motion)) + (most(motion.data.v) > 0 ? ` Fastest: ${shown(most(motion.data.v), "m/s", 3)}.` : ""),
-  strobe: ({ strobe }) => {
+  strobe: ({ strobe, motion }) => {
     if (!strobe || strobe.reason) return strobe?.reason ?? "";
     const { verdict } = strobe;
-    if (!verdict) return strobe.status === "ok" ? "The state at each firing of an endless train; the verdict on it follows." : `An endless train cannot be followed at this rate: ${strobe.status}.`;
+    const [what, step] = motion?.sine ? ["motion", "period of the force"] : ["train", "firing"];
+    if (!verdict) return strobe.status === "ok" ? `The state at each ${step} of an endless ${what}; the verdict on it follows.` : `An endless ${what} cannot be followed at this rate: ${strobe.status}.`;
     const period = /^period-(\d+)$/.exec(verdict.verdict)?.[1];
-    if (period) return period === "1" ? "One point in the end: the train repeats itself with every firing." : `${large(NUMBERS[period] ?? period)} points in the end: the train repeats itself after as many firings.`;
-    if (verdict.verdict === "strange") return `The train never repeats itself: what is small grows by a factor of ${digits(Math.exp(verdict.exponent_per_firing), 3)} with each firing.`;
-    return "Neither a period nor chaos can be told from these firings.";
+    if (period) return period === "1" ? `One point in the end: the ${what} repeats itself with every ${step}.` : `${large(NUMBERS[period] ?? period)} points in the end: the ${what} repeats itself after as many ${step.replace(/^\w+/, "$&s")}.`;
+    if (verdict.verdict === "strange") return `The ${what} never repeats itself: what is small grows by a factor of ${digits(Math.exp(verdict.exponent_per_firing), 3)} with each ${step}.`;
+    return `Neither a period nor chaos can be told from these ${step.replace(/^\w+/, "$&s")}.`;
   },
   loops: ({ motion }, studio) => {
     const { backstop, pack } = hardest(motion, studio.described?.rigid);
@@ -135,7 +136,7 @@ const TEXTS = {
 /** Return what a picture shows, for those who do not see it. */
 export function pictureText(name, studio) {
   const { strobe } = studio.frames;
-  return `${captionOf(name, studio)}${name === "strobe" && strobe && !strobe.reason ? ` ${large(strobeText(strobe))}.` : ""}`;
+  return `${captionOf(name, studio)}${name === "strobe" && strobe && !strobe.reason ? ` ${large(strobeText(strobe, studio.frames.motion?.sine ? "period" : "firing"))}.` : ""}`;
 }
 
 /** Say a sentence of a device with its own noun for what a pulse does, see decision 0027. */

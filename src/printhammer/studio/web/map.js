@@ -102,7 +102,7 @@ export function mapView(body, studio) {
     if (rendered !== frame) render(frame);
     const time = timeUnit(frame.end);
     const x = { low: 0, high: frame.end, label: `time, ${time.name}${frame.pattern ? `, pattern ${frame.pattern.length > 16 ? `${frame.pattern.slice(0, 15)}…` : frame.pattern}` : ""}`, factor: time.factor };
-    const y = { low: frame.rates[0], high: frame.rates[1], label: "firing rate, Hz", factor: 1 };
+    const y = { low: frame.rates[0], high: frame.rates[1], label: studio.frames.motion?.sine ? "frequency of the force, Hz" : "firing rate, Hz", factor: 1 };
     plane = axes(pen, width, height, x, y, MARGIN);
     const { box } = plane;
     scale(pen, box, frame, c);

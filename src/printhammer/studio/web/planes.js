@@ -135,7 +135,8 @@ export function strobeView(body, studio) {
     const seen = (list) => (xs.length > 2 * SETTLING ? list.slice(settled) : list);
     const [xe, ve] = [around(extent(seen(xs)), 0.3 * (spread[0][1] - spread[0][0])), around(extent(seen(vs)), 0.3 * (spread[1][1] - spread[1][0]))];
     pen.font = FONT;
-    const told = strobeText(frame);
+    const step = studio.frames.motion?.sine ? "period" : "firing";
+    const told = strobeText(frame, step);
     const lines = broken(pen, told, width - 12);
     const margin = { left: 46, right: 10, top: 8 + 14 * lines.length, bottom: 32 };
     const plane = axes(pen, width, height, displacementAxis(...widened(...xe)), velocityAxis(...widened(...ve)), margin);
@@ -144,7 +145,7 @@ export function strobeView(body, studio) {
     dots(pen, plane, xs.slice(0, settled), vs.slice(0, settled), 2);
     pen.fillStyle = c.x;
     dots(pen, plane, xs.slice(settled), vs.slice(settled), 2);
-    if (x.length > SETTLING) key(pen, plane.box, [{ name: `firings 1 to ${SETTLING}`, colour: c.ghost }, { name: `to ${x.length}`, colour: c.x }]);
+    if (x.length > SETTLING) key(pen, plane.box, [{ name: `${step}s 1 to ${SETTLING}`, colour: c.ghost }, { name: `to ${x.length}`, colour: c.x }]);
     pen.restore();
     pen.save();
     pen.font = FONT;
@@ -159,14 +160,14 @@ export function strobeView(body, studio) {
   });
 }
 
-export function strobeText(frame) {
+export function strobeText(frame, step = "firing") {
   const told = `${frame.data.x.length} of ${frame.last} points at ${digits(frame.rate, 5)} Hz`;
   if (frame.status !== "ok") return `${told}: ${frame.status}`;
   const judged = frame.verdict;
   const sofar = frame.exponent;
   if (!judged) return `${told}${sofar ? `, exponent so far ${exponentText(sofar.value, sofar.standard_error)}` : ""}`;
   const exponent = judged.exponent_per_firing;
-  return `${judged.verdict.replace("-", " ")}${exponent === null ? "" : `, exponent ${exponentText(exponent, judged.standard_error)} per firing`}`;
+  return `${judged.verdict.replace("-", " ")}${exponent === null ? "" : `, exponent ${exponentText(exponent, judged.standard_error)} per ${step}`}`;
 }
 
 /** Tell an exponent with as many digits as its standard error leaves it. */
