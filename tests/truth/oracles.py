@@ -81,11 +81,16 @@ def backstop_speed_ratio(z: float) -> float:
             if abs(step) <= 1e-16 * y:
                 break
         return y / z
+    return (1.0 - _complement(z)) / z
+
+
+def _complement(z: float) -> float:
+    """1 - y for z >= 1 in the equation above, also where y rounds to 1."""
     # q = 1 - y solves q = exp(-(1 - q) - wanted), a contraction.
-    q = 0.0
+    wanted, q = _lag(z), 0.0
     for _ in range(200):
         q = math.exp(q - 1.0 - wanted)
-    return (1.0 - q) / z
+    return q
 
 
 def backstop_indentation(mass: float, stiffness: float, damping: float, speed: float) -> float:
@@ -110,21 +115,27 @@ def backstop_times(mass: float, stiffness: float, damping: float, speed: float) 
     """
     rate = damping / stiffness
 
-    def one_way(end: float) -> float:
+    def one_way(end: float, rest: float) -> float:
+        """Return the time from a speed `end` to rest; `rest` is 1 + (l/k) `end`, without cancellation."""
+
         def integrand(q: float) -> float:
             w, fall = end * (1.0 - q**5), end * q**5
             if rate == 0.0:
                 energy = mass * fall * (w + 0.5 * fall)
             else:
                 b, d = rate * w, rate * fall
-                energy = mass / rate**2 * (d * b / (1.0 + b) + _lag(d / (1.0 + b)))
+                lasting = rest - d
+                behind = d / lasting
+                lag = _lag(behind) if abs(behind) <= 0.25 else behind - math.log(rest / lasting)
+                energy = mass / rate**2 * (d * b / lasting + lag)
             delta = (2.5 * energy / stiffness) ** 0.4
-            return 5.0 * q**4 * mass * abs(end) / (stiffness * delta**1.5 * (1.0 + rate * w))
+            return 5.0 * q**4 * mass * abs(end) / (stiffness * delta**1.5 * (rest - rate * fall))
 
         return float(quad(integrand, 0.0, 1.0, epsabs=0.0, epsrel=1e-13, limit=200)[0])
 
     out = -speed * (backstop_speed_ratio(rate * speed) if rate > 0.0 else 1.0)
-    return one_way(speed), one_way(out)
+    rest = _complement(rate * speed) if rate * speed >= 1.0 else 1.0 + rate * out
+    return one_way(speed, 1.0 + rate * speed), one_way(out, rest)
 
 
 def hertz_duration(mass: float, stiffness: float, speed: float) -> float:

@@ -10,14 +10,14 @@ from printhammer.identify.datasheet.sheet import LIMITS, DataSheet
 from printhammer.parts.magnet import reluctance as law
 from printhammer.parts.magnet.reluctance import MU0, ReluctanceMagnet
 
-IRON: Final = 7860.0  # Density of iron, kg/m^3
+IRON: Final = 7860.0  # Density of iron, kg/m^3: textbook value
 _HEAVY: Final = 3.0  # Ratio of required to stated armature mass above which a fit is implausible; arbitrary
 
 SATURATION: Final = 2.2
-"""Saturation flux density of pure iron at room temperature, T, rounded up; no soft-iron core exceeds it."""
+"""Flux density, T, that no soft-iron core exceeds: the textbook value of pure iron, 2.15 T, rounded up."""
 
 INTERRUPTED: Final = 20.0
-"""Voltage of the interrupted coil, relative to the rail, in the check of the release time."""
+"""Voltage of the interrupted coil, relative to the rail, in the check of the release time; arbitrary."""
 
 
 def implausible(sheet: DataSheet, part: ReluctanceMagnet) -> list[str]:
