@@ -292,3 +292,17 @@ def test_random_devices_strike_the_same_dots_everywhere() -> None:
     # 300 were tried once; half of these are shipped devices in other times, behind their rails.
     for hammer in devices(40):
         strikes_everywhere(hammer)
+
+
+def test_an_armature_latched_on_a_rigid_front_is_not_at_rest() -> None:
+    """Only an armature that dry friction holds is at rest away from its rest position."""
+    hammer = ph.Hammer.build(
+        1e-3,
+        spring={"law": "cubic", "stiffness": -1e3, "cubic": 0.0, "center": 0.5e-3},
+        pack={"law": "rigid", "front": 1e-3, "restitution": 0.2},
+        backstop={"law": "rigid", "position": 0.0, "restitution": 0.2},
+        waveform={"shape": "half-sine", "amplitude": "3 N", "width": 2e-3},
+    )
+    motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform))
+    assert (motion.x[-1], motion.v[-1]) == (1e-3, 0.0)
+    assert "0.001 m from its rest position" in motion.unsettled

@@ -26,7 +26,7 @@ from printhammer.drive.trains import Drive, PulseTrain
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
-from printhammer.kernel.model.modes import HELD, OK
+from printhammer.kernel.model.modes import HELD, HELD_FREE, OK
 from printhammer.run.plain.posing import CYCLE, FLIGHTS, flight_of, is_window, last_window, least_window
 from printhammer.run.problem import Problem, Record, scales_of
 from printhammer.run.supply import waveforms_of
@@ -37,8 +37,8 @@ TOLERANCE: Final = 5e-7
 MOST_STEPS: Final = 500_000  # Largest number of steps of a single pulse; arbitrary
 # Smallest reach, as a fraction of the typical displacement; arbitrary, above the error of the single pulse
 _LEAST_REACH: Final = 1e-4
-THRESHOLDS: Final = {"least_reach": _LEAST_REACH, "flights": FLIGHTS, "held": HELD}
-"""For a page: smallest reach, smallest window in flights, mode above which friction holds the armature."""
+THRESHOLDS: Final = {"least_reach": _LEAST_REACH, "flights": FLIGHTS, "held": (HELD + 1, HELD_FREE)}
+"""For a page: smallest reach, smallest window in flights, first and last mode of an armature that is held."""
 _MOST_KEPT: Final = 512  # Number of cached windows at which the cache is emptied; arbitrary
 
 _FLIGHT: Final = 0.28e-3  # Flight time of the paper's hammer, for which default rates and times are stated, s
@@ -191,7 +191,7 @@ def unsettled(problem: Problem, record: Record) -> str:
     """
     hammer, nodes = problem.hammer, record.nodes
     x, v = float(nodes[-1, 1]), float(nodes[-1, 2])
-    if record.status != OK or (len(nodes) > 1 and nodes[-2, 3] > HELD):
+    if record.status != OK or (len(nodes) > 1 and HELD < nodes[-2, 3] <= HELD_FREE):
         return ""
     pulse = longest_of(problem.drive)
     if not has_window(hammer, pulse):

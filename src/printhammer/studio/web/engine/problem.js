@@ -171,6 +171,9 @@ function frontOf(posed, nodes, limits) {
   return posed.rest + reach;
 }
 
+/** Whether a mode lies between the first and the last of a pair. */
+const isWithin = (mode, [first, last]) => first <= mode && mode <= last;
+
 /** Whether the armature stands still at all steps of a record that end after a time, s. */
 function isStill({ width }, { values }, after) {
   for (let at = 0; at < values.length; at += width) if (values[at] >= after && values[at + 2] !== 0) return false;
@@ -198,7 +201,7 @@ function runWindowOf(kernel, posed, about, limits) {
 export function unsettledOf(kernel, posed, { code, contacts, nodes }, limits) {
   const { rest, width, wait, flight, scales } = posed;
   const { values } = nodes;
-  if (code || posed.sine || (values.length > width && values.at(3 - 2 * width) > limits.WINDOW.held)) return "";
+  if (code || posed.sine || (values.length > width && isWithin(values.at(3 - 2 * width), limits.WINDOW.held))) return "";
   const [x, v] = [values.at(1 - width), values.at(2 - width)];
   return kernel.temporarily(() => {
     const places = kernel.copy("f", [rest, frontOf(posed, nodes, limits), ...scales, Infinity]);
