@@ -296,7 +296,7 @@ class Motion(Result, fields=False):
 
     @cached_property
     def timings(self) -> Rows[Timing]:
-        """Operate, release and bounce times of the contacts of ``[[contact]]``, shown as a table."""
+        """Operate, release and bounce times of contacts in ``[[contact]]``; none under a sinusoidal force."""
         return Rows(timings_of(self._problem, self._record, self.closings), Timing)
 
     @cached_property
@@ -378,7 +378,7 @@ class Motion(Result, fields=False):
         if self.sticks:
             first = quantity(self.sticks[0].t_in, "s")
             rows.append(("held by friction", f"{len(self.sticks)} x, first at {first}"))
-        energies = Facts([*rows, *timing_facts(self.timings, self.end), *self._energy_facts()])
+        energies = Facts([*rows, *timing_facts(self.timings, self.closings, self.end), *self._energy_facts()])
         if self.drive.quantity != "current" and self.hammer.pack is None:
             return Summary([energies])
         heads = {

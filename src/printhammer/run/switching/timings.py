@@ -18,7 +18,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from printhammer.drive.trains import Drive
+from printhammer.drive.trains import Drive, SineForce
 from printhammer.drive.waveforms.shapes import Trapezoid, Waveform
 from printhammer.parts.spring.forces import LinearContact
 from printhammer.results import Declared, part, scalar
@@ -39,7 +39,7 @@ class Timing(Declared):
     switched_off: float | None = scalar(
         "s",
         "time at which the drive is switched off",
-        more="None if the drive is endless or the next firing begins earlier",
+        more="None if the next firing begins earlier",
     )
     operate_time: float | None = scalar(
         "s", "time from switch-on to the first switching", more=f"excludes the bounce; {_NOT_SEEN}"
@@ -69,9 +69,12 @@ def off_after(waveform: Waveform) -> float:
 def timings_of(problem: Problem, record: Record, closings: Sequence[Closing]) -> list[Timing]:
     """Return the switching times of all contacts, in the order of the hammer file, then of the firings.
 
-    `closings` are those of the run, from `printhammer.run.contacts.closings_of`.
+    `closings` are those of the run, from `printhammer.run.contacts.closings_of`. A sinusoidal force, which is
+    never switched, gives no switching times.
     """
-    timings = []
+    timings: list[Timing] = []
+    if isinstance(problem.drive, SineForce):
+        return timings
     for key, term in problem.hammer.terms.items():
         if isinstance(term, LinearContact):
             name = key.partition(".")[2]
@@ -133,9 +136,18 @@ def _timing(
     )
 
 
-def timing_facts(timings: Sequence[Timing], end: float) -> list[FactRow]:
-    """Return the switching times of each contact, for the summary of a run that ends at `end`, s."""
+def timing_facts(timings: Sequence[Timing], closings: Sequence[Closing], end: float) -> list[FactRow]:
+    """Return the switching times of each contact, for the summary of a run that ends at `end`, s.
+
+    Without switching times, the rows state the closings of each contact.
+    """
     rows: list[FactRow] = []
+    if not timings:
+        for name in dict.fromkeys(each.contact for each in closings):
+            mine = [each for each in closings if each.contact == name]
+            count = f"{len(mine)} {'closing' if len(mine) == 1 else 'closings'}"
+            most = quantity(max(each.peak_force for each in mine), "N")
+            rows.append((f"contact {name}", f"{count} from {quantity(mine[0].t_in, 's')}, up to {most}"))
     for name in dict.fromkeys(each.contact for each in timings):
         own = [each for each in timings if each.contact == name]
         forth, back = ("closes", "opens") if own[0].kind == "make" else ("opens", "closes")
