@@ -109,7 +109,9 @@ export function sketchView(body, studio) {
     pen.font = FONT;
     pen.textAlign = "center";
     if (platen !== null) block(pen, X(platen), middle - 1.3 * tall, 0.06 * width, 2.6 * tall, c.backstop, "platen", c);
-    if (front !== null) {
+    // The displacement of a mass is that of its left face.
+    if (front !== null && studio.described?.rigid_front) block(pen, X(front) + (isArmature ? 0 : 0.08 * width), middle - 0.75 * tall, 0.05 * width, 1.5 * tall, c.backstop, packOf(studio.described), c);
+    else if (front !== null) {
       const touch = Math.max(x, front);
       const thick = Math.max(X(platen ?? high) - X(front), 3);
       pen.fillStyle = c.pack;
