@@ -61,18 +61,18 @@ export function piece(kernel, hammer, state, limits, { rates, columns, wanted })
   return kernel.temporarily(() => {
     const posed = pose(kernel, hammer, state, limits);
     const slots = state.pattern || "1".repeat(state.pulses);
-    const fired = [...slots].flatMap((mark, k) => (mark === "1" ? [k] : []));
+    // A continuous force begins once, at 0; it differs from rate to rate, and strikes no dots.
+    const fired = isSine(state) ? [0] : [...slots].flatMap((mark, k) => (mark === "1" ? [k] : []));
     const end = isSine(state) ? slots.length / state.low : (slots.length - 1) / state.low + posed.wait;
     const grid = kernel.array("f", columns);
     kernel.call("map_rates", 0, end, grid);
     const [starts, firings] = [kernel.array("i", rates.length + 1), kernel.array("f", rates.length * fired.length)];
     kernel.call("map_trains", kernel.copy("f", rates), kernel.copy("i", fired), Boolean(state.pattern), starts, firings);
     const counts = rates.map(() => fired.length);
-    // A continuous force differs from rate to rate, and strikes no dots.
     const waves = isSine(state) ? wavesOf(kernel, hammer, state, limits, rates) : null;
     const isStruck = wanted && !waves;
     const kinds = { grid: grid.values.slice(), room: isStruck ? counts : null, most: limits.MOST_MAP_STEPS, waves };
-    const kept = many(kernel, posed, firings, waves ? rates.map(() => 1) : counts, rates.map(() => end), kinds);
+    const kept = many(kernel, posed, firings, counts, rates.map(() => end), kinds);
     const struck = isStruck ? kernel.array("i", firings.shape[0]) : null;
     if (struck) kernel.call("map_struck", kept.dots, kept.dot_starts, fired.length, struck);
     return { end, places: posed.places, x: kept.x.values.slice(), ok: Array.from(kept.status.values, (code) => code === 0n), struck: struck && Uint8Array.from(struck.values, Number) };
