@@ -16,7 +16,7 @@ from printhammer.studio.bundle import page_files
 
 NEEDS = {"opened_browser": ("Chromium", chromium), "opened_firefox": ("Firefox", firefox)}
 """Browsers by the fixture that starts them."""
-HAMMERS = ("hendriks-1983-1", "hendriks-1983", "bouncing-ball", "duffing-holmes")
+HAMMERS = ("hendriks-1983-1", "hendriks-1983", "bouncing-ball", "duffing-holmes", "relay-5v")
 """Hammers of the page of the tests, the first of which is shown."""
 WHOLE = f"#views={'-'.join(VIEWS)}"
 """Link to the page with all views."""

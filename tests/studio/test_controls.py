@@ -34,6 +34,15 @@ def test_every_constant_has_a_control_whose_range_holds_it(name: str) -> None:
         assert constant["low"] > 0.0 or not constant["log"]
 
 
+def test_contacts_of_the_file_have_name_side_and_position() -> None:
+    relay = load("relay-5v")
+    assert [tuple(contact.values()) for contact in controls.describe(relay)["contacts"]] == [
+        ("make", "front", relay.constants["contact.make.position"].si),
+        ("break", "back", relay.constants["contact.break.position"].si),
+    ]
+    assert controls.describe(load(CRUDE))["contacts"] == []
+
+
 @pytest.mark.parametrize("name", HAMMERS)
 def test_every_law_has_its_equation_or_first_line(name: str) -> None:
     hammer = load(name)

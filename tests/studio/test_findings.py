@@ -194,11 +194,38 @@ def test_the_actuator_reads_the_current_of_its_time(opened: Page) -> None:
     hammer = ph.load("hendriks-1983")
     drive = ph.PulseTrain(hammer.waveform, rate=1200, pulses=9)
     for time in (1.1e-4, 9.6e-4, 6.002e-3):
-        drawn = opened.run(
-            "(() => { const texts = []; const pen = new Proxy({}, { get: (_t, name) => name === 'fillText' ?"
-            " (text) => texts.push(text) : () => ({ width: 10 }), set: () => true });"
-            f" window.studio.studio.cursor = {time}; window.studio.studio.views.sketch.paint(pen, 500, 200);"
-            " return texts.find((text) => / A$/.test(text)); })()"
-        )
+        drawn = next(text for text in sketched(opened, time) if text.endswith(" A"))
         current = float(drive.value([time])[0])
         assert float(drawn.split()[-2]) == pytest.approx(current, rel=0.02, abs=2e-3)
+
+
+@pytest.mark.slow
+def test_contacts_of_a_relay_open_and_close_at_their_positions(opened: Page) -> None:
+    relay = ph.load("relay-5v")
+    opened.run("window.studio.studio.store.set({ hammer: 'relay-5v', rate: 20, pulses: 3 })")
+    opened.wait("!window.studio.studio.busy && window.studio.studio.loaded === 'relay-5v'")
+    motion = ph.simulate(relay, ph.PulseTrain(relay.waveform, rate=20.0, pulses=3))
+    make, separation = (relay.constants[f"contact.{name}.position"].si for name in ("make", "break"))
+    seen = set()
+    for time in (0.0, 4e-3, 5e-3, 15e-3, 40e-3, 60e-3):
+        x = float(motion.at([time])[0][0])
+        states = [
+            f"make {'closed' if x > make else 'open'}",
+            f"break {'closed' if x < separation else 'open'}",
+        ]
+        assert set(states) <= set(sketched(opened, time))
+        opened.run(f"window.studio.studio.setCursor({time})")
+        scrub = "document.querySelector('.view-sketch .scrub').getAttribute('aria-valuetext')"
+        opened.wait(f"{scrub}.endsWith('{', '.join(states)}')")
+        seen |= set(states)
+    assert len(seen) == 4
+
+
+def sketched(page: Page, time: float) -> list[str]:
+    """Return the texts of the drawing of the actuator at a time, s."""
+    return page.run(
+        "(() => { const texts = []; const pen = new Proxy({}, { get: (_t, name) => name === 'fillText' ?"
+        " (text) => texts.push(text) : () => ({ width: 10 }), set: () => true });"
+        f" window.studio.studio.cursor = {time}; window.studio.studio.views.sketch.paint(pen, 500, 200);"
+        " return texts; })()"
+    )

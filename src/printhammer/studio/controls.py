@@ -10,7 +10,7 @@ from printhammer.drive.waveforms.drivers import DRIVERS, Rail
 from printhammer.drive.waveforms.shapes import SHAPES, Sine, Waveform
 from printhammer.parts.base import Part
 from printhammer.parts.friction import DryFriction
-from printhammer.parts.spring.forces import ForceSum
+from printhammer.parts.spring.forces import ForceSum, LinearContact
 from printhammer.studio import bounds
 from printhammer.studio.coil import by_voltage, open_constants, rail_of, span_of
 from printhammer.support.constants import quantities
@@ -128,9 +128,10 @@ def describe(hammer: Hammer) -> dict[str, Any]:
         `name`, `title`, `note`, `constants` (a list), `open` (coil constants that the file leaves open),
         `rail` (default rail driver, or None), `combined` (controls that change several constants),
         `waveform` (shape and constants, or None), `start` (entries of the initial state that differ from the
-        default), `places` (positions), the nouns `strike`, `struck` and `mover`, `views` (those listed in
-        the hammer file), `rigid` and `rigid_front` (whether backstop and front are rigid), and `dry` (whether
-        dry friction acts and the hammer has a magnet: a voltage may then drive the coil, without exponents).
+        default), `places` (positions), `contacts` (name, side and position of each contact of the file), the
+        nouns `strike`, `struck` and `mover`, `views` (those listed in the hammer file), `rigid` and
+        `rigid_front` (whether backstop and front are rigid), and `dry` (whether dry friction acts and the
+        hammer has a magnet: a voltage may then drive the coil, without exponents).
     """
     constants = []
     for key, constant in hammer.constants.items():
@@ -147,6 +148,11 @@ def describe(hammer: Hammer) -> dict[str, Any]:
         "waveform": None if hammer.waveform is None else fields_of(hammer.waveform),
         "start": opening_of(hammer),
         "places": {"backstop": hammer.position, "front": hammer.front, "platen": hammer.platen},
+        "contacts": [
+            {"name": key.partition(".")[2], "side": contact.side, "position": contact.position}
+            for key, contact in hammer.terms.items()
+            if isinstance(contact, LinearContact)
+        ],
         "strike": hammer.strike,
         "struck": hammer.struck,
         "mover": hammer.mover,

@@ -1,7 +1,7 @@
 // What a view tells, in a sentence: read below its title, and by those who do not see the picture.
 import { strobeText } from "./planes.js";
 import { digits, shown } from "./units.js";
-import { large, moverOf, stopOf } from "./words.js";
+import { large, moverOf, packOf, stopOf } from "./words.js";
 
 const NUMBERS = ["no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve"];
 const ORDINALS = ["first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth", "eleventh", "twelfth"];
@@ -74,7 +74,11 @@ const TEXTS = {
   sketch: ({ motion }, studio) => {
     const { backstop, front } = motion.places;
     const mover = moverOf(studio.described);
-    if (mover !== "armature") return `The ${mover}${backstop === null ? "" : ` and the ${stopOf(studio.described)}`}, to scale along the direction of motion.`;
+    if (mover !== "armature") {
+      const stops = [...(backstop === null ? [] : [stopOf(studio.described)]), ...(front === null ? [] : [packOf(studio.described)])];
+      const met = stops[0] === stops[1] && stops.length ? [`two ${stops[0]}s`] : stops.map((name) => `the ${name}`);
+      return `${[`The ${mover}`, ...met].join(" and ")}, to scale along the direction of motion.`;
+    }
     const places = [...motion.data["strobe x"]].slice(1);
     if (backstop === null || front === null || !places.length) return "The face of the armature, to scale along its stroke.";
     const away = places.filter((x) => x - backstop > 0.02 * (front - backstop)).length;

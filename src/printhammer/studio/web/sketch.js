@@ -90,10 +90,11 @@ export function sketchView(body, studio) {
     const { backstop, front, platen } = frame.places;
     const mover = moverOf(studio.described);
     const isArmature = mover === "armature";
-    const known = [backstop, front, platen, ...(isArmature ? frame.data.x.subarray(0, 1) : extent(frame.data.x))].filter((place) => place !== null);
+    const contacts = studio.described?.contacts ?? [];
+    const known = [backstop, front, platen, ...contacts.map(({ position }) => position), ...(isArmature ? frame.data.x.subarray(0, 1) : extent(frame.data.x))].filter((place) => place !== null);
     const low = Math.min(...known);
-    // Without a platen the pack has no end.
-    const high = platen === null && front !== null ? front + 0.6 * (front - low) : Math.max(...known);
+    // Without a platen the pack has no end, unless it is rigid.
+    const high = platen === null && front !== null && !studio.described?.rigid_front ? front + 0.6 * (front - low) : Math.max(...known);
     const way = high - low || 1e-4;
     const [left, right] = isArmature ? [0.34 * width, 0.9 * width] : [0.16 * width, 0.8 * width];
     const X = (x) => left + ((x - low) / way) * (right - left);
@@ -103,14 +104,16 @@ export function sketchView(body, studio) {
     const tall = Math.min(Math.max((0.5 * (bottom - top) - 15) / 1.3, 8), 90);
     const x = displacementAt(frame, studio.cursor);
     const driven = valueAt(frame, frame.data.drive, studio.cursor);
-    // What is left of an exponential decay is told as nothing.
+    // What is left of an exponential decay, and a rest position that only rounding moves from 0, are told as nothing.
+    const place = Math.abs(x) < 1e-9 * way ? 0 : x;
     const current = Math.abs(driven) < 1e-4 * (frame.peak || 1) ? 0 : driven;
     pen.save();
     pen.font = FONT;
     pen.textAlign = "center";
     if (platen !== null) block(pen, X(platen), middle - 1.3 * tall, 0.06 * width, 2.6 * tall, c.backstop, "platen", c);
-    // The displacement of a mass is that of its left face.
-    if (front !== null && studio.described?.rigid_front) block(pen, X(front) + (isArmature ? 0 : 0.08 * width), middle - 0.75 * tall, 0.05 * width, 1.5 * tall, c.backstop, packOf(studio.described), c);
+    // The displacement of a mass is that of its left face, or of its centre without a backstop.
+    const [behind, ahead] = isArmature ? [0, 0] : backstop === null ? [-0.04 * width, 0.04 * width] : [0, 0.08 * width];
+    if (front !== null && studio.described?.rigid_front) block(pen, X(front) + ahead, middle - 0.75 * tall, 0.05 * width, 1.5 * tall, c.backstop, packOf(studio.described), c);
     else if (front !== null) {
       const touch = Math.max(x, front);
       const thick = Math.max(X(platen ?? high) - X(front), 3);
@@ -134,20 +137,36 @@ export function sketchView(body, studio) {
       pen.beginPath();
       pen.arc(tip + radius, middle, radius, 0, 2 * Math.PI);
       pen.fill();
-    } else pen.fillRect(tip - (backstop === null ? 0.04 * width : 0), middle - 0.5 * tall, 0.08 * width, tall);
+    } else pen.fillRect(tip + behind, middle - 0.5 * tall, 0.08 * width, tall);
     if (backstop !== null) block(pen, X(backstop) - (isArmature ? 0.26 : 0.05) * width, middle - 0.75 * tall, (isArmature ? 0.07 : 0.05) * width, 1.5 * tall, c.backstop, stopOf(studio.described), c);
+    const rows = { front: 0, back: 0 };
+    for (const { name, side, position } of contacts) {
+      const isFront = side === "front";
+      const face = isFront ? ahead : behind;
+      const closed = isClosed({ side, position }, x);
+      lever(pen, X(position) + face, tip + face, closed, middle, isFront ? -tall : tall, c);
+      // A closed lever leans away from its name.
+      pen.textAlign = isFront ? "right" : "left";
+      pen.fillStyle = closed ? c.accent : c.muted;
+      pen.fillText(stateOf(name, closed), X(position) + face + (isFront ? -7 : 7), middle + (isFront ? 8 - 1.2 * tall + 13 * rows.front : 1.2 * tall - 13 * rows.back));
+      rows[side] += 1;
+    }
+    pen.textAlign = "center";
     if (has(studio.described, "magnet")) coil(pen, X(low) - 0.15 * width, middle - 1.1 * tall, 0.1 * width, current, frame, c);
     ruler(pen, X, low, high, height, c);
     pen.fillStyle = c.ink;
     pen.textAlign = "left";
-    pen.fillText(`${shown(studio.cursor, "s")}   ${shown(x, "m")}   ${shown(current, frame.quantity === "force" ? "N" : "A", 3)}${voltageAt(frame, studio.cursor, "   ")}`, 8, 14);
+    pen.fillText(`${shown(studio.cursor, "s")}   ${shown(place, "m")}   ${shown(current, frame.quantity === "force" ? "N" : "A", 3)}${voltageAt(frame, studio.cursor, "   ")}`, 8, 14);
     pen.restore();
   }
 
   function cursor() {
     const [low, high] = span();
     scrub.value = String(Math.round((1000 * (studio.cursor - low)) / (high - low || 1)));
-    scrub.setAttribute("aria-valuetext", shown(studio.cursor, "s"));
+    const frame = studio.frames.motion;
+    const contacts = frame ? studio.described?.contacts ?? [] : [];
+    const states = contacts.map((contact) => stateOf(contact.name, isClosed(contact, displacementAt(frame, studio.cursor))));
+    scrub.setAttribute("aria-valuetext", [shown(studio.cursor, "s"), ...states].join(", "));
     area.draw();
   }
   return {
@@ -167,6 +186,25 @@ function block(pen, x, y, w, h, colour, name, c) {
   pen.fillRect(x, y, w, h);
   pen.fillStyle = c.muted;
   pen.fillText(name, x + w / 2, y + h + 13);
+}
+
+const isClosed = ({ side, position }, x) => (side === "front" ? x > position : x < position);
+const stateOf = (name, closed) => `${name} ${closed ? "closed" : "open"}`;
+
+/** Draw a contact: a lever that stands at its position, and that a pin on the mover bends when the contact is closed. */
+function lever(pen, place, pin, closed, middle, tall, c) {
+  const touch = closed ? pin : place;
+  pen.lineWidth = 2;
+  pen.strokeStyle = c.x;
+  line(pen, pin, middle + 0.16 * tall, pin, middle + 0.9 * tall);
+  pen.strokeStyle = closed ? c.accent : c.muted;
+  pen.fillStyle = closed ? c.accent : c.panel;
+  line(pen, place, middle + 1.2 * tall, touch, middle + 0.7 * tall);
+  pen.beginPath();
+  pen.arc(touch, middle + 0.8 * tall, 3, 0, 2 * Math.PI);
+  pen.fill();
+  pen.stroke();
+  pen.lineWidth = 1;
 }
 
 function coil(pen, x, y, w, current, frame, c) {
