@@ -155,7 +155,7 @@ def count_all(found: list[Recovery]) -> dict[str, int]:
 def test_the_recipe_of_the_page_in_a_few_laboratories() -> None:
     """Run as printed, through files, as `docs/measure/recipe.py` does a hundred times."""
     path = Path(__file__).parents[2] / "docs" / "measure"
-    count = 5
+    count = 3
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(path))
         script = importlib.import_module("recipe")
@@ -168,12 +168,13 @@ def test_the_recipe_of_the_page_in_a_few_laboratories() -> None:
 
 
 @pytest.mark.slow
-def test_forty_laboratories() -> None:
+def test_sixteen_laboratories() -> None:
     """Intervals are neither too narrow nor too wide; `docs/measure/recovery.py` counts 100 laboratories.
 
-    No constant misses its 95 % interval more often than chance allows; all together hold it in 92 to 98 %.
+    No constant misses its 95 % interval more often than chance allows. All 17 together hold it in 92 to 98 %:
+    of 272 independent intervals, 95 % ± 1.3 % do.
     """
-    labs = 40
+    labs = 16
     counts = count_all([laboratory(seed) for seed in range(labs)])
     allowed = binom.isf(CHANCE, labs, 0.05)
     assert {key: n for key, n in counts.items() if labs - n > allowed} == {}
@@ -183,7 +184,7 @@ def test_forty_laboratories() -> None:
 @pytest.mark.slow
 def test_laboratories_with_hammers_of_their_own() -> None:
     """So it is for other hammers that print, each constant up to 20 % from the shipped one."""
-    labs = 20
+    labs = 8
     found = [recover(hammer, seed) for seed, hammer in enumerate(printing_hammers(labs))]
     counts = count_all(found)
     allowed = binom.isf(CHANCE, labs, 0.05)
