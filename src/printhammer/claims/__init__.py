@@ -1,7 +1,7 @@
 """Claims of the paper: the measurable statements of Hendriks (1983), each tested for a hammer.
 
 `claims.toml` states the claims as numbers; one module per family measures the values; `judge_all` compares
-both.
+the measured values with the claims.
 """
 
 from printhammer.claims import bursts, integrators, statics, strobes, verdicts

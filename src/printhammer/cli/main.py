@@ -124,7 +124,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 
 
 def _advice(message: str, error: Exception) -> str:
-    """Return how to select the hammer, after an extra argument of a verb that has the option --hammer."""
+    """Return advice on how to select the hammer, for an extra argument of a verb with the option --hammer."""
     command = getattr(getattr(error, "ctx", None), "command", None)
     flags = [flag for option in getattr(command, "params", ()) for flag in option.opts]
     return "; --hammer selects the hammer" if "unexpected extra" in message and "--hammer" in flags else ""

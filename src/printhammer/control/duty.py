@@ -363,7 +363,7 @@ TEMPERATURES: Final = (20.0, 40.0, 60.0, 80.0, 100.0, 120.0, 140.0)
 
 _LEFT: Final = 1e-3  # Residual current at which a pulse counts as ended, as a fraction of its peak; arbitrary
 _DECAYED: Final = 0.01
-"""Residual fraction of the current whose heat is neglected: at most 2 % of the next dot's; arbitrary."""
+"""Fraction of the current whose heat is neglected: at most 2 % of the heat of the next dot; arbitrary."""
 _DOUBLINGS: Final = 8  # Iteration limit of the doublings of the simulated time; arbitrary
 
 

@@ -43,7 +43,7 @@ _MOST_SINGLE: Final = 20
 
 
 class Parameter(Declared):
-    """Constant of hammer or drive, and derivatives of the kernel's arrays with respect to the constant."""
+    """Differentiable constant, with the derivatives of the kernel's arrays with respect to the constant."""
 
     name: str = part('name of the constant, such as "pack.stiffness", "waveform.width", "period", "firing.1"')
     value: float = part("value in SI")

@@ -110,7 +110,7 @@ def even_times(
 
 
 def read_times(at: Iterable[float | str]) -> FloatArray:
-    """Parse firing times, an array, s, or a sequence of strings with units; errors as for `read_number`."""
+    """Parse firing times: an array of times in s, or a sequence of strings with units."""
     if isinstance(at, np.ndarray) and at.dtype.kind in "fiu":
         return at.astype(np.float64)
     try:

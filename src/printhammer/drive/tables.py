@@ -352,9 +352,9 @@ def pulse(shape: int, fields: Any, table: Any, about: Any) -> int:
         Segment table, in the form for the kernel: the last row has the kind `END`.
     about : float64 array, shape (14,)
         In order: support, s; end of the table, s; largest value; 1 if the latest firing replaces earlier
-        ones, else 0; resistance of the supply in series with one coil, ohm; upper current of the hold phase
-        and of the chopper, A, NaN if missing; the six numbers of the supply; end of the time axis of a plot,
-        s.
+        firings, else 0; resistance of the supply in series with one coil, ohm; upper current of the hold
+        phase and of the chopper, A, NaN if missing; the six numbers of the supply; end of the time axis of a
+        plot, s.
 
     Returns
     -------

@@ -204,7 +204,7 @@ def _at_bound(solution: Solution) -> BoolArray:
 
 
 def _next_held(solution: Solution, data: FloatArray) -> int | None:
-    """Select the next parameter to hold; return its index, or None if the data determine all free ones."""
+    """Select the next parameter to hold; return its index, or None if the data determine all parameters."""
     space, free = solution.parameters, np.flatnonzero(solution.free)
     bound = [k for k in free.tolist() if _at_bound(solution)[k]]
     if bound:

@@ -91,7 +91,7 @@ def damping_force(c: Any, v: float) -> float:
 
 
 def friction_force(c: Any, k: float) -> float:
-    """Return 0 N, the dry friction: the hammer has none."""
+    """Return 0 N, the friction force: the hammer has no dry friction."""
     return 0.0
 
 

@@ -68,7 +68,7 @@ class Part(BaseModel):
 
     @classmethod
     def function(cls, name: str) -> Any:
-        """Return a function that the module of the class or of a base class defines, or None."""
+        """Return a law function that the module of the class or of a base class defines; None if missing."""
         modules = (vars(sys.modules[base.__module__]) for base in cls.__mro__ if issubclass(base, Part))
         return next((module[name] for module in modules if name in module), None)
 
@@ -88,7 +88,7 @@ class Part(BaseModel):
         return (*(_number(value, kind) for value, kind in values), float(self.variant))
 
     def content(self) -> Mapping[str, Any]:
-        """Return the numbers read from a further file, such as a table, that identify the part."""
+        """Return the numbers read from an additional file, such as a table, which identify the part."""
         return {}
 
     @property

@@ -23,7 +23,7 @@ from printhammer.parts.damping import ViscousDamping
 from printhammer.parts.spring.forces import Friction
 
 FRICTION = True
-"""Whether a dry friction acts, whose static and kinetic force `friction_force` returns."""
+"""Whether dry friction acts; `friction_force` returns its static and kinetic values."""
 
 
 def damping_force(c: Any, v: float) -> float:
@@ -37,7 +37,7 @@ def friction_force(c: Any, k: float) -> float:
 
 
 def damping_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants, the numbers of the part; return their number."""
+    """Write the packed constants, which are the values of the part; return their count."""
     for k in range(3):
         c[k] = q[k]
     return 3

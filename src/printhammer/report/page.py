@@ -138,7 +138,7 @@ def schemes_view(report: Report) -> dict[str, Any] | None:
 
 
 def predictions_view(report: Report) -> dict[str, Any] | None:
-    """Return, for hammers fitted to the stated claims, the fraction that satisfies each other claim."""
+    """Return, for hammers fitted to the stated claims, the fraction for which each other claim holds."""
     predictions = report.reconstruction.predictions
     if predictions is None or not report.reconstructed:
         return None

@@ -29,7 +29,7 @@ def begin(laws: Laws) -> Callable[[], None]:
     Returns
     -------
     callable
-        Function that waits for the other process, which ends with this process at the latest.
+        Function that waits for the other process, which is terminated if this process ends first.
     """
     if thread_count(None) < 2:
         return _nothing

@@ -152,7 +152,7 @@ _KNOWN: Final = (
     "loading_work",
     "net_loss",
 )
-"""Fields of a struck dot in the order of the columns of `printhammer.kernel.readout.contacts`."""
+"""Fields of a printed dot, in the order of the columns of `printhammer.kernel.readout.contacts`."""
 
 
 def _dot_of(index: int, row: list[float]) -> Dot:

@@ -143,7 +143,7 @@ class Ensemble:
         One drive for all members, or one for each; `printhammer.PulseTrains` is the most efficient form of
         many trains.
     ends : float or array
-        End of the runs, s, one for all or one for each.
+        End times of the runs, s: one time for all members, or one for each member.
     states : tuple or array, optional
         Displacement, m, and velocity, m/s, at the start: one for all or one row for each member; by default
         the rest state of the member's hammer. Rows of four also hold the mode and the memory, as in
@@ -151,8 +151,8 @@ class Ensemble:
         the coil and in its shorted turn, A, and the voltage of the supply's capacitor, V; by default there is
         no current, and the capacitor is charged.
     starts : float or array, optional
-        Time of these states, s, not negative, one for all or one for each; by default 0. Earlier firings are
-        active at that time.
+        Start times of the runs, s, not negative: one time for all members, or one for each member; by default
+        0. Pulses fired before the start are still active.
     tolerance : float, optional
         Error tolerance of one step, in units of the distance from backstop to pack and of a typical speed.
     max_steps : int, optional

@@ -243,7 +243,7 @@ class Motion(Result, fields=False):
         return table
 
     def at(self, t: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return displacement, m, and velocity, m/s, at times of the run, s; at a jump, those after it."""
+        """Return (x, v), m and m/s, at times of the run, s; at a jump of the velocity, after the jump."""
         table = self._resampled(t)
         return table[:, 0], table[:, 1]
 

@@ -306,9 +306,8 @@ class Problem:
     def in_stretches(self, end: float, capacity: int, take: Callable[[Iterator[Stretch]], T]) -> T:
         """Integrate to time `end`, s, and process the record in stretches, so that memory does not grow.
 
-        `take` receives an iterator of stretches of at most `capacity` nodes, and need not consume all; if a
-        single contact has more nodes, `take` is called again with longer stretches. Returns the result of
-        `take`.
+        `take` receives an iterator of stretches of at most `capacity` nodes, and need not exhaust it; if a
+        contact alone has more nodes, `take` is called again with longer stretches. Returns its result.
         """
         while True:
             try:
@@ -331,7 +330,7 @@ class Problem:
                 contacts[0] = contacts[touched - 1]
 
     def resample(self, record: Record, times: FloatArray) -> FloatArray:
-        """Return states and forces, `columns` for each ascending time, s; see the kernel's `resample`."""
+        """Return states and forces at ascending times, s, shape (times, `columns`); see the kernel."""
         out = np.empty((times.size, self.columns))
         self.kernel.resample(times, record.nodes, self.drive_arrays(), self.constants, out)
         return out

@@ -399,7 +399,7 @@ def regimes_of(
     hammers : Hammer or Regime, or sequence of them
         One hammer for all trains, or one for each; with regimes, only `phase` may be passed.
     periods : sequence, optional
-        Times between firings, s or text with a unit, one for each train, or a single one for all hammers.
+        Times between firings, s or text with a unit: one time for each train, or one time for all hammers.
     drives : sequence of Drive, optional
         Continuous periodic forces, instead of periods.
     waveform, overlap, phase

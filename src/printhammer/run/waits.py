@@ -33,8 +33,8 @@ def waits_of(
     """Compute the time from last firing to end of each run, s, like `wait_of`, but with ensembles.
 
     One hammer and one waveform for each run, shape (runs,); equal objects are simulated once. Devices whose
-    armature does not rest clear of a pack are simulated singly: the work of a member is then little beside
-    that of finding its rest position.
+    armature does not rest clear of a pack are simulated singly: most of the work is then the search for the
+    rest position.
     """
     places: dict[tuple[int, int], int] = {}
     pairs: list[tuple[Hammer, Waveform]] = []

@@ -69,7 +69,7 @@ _CLOSER: Final = 4.0  # Arbitrary
 _ASIDE: Final = 0.5
 """Largest offset of a doubled orbit from the critical direction, relative to its distance; arbitrary."""
 _NEW_MULTIPLIER: Final = 0.3
-"""Largest distance of a multiplier of a doubled orbit from 1 near its period doubling; arbitrary."""
+"""Largest distance from 1 of a doubled orbit's nearest multiplier, near its period doubling; arbitrary."""
 _HALF_NEAR: Final = 0.05  # Arbitrary
 """Largest scaled distance between an orbit and one of half its period, for both to meet at a doubling."""
 _HALF_DOUBLES: Final = 0.5
@@ -320,7 +320,7 @@ def follow_doubled(
     """Follow the orbits of twice the period that are born at a period doubling.
 
     The first orbit is sought at a scaled distance `amplitude` from the doubling `point`, in the direction of
-    the eigenvector whose multiplier is -1; its parameter is an unknown, too, and may lie on either side of
+    the eigenvector whose multiplier is -1; its parameter is also an unknown, and may lie on either side of
     the doubling. The orbit is accepted if, to first order, it lies in that direction, with the parameter and
     the multipliers of the doubling. Otherwise the search is repeated closer to the doubling. `doubled` is the
     map applied twice; the other arguments are those of `follow`. Raises InputError if no such orbit is found.

@@ -43,7 +43,7 @@ _LEAST_AMPLITUDE: Final = 1e-5  # Smallest scaled distance from a crossing to tr
 _CLOSER: Final = 4.0
 """Ratio of successive scaled distances from a crossing at which the crossing curve is sought; arbitrary."""
 _ASIDE: Final = 0.5  # Arbitrary
-"""Largest distance from the predicted point, relative to the step, of a point on the crossing curve."""
+"""Largest distance of a point on the crossing curve from the predicted point, relative to the step."""
 
 
 def locate_crossing(
@@ -51,8 +51,8 @@ def locate_crossing(
 ) -> tuple[float, Node | None]:
     """Locate a crossing between two nodes; return the fraction of the step, and the node or None.
 
-    Since Newton's method fails at the crossing itself, the crossing is bracketed ever closer and
-    interpolated.
+    Since Newton's method fails at the crossing itself, the crossing is bracketed ever more closely, and its
+    position is interpolated.
     """
     low, high, one, other = 0.0, 1.0, here, ahead
     for _ in range(_ROUNDS):
@@ -132,8 +132,8 @@ def follow_crossing(
 ) -> Curve:
     """Follow, in both directions, the curve that crosses a known curve at one of its nodes.
 
-    The first point of the other curve is sought at a scaled distance along the tangent of the other curve; if
-    no fixed point is found, the distance is reduced. The other arguments are those of `follow`.
+    The first point of the crossing curve is sought at a scaled distance along its tangent; if no fixed point
+    is found, the distance is reduced. The other arguments are those of `follow`.
 
     Raises
     ------

@@ -46,7 +46,7 @@ _SLOWER: Final = (0.98, 0.9, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.02, 0.005)
 
 
 class Flight(Declared):
-    """Motion from one impact on a surface to a later impact, with the surface removed near both impacts."""
+    """Motion between two impacts on a surface; close to both impacts the model omits the surface."""
 
     end: FloatArray = part("displacement, m, and velocity, m/s, at the end, shape (2,)")
     jacobian: FloatArray = part("derivative with respect to the state at the start, shape (2, 2)")
@@ -264,8 +264,8 @@ def grazing_end(
 ) -> tuple[list[Node], float] | None:
     """Compute the last orbits of a branch before a final grazing, and the parameter at the grazing.
 
-    `node` is the last known orbit; with `impacts`, its turning points are ignored. None if the orbit is not
-    close to a grazing.
+    `node` is the last known orbit; if `impacts` is true, its turning points are ignored. None if the orbit is
+    not close to a grazing.
     """
     regime, width = family.regime.with_(family.name, node.parameter), float(scales[-1])
     every = near_touches(regime, node.state, family.firings, family.tolerance)

@@ -226,7 +226,7 @@ def follow_doublings(
 
 
 class _Collected:
-    """Branches collected during a search, with methods that follow and add branches."""
+    """Branches found so far by a search, with methods that follow and add branches."""
 
     def __init__(self, bounds: tuple[float, float], steps: Steps, effort: Effort) -> None:
         self.bounds, self.steps, self.effort = bounds, steps, effort
@@ -235,19 +235,19 @@ class _Collected:
         self.done: set[tuple[int, int]] = set()
 
     def result(self) -> Branches:
-        """Return all branches collected, in ascending order of period."""
+        """Return all branches found, in ascending order of period."""
         return Branches(tuple(sorted(self.found, key=lambda branch: branch.firings)), tuple(self.refused))
 
     @contextmanager
     def kept_at_interrupt(self) -> Iterator[None]:
-        """Context that turns an interrupt into `InterruptedBranches` with the branches collected."""
+        """Context manager that converts an interrupt to `InterruptedBranches`, with the branches found."""
         try:
             yield
         except KeyboardInterrupt:
             raise InterruptedBranches(self.result()) from None
 
     def add(self, orbits: list[Orbit]) -> None:
-        """Follow the branch through each orbit that lies on no known branch, and add it."""
+        """Follow the branch through each orbit that lies on no known branch; append the new branches."""
         left = list(orbits)
         while left:
             left = [orbit for orbit in left if not self.is_known(orbit)]
@@ -259,7 +259,7 @@ class _Collected:
                     self.found.append(branch)
 
     def followed(self, orbit: Orbit) -> Branch | str:
-        """Follow the branch through an orbit; return the branch, or a sentence on the failure."""
+        """Follow the branch through an orbit; return the branch, or the failure as a sentence."""
         bounds = read_bounds(orbit.regime, RATE, self.bounds)
         tracer = Tracer(orbit.regime, RATE, bounds, self.effort.alone)
         try:
@@ -268,7 +268,7 @@ class _Collected:
             return f"{orbit.name} at {orbit.regime.rate:.9g} Hz: {error}"
 
     def is_known(self, orbit: Orbit) -> bool:
-        """Whether an orbit lies on a branch that has been collected."""
+        """Whether an orbit lies on a branch that the search has already found."""
         alike = [branch for branch in self.found if branch.firings == orbit.firings]
         return any(_is_on(branch, orbit) for branch in alike)
 

@@ -40,7 +40,7 @@ _LOST: Final = ("lost", "jump", "no value")
 GRAZING: Final = "grazing"
 _AT_GRAZING: Final = "it grazes the rigid backstop, where the strobe map has no derivative"
 _SHORTER: Final = 1e-6  # Arbitrary
-"""Scaled closing error after a fraction of the firings below which an orbit has the shorter period."""
+"""Scaled closing error below which an orbit that closes after fewer firings has the shorter period."""
 _DIGITS: Final = ".9g"
 _MOST_SECTIONS: Final = 8  # Maximum number of segments of a branch at different sections; arbitrary
 _SAME_PHASE: Final = 1e-3  # Arbitrary

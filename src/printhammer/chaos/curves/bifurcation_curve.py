@@ -129,7 +129,7 @@ class BifurcationCurve(Result, rows="point"):
     @property
     @derived("1", "whether stability is lost, the other multiplier being inside the unit circle", "point")
     def limits(self) -> BoolArray:
-        """Mask, shape (N,), of points where stability is lost: the other multiplier has modulus below 1."""
+        """Mask, shape (N,), of the points at which a stable orbit loses its stability."""
         if self.kind == "grazing":
             return np.asarray(np.abs(self.multipliers).max(axis=1) < 1.0)
         return np.asarray(np.abs(self.multipliers).max(axis=1) < 1.0 + SAME)

@@ -6,10 +6,10 @@
 | fold-flip | fold, doubling | the other multiplier is -1, or 1 |
 | 1:1 resonance | fold, Neimark-Sacker | both multipliers are 1 |
 | 1:2 resonance | doubling, Neimark-Sacker | both multipliers are -1 |
-| degenerate doubling | doubling | the coefficient c (`normal_forms`) is 0: super- and subcritical doublings
-meet | | fold or doubling meets grazing | fold, doubling, grazing | a contact appears while a multiplier is 1
-or -1 | | resonant grazing | grazing, fold, doubling | the element (1, 2) of A^n is 0 | | degenerate grazing |
-grazing | the acceleration at the touch is 0 |
+| degenerate doubling | doubling | c (`normal_forms`) is 0: super- and subcritical doublings meet |
+| fold or doubling meets grazing | fold, doubling, grazing | a contact appears while a multiplier is 1 or -1 |
+| resonant grazing | grazing, fold, doubling | the element (1, 2) of A^n is 0 |
+| degenerate grazing | grazing | the acceleration at the touch is 0 |
 
 A is the derivative of the strobe map without the touch. At a resonant grazing of a rigid backstop, the
 square-root term of the map over n periods of the orbit has no effect on the trace (A. P. Ivanov, J. Sound
@@ -231,5 +231,5 @@ def _missed(
 
 
 def resonance_test(passages: int) -> Callable[[FloatArray], float]:
-    """Return the test function of a resonant grazing: element (1, 2) of A^n, A: derivative of the map."""
+    """Return the test function of a resonant grazing: element (1, 2) of the derivative's n-th power."""
     return lambda jacobian: float(np.linalg.matrix_power(jacobian, passages)[0, 1])

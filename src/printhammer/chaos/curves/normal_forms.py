@@ -34,7 +34,7 @@ MOST_PERIODS: Final = 4
 _SPACINGS: Final = (2e-3, 2e-4, 5e-5)
 """Finite-difference steps tried, the largest first, in half-widths; arbitrary."""
 _AGREE: Final = 0.05  # Arbitrary
-"""Relative difference of coefficients at a step and at half the step, below which they are accepted."""
+"""Largest accepted relative difference between the coefficients for a step and for half the step."""
 _DOUBLES: Final = 1e-4
 """Largest distance of a multiplier from -1 at which a normal-form coefficient is computed; arbitrary."""
 _FEW: Final = 1e-9  # Relative magnitude below which a denominator is singular; arbitrary

@@ -219,7 +219,7 @@ def stability_chart(
 
 
 def _limits(branch: Branch) -> list[BranchEvent]:
-    """List the events at which a branch loses stability: the other multiplier is inside the unit circle."""
+    """List the events at which the stable orbits of a branch lose their stability."""
     lost = [event for event in branch.events if np.abs(event.multipliers).max() < 1.0 + SAME]
     return [event for event in lost if event.kind in TESTS]
 
@@ -234,7 +234,7 @@ class _Chart:
         self.value = branch.regime.value(second)
 
     def across(self, effort: Effort) -> list[tuple[float, list[Start]]]:
-        """Locate stability limits along the second parameter; return (first-parameter value, starts) each."""
+        """Locate stability limits in the second parameter; return pairs (first-parameter value, starts)."""
         branch, values = self.branch, self.branch.values
         low, high = float(values.min()), float(values.max())
         # Prefer a stable orbit: its branch loses stability at its limits.

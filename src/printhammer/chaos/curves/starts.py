@@ -39,7 +39,7 @@ class Start:
     state: FloatArray
     value: float
     other: float | None = None
-    """Value of the second parameter; None if the value of the regime is used."""
+    """Value of the second parameter; None for the value of the regime."""
 
 
 def start_of(

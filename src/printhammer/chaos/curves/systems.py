@@ -120,7 +120,7 @@ class CurvePoint(Declared):
 
 
 class MultiplierSystem:
-    """Extended map for an orbit with a critical multiplier; unknowns: the state, the first parameter."""
+    """Extended map of an orbit with a critical multiplier; unknowns are the state and the first parameter."""
 
     def __init__(self, plane: Plane, kind: str) -> None:
         self.plane, self.kind, self.test = plane, kind, TESTS[kind]
@@ -180,7 +180,7 @@ def curve_point_of(node: Node) -> CurvePoint:
 _PHASES: Final = 0.2
 """Scale of the phase of a touch, as a fraction of the period; arbitrary."""
 _IN_TRACE: Final = {"fold": -1.0, "period doubling": 1.0, "Neimark-Sacker": 0.0}
-"""Coefficient c, by definition of the test function f = 1 + det J + c tr J; Neimark-Sacker: f = det J - 1."""
+"""Coefficient c of the test function f = 1 + det J + c tr J, by kind; 0 for Neimark-Sacker, f = det J - 1."""
 
 
 def _flight(
@@ -190,7 +190,7 @@ def _flight(
 
 
 class GrazingSystem:
-    """Extended map for an orbit that grazes a surface; unknowns: phase of the touch, first parameter."""
+    """Extended map of an orbit that grazes a surface; unknowns are touch phase and first parameter."""
 
     def __init__(self, plane: Plane, surface: Surface) -> None:
         self.plane, self.kind, self.surface = plane, GRAZING, surface
@@ -199,8 +199,8 @@ class GrazingSystem:
     def at(self, phase: float, first: float, second: float) -> tuple[CurvePoint, FloatArray] | str:
         """Compute the orbit that starts at a grazing of the surface, and its closing error at the next touch.
 
-        The closing error is the difference of both states, in units of the state scales. A text with the
-        reason is returned if the run ends early; InputError if the parameters are invalid.
+        The closing error is the difference of the states at start and end, in units of the state scales. If
+        the run ends early, the reason is returned as text. InputError if the parameters are invalid.
         """
         flight = _flight(self.plane, self.surface, phase, 0.0, first, second)
         if flight.trouble:

@@ -55,7 +55,7 @@ System = MultiplierSystem | ImpactSystem | GrazingSystem
 
 @dataclass
 class Traced:
-    """Traced bifurcation curve: nodes, stops, points of codimension two, and coefficients."""
+    """Traced bifurcation curve: nodes, stops, points of codimension two, and normal-form coefficients."""
 
     kind: str
     surface: str
@@ -184,7 +184,7 @@ class CurveTracer:
         return MultiplierSystem(moved, self.kind), np.append(quiet[1], start.value)
 
     def state_at(self, start: Start, second: float) -> FloatArray:
-        """Compute displacement and velocity of a start's orbit, at the section that its curve uses."""
+        """Compute the orbit of a start, as a state (m, m/s), at the section used along the curve."""
         system, unknown = self.begin(start, second)
         if isinstance(system, MultiplierSystem):
             return np.asarray(unknown[:2])
@@ -295,12 +295,12 @@ class CurveTracer:
         return self.kind.removeprefix("period ")
 
     def distance(self, one: CurvePoint, other: CurvePoint) -> float:
-        """Compute the distance between two points in the parameter plane, in units of its scales."""
+        """Compute the distance between two points of the parameter plane, in units of its scales."""
         away = np.array([one.first - other.first, one.second - other.second]) / self.plane.scales[2:]
         return float(np.linalg.norm(away))
 
     def grazing_near(self, place: CurvePoint, within: float) -> CurvePoint | None:
-        """Find the grazing near an orbit of the curve at which the curve's test function vanishes."""
+        """Find the grazing near a curve point at which the test function is zero; None if not found."""
         regime = replace(self.plane.at(place.first, place.second), phase=place.phase)
         for touch in near_touches(regime, place.state, self.plane.firings, self.plane.tolerance)[:3]:
             guess = np.array([touch.phase, place.first, place.second])
@@ -312,7 +312,7 @@ class CurveTracer:
     def with_ends(
         self, nodes: list[Node], stops: list[Stop], points: list[CodimensionTwo]
     ) -> list[CodimensionTwo]:
-        """Add the points of codimension two at which the curve ends in a grazing, and set its stops."""
+        """Find the grazings at the ends of a curve; return all codimension-two points, and update `stops`."""
         if self.kind not in ("fold", "period doubling"):
             return points
         for end, (node, after) in enumerate(((nodes[0], -1), (nodes[-1], len(nodes) - 1))):

@@ -7,7 +7,7 @@ Lyapunov exponent; the standard deviation falls as n^-1/2 if correlations decay 
 motion stays near regular orbits for a long time (A. Prasad and R. Ramaswamy, Phys. Rev. E 60 (1999) 2761).
 The fraction of stretches with a negative exponent shows how often neighbouring motions converge temporarily,
 although the train is chaotic. Limitation: all stretches are taken from one train; regions of the attractor
-that it has not visited do not contribute.
+that the train has not visited do not contribute.
 """
 
 from __future__ import annotations

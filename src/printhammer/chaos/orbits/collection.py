@@ -60,7 +60,7 @@ def index_sums(orbits: Sequence[tuple[int, npt.NDArray[np.complex128]]], longest
 
 
 def fewest_missing(sums: Mapping[int, int]) -> int:
-    """Compute the least number of missing orbits from the index sums by number of firings.
+    """Compute a lower bound on the number of missing orbits from the index sums.
 
     An orbit of d firings adds d or -d to the sums over the multiples of d firings, so that at least
     k / n orbits are missing if the sum over n firings differs from 1 by k.

@@ -55,7 +55,7 @@ class Records(Declared):
     begins: bool = part("whether the first record is the long record of the train from rest", default=True)
 
     def rows(self, begin: int, end: int) -> Records:
-        """Return the records of the motions with indices from `begin` to before `end`."""
+        """Return the records of the motions with indices from `begin` up to, but excluding, `end`."""
         return Records(self.states[begin:end], self.usable[begin:end], begins=not begin)
 
 

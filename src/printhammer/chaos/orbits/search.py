@@ -25,7 +25,7 @@ MOST_FIRINGS: Final = 64  # Largest orbit period that can be searched for, in fi
 STARTS: Final = 1024
 """Default number of initial states of a search, in addition to the rest state; arbitrary."""
 GUESSES: Final = 48
-"""Default number of initial guesses per number of firings and block of starts; arbitrary."""
+"""Default number of initial guesses for each orbit period and each block of starts; arbitrary."""
 FOLLOW: Final = 2
 """Default largest period, in firings, of the orbits whose branches are followed; arbitrary."""
 
@@ -59,8 +59,8 @@ def orbits(
         1024, 2048, 4096 and so on. A search with more starts or guesses finds all orbits of a search with
         fewer.
     guesses : int, optional
-        Number of guesses per number of firings in each block of starts, rounded up to 8, 48, 96 and so on; it
-        is multiplied by eight for 1 firing, by four for 2 firings, and by two for 3 and 4 firings. Further
+        Number of guesses for each orbit period in each block of starts, rounded up to 8, 48, 96 and so on,
+        and multiplied by eight for period 1, by four for period 2, and by two for periods 3 and 4. Further
         guesses are concatenations of known shorter orbits.
     follow : int, optional
         Largest period, in firings, of the orbits whose branches are followed over 5 % of the drive period on

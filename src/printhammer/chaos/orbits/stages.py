@@ -73,10 +73,10 @@ def crossings(orbit: Orbit) -> list[FloatArray]:
 
 _LONG: Final = 400  # Arbitrary
 """Number of firings of the long record, the train from rest, that is searched for close returns."""
-_BLOCKS: Final = (128, 1024)
-"""Numbers of starts, ascending; requests are rounded up, as for `_BATCHES`; arbitrary."""
+_BLOCKS: Final = (128, 1024)  # Arbitrary
+"""Allowed numbers of starts, ascending, continued by doubling the last; requests are rounded up."""
 _BATCHES: Final = (8, 48)  # Arbitrary
-"""Numbers of guesses, ascending; requests are rounded up to an entry or a repeated doubling of the last."""
+"""Allowed numbers of guesses, ascending, continued by doubling the last; requests are rounded up."""
 _EVEN: Final = 8
 """Orbit period, in firings, below which the number of guesses is raised in inverse proportion; arbitrary."""
 _JOINED: Final = 48

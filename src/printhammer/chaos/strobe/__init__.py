@@ -1,1 +1,1 @@
-"""Strobe maps: states of a pulse train at its firings, and classification of the motion."""
+"""Strobe maps: states of a hammer at the firings of a pulse train, and classification of the motion."""

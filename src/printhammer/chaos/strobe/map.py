@@ -286,7 +286,7 @@ def is_on_impact(regime: Regime, state: FloatArray, firings: int, tolerance: flo
 def _around(
     regime: Regime, state: FloatArray, firings: int, tolerance: float
 ) -> tuple[Problem, Record, FloatArray] | None:
-    """Integrate an orbit; return problem, record, and contact times modulo the period, s, from `_busy`."""
+    """Integrate an orbit; return problem, record, and sampled contact times modulo the period, s."""
     train, _ = regime.train(firings + 1)
     begin, *_, end = (float(time) for time in regime.moments(train, firings))
     try:

@@ -106,7 +106,7 @@ _BEFORE: Final = 100
 
 
 class Train(Declared):
-    """Regime fired from an initial state, without earlier firings."""
+    """Pulse train: a regime that starts from an initial state, without earlier firings."""
 
     regime: Regime = part("hammer and periodic drive")
     drive: Drive = part("a sequence of pulses, or a continuous periodic force")

@@ -112,7 +112,7 @@ class FeedbackStrategy(Declared):
         self.controller.learn(loops, contacts)
 
     def _see_flights(self, hammer: Hammer, now: Sequence[tuple[Loop, int]]) -> None:
-        """Advance runs to their next decisions, and estimate the coming pack contacts from the flights."""
+        """Advance runs to their next decisions; predict the next pack contacts from sensor samples."""
         loops = [loop for loop, _dot in now]
         starts = np.array([loop.time for loop in loops])
         touches = np.array([loop.touch - LEADS[loop.kind] for loop in loops])

@@ -73,7 +73,7 @@ _POLICIES: Final = 8  # Size of the policy cache; arbitrary
 
 
 class Ahead(NamedTuple):
-    """Prediction for a control action: the push, the throw that follows, and the next pack contact.
+    """Prediction for a control action: the push into the pack, the next throw, and the next pack contact.
 
     `fire`, `leaves` and `touch` are the times of the throw, of departure from the pack and of the next touch,
     s after the present touch. `width` is the width of the push, s; `kind` and `speed`, m/s, are those of the
@@ -160,7 +160,7 @@ class Controller:
             self._contacts.learn([loops[k] for k in rows], samples.take(rows))
 
     def estimate(self, loops: Sequence[Loop], samples: Samples) -> None:
-        """Estimate times and speeds of the coming pack contacts from sensor samples of the flights."""
+        """Estimate times and speeds of the next pack contacts from sensor samples of the flights."""
         expected = Expected(
             np.array([loop.touch for loop in loops]),
             np.array([loop.speed for loop in loops]),
@@ -206,7 +206,7 @@ class Controller:
         return np.diag([_PLACE_ERROR * self.stroke, _SPEED_ERROR, loop.learned.scale_error]) ** 2
 
     def decide(self, now: Sequence[tuple[Loop, int]], policy: Policy) -> None:
-        """Choose the pulses after the coming pack contacts; `now` pairs each run with its dot index."""
+        """Choose the pulses after the next pack contacts; `now` pairs each run with its dot index."""
         kind = np.array([loop.kind for loop, _dot in now])
         speed = np.array([loop.speed for loop, _dot in now])
         touch = np.array([loop.touch for loop, _dot in now])

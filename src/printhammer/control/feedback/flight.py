@@ -78,7 +78,7 @@ class FreeForce:
 
 @dataclass(frozen=True)
 class Expected:
-    """Prior mean and covariance of time, speed and current scale at M coming pack contacts.
+    """Prior mean and covariance of time, speed and current scale at the next pack contacts of M runs.
 
     `time`, s, and `speed`, m/s, are those of the contacts; `scale` is the relative deviation of all currents
     from nominal. `covariance`, shape (M, 3, 3), is that of displacement at `time`, m, speed, m/s, and scale.
@@ -92,7 +92,7 @@ class Expected:
 
 @dataclass(frozen=True)
 class Flight:
-    """Flights estimated from sensor samples: states, covariances, and the coming pack contacts."""
+    """Flights estimated from sensor samples: states, covariances, and the predicted pack contacts."""
 
     # Time, s, and speed, m/s, of the coming touch, (M,)
     touch: FloatArray
@@ -129,7 +129,7 @@ class Flight:
 def flight_from_samples(
     samples: Samples, expected: Expected, front: FloatArray, accelerations: Accelerations
 ) -> Flight:
-    """Estimate flights, and the coming pack contacts at `front`, m, from sensor samples.
+    """Estimate flights from sensor samples; predict the next contact with the pack at `front`, m.
 
     `accelerations` maps displacements, m, times, s, and scales, all broadcastable to the shape (M, K), to
     accelerations of a flying armature, m/s².

@@ -92,7 +92,7 @@ class ForceMap:
 
 @dataclass(frozen=True)
 class ImpactMap:
-    """Outcome of each of A switching actions of the coil from each of the T touches of a force map."""
+    """Outcomes of A switching actions of the coil after each of the T touches of a force map."""
 
     back: FloatArray  # Return current after the push, A, (A,)
     fire: FloatArray  # Time after the touch at which the next push begins, s, (A,)
@@ -227,5 +227,5 @@ def bilinear(table: FloatArray, i: IntArray, p: FloatArray, j: IntArray, q: Floa
 
 
 def blend_known(low: FloatArray, high: FloatArray, share: FloatArray) -> FloatArray:
-    """Interpolate linearly between two values; if one is NaN, return the other."""
+    """Interpolate linearly between two values; if either value is NaN, return the other value."""
     return blend(np.where(np.isnan(low), high, low), np.where(np.isnan(high), low, high), share)

@@ -143,7 +143,7 @@ _FRONT_DRIFT: Final = 0.002
 _SCALE_DRIFT: Final = 0.002
 """Standard deviation of the random walk of the current scale per decision; arbitrary."""
 _FARTHEST: Final = 5.0
-"""Prior standard deviations from nominal beyond which an estimate is rejected; arbitrary."""
+"""Distance from nominal, in prior standard deviations, beyond which an estimate is rejected; arbitrary."""
 
 
 @dataclass
@@ -186,12 +186,12 @@ class Learned:
         self.scale_error = float(min(np.hypot(self.scale_error, _SCALE_DRIFT), SCALE_ERROR))
 
     def take_scale(self, scale: float, variance: float) -> None:
-        """Store an estimate of the current scale if within `_FARTHEST` prior deviations of nominal."""
+        """Store an estimate of the current scale unless implausibly far from nominal; see `_FARTHEST`."""
         if abs(scale) <= _FARTHEST * SCALE_ERROR and variance > 0.0:
             self.scale, self.scale_error = scale, float(np.sqrt(variance))
 
     def take_front(self, front: float, variance: float) -> None:
-        """Store an estimate of the pack front if within `_FARTHEST` prior deviations of nominal."""
+        """Store an estimate of the pack front unless implausibly far from nominal; see `_FARTHEST`."""
         if abs(front) <= _FARTHEST * FRONT_ERROR and variance > 0.0:
             self.front, self.front_error = front, float(np.sqrt(variance))
 

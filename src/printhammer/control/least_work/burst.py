@@ -86,7 +86,7 @@ class NoBurstError(PrinthammerError):
 
 
 class SupplyCheck(Declared):
-    """Dots of a burst when all currents change by each of n relative amounts: arrays of shape (n,)."""
+    """Dots of a burst with all currents scaled by 1 + c, for n values of c: arrays of shape (n,)."""
 
     changes: FloatArray = part("relative change of every current: 0.03 for 3 % more")
     adequate: IntArray = part(
@@ -97,7 +97,7 @@ class SupplyCheck(Declared):
     status: TextArray = part("status of each simulation")
 
     def summary(self, count: int) -> Summary:
-        """Tabulate the dots of a burst of `count` dots, one row per change of the current."""
+        """Tabulate the dots of a burst of `count` dots, one row per relative change of the currents."""
         columns = [
             Cells("current", [f"{100.0 * change:+.1f} %" for change in self.changes]),
             Cells("adequate dots", [f"{adequate} of {count}" for adequate in self.adequate]),

@@ -205,7 +205,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return mixed(low_row, high_row, share)
 
     def fired_by(self, driver: str, hammer: Hammer) -> CompensationTable:
-        """Convert a table tuned on `driven_by(hammer, driver, ...)` to a table for `hammer` and this driver.
+        """Convert a table tuned for the driver `driver` of a hammer to a table with the present driver.
 
         All pulses are shifted by the difference of the flight times from rest.
         """

@@ -262,7 +262,7 @@ def _is_applicable(hammer: Hammer, by: Perturbation) -> bool:
 
 
 def _growth(driven: Sequence[Hammer], rate: float, strategy: Strategy, effort: Effort) -> FloatArray:
-    """Compute each hammer's larger row multiplier, with a dot in every slot or in every second slot."""
+    """Compute the row multiplier of each hammer: the larger for a dot in every or every second slot."""
     rates = [rate] * len(driven)
     each = np.array([multipliers(driven, rates, strategy, effort, step) for step in (1, 2)])
     largest = np.nan_to_num(np.abs(each), nan=-1.0).argmax(axis=0)

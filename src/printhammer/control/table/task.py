@@ -30,7 +30,7 @@ from printhammer.support.arrays import BoolArray, FloatArray
 QUIET: Final = 2e-4
 _LONGEST: Final = 20e-3  # Lower bound of the time limit for settling after a single pulse, s; arbitrary
 _WINDOWS: Final = 2.0
-"""Lower bound of that time limit, in windows of the hammer (`printhammer.run.window`); arbitrary."""
+"""Lower bound of the time limit for settling, in windows of `printhammer.run.window`; arbitrary."""
 _SAMPLE: Final = 2e-6  # Sampling interval of the motion that is tested for settling, s; arbitrary
 # Allowance for a late or wide print pulse before a brake pulse, s; arbitrary
 _WIDE: Final = 50e-6

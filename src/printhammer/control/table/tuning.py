@@ -310,7 +310,7 @@ def _bridge(draft: Draft) -> None:
 
 
 def _tune_again(draft: Draft, poor: IntArray) -> None:
-    """Retune poor rates, in place, with additional candidates from neighbouring periods."""
+    """Retune the rates with the indices `poor`, in place, with additional candidates from nearby periods."""
     if not poor.size:
         return
     task = draft.task

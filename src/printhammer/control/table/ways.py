@@ -44,7 +44,7 @@ def solve(
 
     The method is Levenberg-Marquardt (J. Nocedal and S. J. Wright, *Numerical Optimization*, ch. 10).
 
-    The values of a dot are its firing time, or advance, and width, s; `start` contains the initial guesses.
+    The values of a dot are its firing time (or advance) and width, s; `start` contains the initial guesses.
     `measure(values, active, shifts)` returns the deviations of the dots with the indices `active` for each of
     the shifts of their values, as fractions of the limits, NaN for a lost dot; shape (active, shifts,
     deviations). Derivatives are finite differences with `steps`, s, forward in time and backward in width. A
@@ -90,11 +90,11 @@ def changes(
     most: FloatArray,
     longest: float = LONGEST_STEP,
 ) -> FloatArray:
-    """Compute a Levenberg-Marquardt step in firing time and width, s, shape (dots, 2).
+    """Compute the Levenberg-Marquardt step of firing time and width, s, shape (dots, 2).
 
-    `slopes`, shape (dots, deviations, 2), are the derivatives of the deviations `off`, shape (dots,
-    deviations), with respect to firing time, or advance, and width, 1/s. The change of width, s, is clipped
-    to `least` and `most`, one value per dot, and both changes to `longest`, s.
+    `off`, shape (dots, deviations), are the deviations; `slopes`, shape (dots, deviations, 2), are their
+    derivatives with respect to firing time (or advance) and width, 1/s. The step of the width is clipped to
+    the range from `least` to `most`, s, one value per dot, and both steps to at most `longest`, s.
     """
     turned = slopes.transpose(0, 2, 1)
     # The damping keeps the step finite in a direction that does not affect the deviations.

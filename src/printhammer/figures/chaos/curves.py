@@ -1,4 +1,4 @@
-"""Figures of bifurcation curves in the plane of two parameters, over the attractors of trains from rest.
+"""Figures of bifurcation curves in a plane of two parameters, coloured by the period of trains from rest.
 
 `plot_chart` draws a stability chart: the limits of an orbit, and the trains from rest that settle to its
 period.

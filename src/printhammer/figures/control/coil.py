@@ -106,7 +106,7 @@ _MICRO: Final = 1e6  # Microseconds in a second
 def plot_impact_time(study: ImpactTime) -> Figure:
     """Draw standard deviation and bias magnitude of estimated impact times against the sensor noise.
 
-    Orange: nominal hammer. Blue: individual units, whose constants deviate from the nominal ones.
+    Orange: nominal hammer. Blue: individual units, whose constants deviate from the nominal constants.
     """
     figure = new_figure(5.2)
     grid = figure.add_gridspec(2, 1)

@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 
 
 class Picture(Figure):
-    """Matplotlib figure that displays itself as the last value of a notebook cell.
+    """Matplotlib figure that a notebook displays if the figure is the last value of a cell.
 
-    Notebooks use the PNG repr; if the inline backend of matplotlib is active, the backend takes precedence,
-    and the figure appears only once.
+    Notebooks use the PNG repr. If the inline backend of matplotlib is active, the backend displays the figure
+    instead, so that the figure appears only once.
     """
 
     settings: Mapping[str, Any] = {}

@@ -84,7 +84,7 @@ class Channel(Declared):
         return self.rounded(shown, true)
 
     def rounded(self, shown: FloatArray, true: FloatArray) -> FloatArray:
-        """Round readings to whole quantisation steps; `true` supplies the full scale."""
+        """Round readings to whole quantisation steps; the true values `true` determine the full scale."""
         step = self.step(full_scale(true))
         return np.rint(shown / step) * step if step > 0.0 else shown
 

@@ -1,6 +1,6 @@
 """Constrained Gauss-Newton iteration on chains of segments, and its diagnostics.
 
-Every step solves the linearised problem in which all gaps between segments are closed; it is shortened until
+Every step solves the linearised problem in which all gaps between segments are closed, and is shortened until
 the data misfit or the gap is smaller than at all earlier steps (a filter method: R. Fletcher and S. Leyffer,
 Math. Program. 91 (2002) 239). While the constants are far off, only spikes of the records are excluded; near
 the solution, outliers are excluded by their residuals.
@@ -46,7 +46,7 @@ def condition_number(design: FloatArray) -> float:
 def singular(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Compute singular values, ascending, and right singular vectors as columns, of a tall matrix.
 
-    They are computed from the small normal matrix, which is accurate for condition numbers up to 1e7.
+    Both are computed from the small normal matrix, which is accurate for condition numbers up to 1e7.
     """
     squares, vectors = np.linalg.eigh(matrix.T @ matrix)
     return np.sqrt(np.maximum(squares, 0.0)), vectors

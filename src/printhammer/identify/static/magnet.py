@@ -3,7 +3,7 @@
   F(x, I) = F0 - (Am - Bm I)^2 / sqrt(x) + Bs - (Bs / As)(x - b)
 
 Data: the columns ``displacement``, ``current``, ``force``, the static force of magnet and spring together,
-positive toward the paper; and, to separate both, a table of the spring alone.
+positive toward the paper; and, to separate the two forces, a table of the spring alone.
 """
 
 from __future__ import annotations

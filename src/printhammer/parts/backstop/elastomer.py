@@ -27,7 +27,7 @@ def backstop_elastic(c: Any, w: float) -> float:
 
 
 def backstop_viscous(c: Any, w: float, v: float) -> float:
-    """Return the viscous force -1.5 k A w v, N, cut off where the total would pull."""
+    """Return the viscous force -1.5 k A w v, N, cut off where the total force would be attractive."""
     force = -c[1] * w * v
     if c[2] == 0.0:
         least = -c[0] * w * w * w

@@ -111,7 +111,7 @@ def settle(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float
 
 
 def undisturbed_rate(hammer: Hammer) -> float:
-    """Return a rate, Hz, up to which the armature is exactly at rest at each pulse; 0 if there is none.
+    """Return a rate, Hz, up to which the armature is exactly at rest at each pulse; 0 without such a rate.
 
     A device with a rigid backstop and a driver that ends its current is at rest to the last bit some time
     after a pulse. Pulses further apart than that time give equal dots.

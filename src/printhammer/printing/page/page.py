@@ -1,8 +1,8 @@
 """The printed page: position and darkness of every dot on the paper.
 
 Each wire of each print line is a separate simulation from rest; all simulations form one ensemble. The
-carriage passes slot n at n / rate after slot 0, at the speed rate x pitch. A dot lands where the carriage is
-at touch; all dots are shifted together by the carriage travel during the flight time of the single pulse,
+carriage passes slot n a time n / rate after slot 0, at the speed rate x pitch. A dot lands where the carriage
+is at touch; all dots are shifted together by the carriage travel during the flight time of the single pulse,
 which a printer corrects. The remaining offset is the placement error: arrival deviation x carriage speed.
 
 Darkness: the optical density of a dot is that of the single-pulse dot times the ratio of the peak forces, and

@@ -1,9 +1,9 @@
 """Plain functions compiled as entry points of a web page's WebAssembly module, besides the kernel.
 
 A plain function takes numbers, arrays and tuples of them, allocates nothing, raises nothing, and returns
-integers; it and all functions that it calls are ordinary functions of any room. Python calls it as it is, or
-as machine code through `compiled`; a page calls it in the module of a hammer's laws, `page_module`. A name
-that its module leaves undefined is bound to the law, choice or function of the kernel of that name.
+integers; the functions that it calls may be in any folder. Python calls a plain function directly, or as
+machine code through `compiled`; a page calls it in the module of a hammer's laws, `page_module`. A name that
+its module leaves undefined is bound to the law, choice or function of the kernel of that name.
 """
 
 from __future__ import annotations

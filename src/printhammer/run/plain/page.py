@@ -1,7 +1,7 @@
 """Entry points for a web page that sets up a run: constants, rest position, supply, scales, window.
 
-They compute what `printhammer.run.problem` computes from a hammer and a drive. An outcome other than 0 is a
-refusal; see `REFUSALS`.
+The entry points compute what `printhammer.run.problem` computes from a hammer and a drive. An outcome other
+than 0 is a refusal; see `REFUSALS`.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def fill_constants(
     damping, spring, pack, backstop, coil, magnet : float64 arrays
         Numbers of the parts (`printhammer.parts.base.Part.numbers`), empty for an absent part.
     constants : float64 array
-        Zeros; the constants.
+        Array of zeros, to which the constants are written.
     ends : float64 array, shape (2,)
         Range of displacements in which the law of the magnet is valid, m.
 
@@ -179,12 +179,12 @@ def find_rest(constants: Any, limits: Any, grid: Any, points: Any, found: Any, o
     found : float64 array, shape (24576, 3)
         Working space.
     out : float64 array, shape (2,)
-        Rest position, m, or else the number of a refusal.
+        Rest position, m; for a refusal, the numbers in its message.
 
     Returns
     -------
     int
-        Outcome.
+        Outcome: 0 if found, else the code of a refusal; see `REFUSALS`.
     """
     work = Work(grid, points[0], points[1], found, sorted_in_place)
     return rest_position(statics_at(constants, limits), work, out)

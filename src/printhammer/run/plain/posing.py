@@ -160,7 +160,7 @@ def falling_place(low: float, high: float, current: float, coil: Coil) -> tuple[
 
 
 def largest_force(x: float, current: float, push: float, s: Statics) -> float:
-    """Return the larger force without and with a current, N, and the force of the drive `push`, N."""
+    """Return the larger absolute static force, without or with a current, plus the drive force `push`, N."""
     largest = 0.0
     for i in (0.0, current):
         size = abs(free_force(x, i, s))
@@ -201,7 +201,7 @@ def typical_scales(
 
 
 def allowances(tolerance: float) -> tuple[float, float]:
-    """Return the tolerances of the order 6 and order 7 error estimates, from that of the order 8 method."""
+    """Return the tolerances of the error estimates of orders 6 and 7, from the tolerance of the method."""
     return (10.0 * tolerance) ** (7.0 / 9.0), 10.0 * tolerance
 
 
