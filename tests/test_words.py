@@ -93,6 +93,15 @@ PHRASES = (
     r"(?:How|What|Which) \S+ (?:are|is) like\b",
 )
 FORBIDDEN = re.compile("|".join(PHRASES), re.IGNORECASE)
+PRONOUNS = re.compile(
+    r"\bthe latter\b|\bthe former (?:or|one)\b|\b(?:if|where) there is (?:none|one)\b|\bwithout one\b"
+    r"|\b(?:the|an?|another) (?:\w+ )?one[.,;:)]|(?<!np\.)\bones\b"
+)
+"""Pronouns in place of a noun, which the reader has to look for in another clause."""
+
+PRONOUNS_ALLOWED = ("kernel/model", "kernel/variational", "parts/spring")
+"""Rooms in which pronouns still stand for nouns."""
+
 FIRST_WORDS = re.compile(
     r"(?:A|An|The|Of|How|What|When|Where|Which|Whether|Return|With|By|From|Its|Their|Them|It|Only|Other)\b"
 )
@@ -104,10 +113,10 @@ def flowing(text: str) -> str:
     return " ".join(re.sub(r'"?\s*\n\s*(?:# ?|f?")?', " ", text).split())
 
 
-def forbidden(path: Path) -> list[str]:
+def forbidden(path: Path, phrases: re.Pattern[str] = FORBIDDEN) -> list[str]:
     """Return the forbidden phrases in a file, each with its surroundings."""
     text = flowing(path.read_text("utf-8"))
-    return [text[max(0, found.start() - 30) : found.end() + 30] for found in FORBIDDEN.finditer(text)]
+    return [text[max(0, found.start() - 30) : found.end() + 30] for found in phrases.finditer(text)]
 
 
 @pytest.mark.parametrize("room", ROOMS)
@@ -124,6 +133,13 @@ def test_studies_speak_plainly() -> None:
 
 def test_pages_speak_plainly() -> None:
     assert {page: said for page in PAGES if (said := forbidden(ROOT / page))} == {}
+
+
+def test_a_noun_is_named() -> None:
+    modules = {str(path.relative_to(PACKAGE)): path for path in sorted(PACKAGE.rglob("*.py"))}
+    pages = {page: ROOT / page for page in PAGES if not page.startswith("docs/decisions")}
+    read = {name: path for name, path in modules.items() if not name.startswith(PRONOUNS_ALLOWED)} | pages
+    assert {name: said for name, path in read.items() if (said := forbidden(path, PRONOUNS))} == {}
 
 
 def test_a_phrase_is_found_across_lines(tmp_path: Path) -> None:

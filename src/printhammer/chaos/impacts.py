@@ -219,7 +219,7 @@ def _section(train: Train, surface: Surface, counts: tuple[int, int, int], toler
     touches = touches_of(problem, surface, float(times[skipped]), float(times[-1]), wanted)
     t, v, t_out, v_out = touches.rows.T.copy()
     latest = np.searchsorted(times, t, side="right") - 1
-    # Touches are recorded up to the last one, or to the end of the run.
+    # Touches are recorded up to the last requested touch, or to the end of the run.
     until = t[-1] if len(t) == wanted else touches.reached
     return Section(
         hammer=train.hammer,

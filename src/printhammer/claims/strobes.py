@@ -37,7 +37,7 @@ def scaled(points: FloatArray) -> FloatArray:
 
 
 def panels(context: Context, *, strange: bool = True) -> dict[str, FloatArray]:
-    """Compute the strobe points of the panels of Fig. 11, by name: all panels, or only the chaotic ones."""
+    """Compute the strobe points of the panels of Fig. 11, by name: all panels, or only the chaotic panels."""
     count = claims()["poincare_window"].settings["points"]
     return {
         panel_name(period): strobe_points(context, period, count)

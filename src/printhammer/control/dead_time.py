@@ -226,7 +226,7 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
         return header_text(self.hammer, self.blow, self.voltage, self.temperature, tables)
 
     def save(self, path: str | Path) -> None:
-        """Write the table in the format of the file suffix, a C header (.h) among others, atomically.
+        """Write the table in the format of the file suffix, such as a C header (.h), atomically.
 
         Raises
         ------

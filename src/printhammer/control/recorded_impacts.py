@@ -173,7 +173,7 @@ def _estimator(
             f"{table.path}: time steps from {steps.min():.4g} to {steps.max():.4g} s",
             file=table.path,
             key="time",
-            expected="even ones",
+            expected="even time steps",
         )
     values = table.values[signal]
     noise = max(noise_of_record(values), _QUIET * float(np.abs(values).max()))

@@ -70,7 +70,7 @@ def row_multipliers(
         that the row from rest reaches, which is near the fixed point if the preceding dots are good.
     firing : int, optional
         Index of the firing at which the map starts. If the first dots are compensated, they start in the
-        fixed point, so that the state is closer to the fixed point at an early firing than at a late one.
+        fixed point, so that the state is closer to the fixed point at an early firing than at a late firing.
 
     Returns
     -------

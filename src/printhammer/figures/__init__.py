@@ -103,7 +103,7 @@ FIGURES: Final[dict[int, PaperFigure]] = {
             "maps.surface",
             "Nine pulses: displacement against time and rate",
             "Displacement under nine pulses at gradually rising rates, one curve for each rate; nearer curves"
-            " hide farther ones. Blue: inside the ribbon and paper pack.",
+            " hide farther curves. Blue: inside the ribbon and paper pack.",
         ),
         PaperFigure(
             9,

@@ -71,7 +71,7 @@ class EquilibriumPicture:
     rest: float | None
     """Rest position of the armature at zero current, m; None without a rest state."""
     no_rest: str
-    """Reason why there is no rest state; empty if there is one."""
+    """Reason why there is no rest state; empty if the hammer has a rest state."""
     equilibria: tuple[Equilibrium, ...]
     """Equilibria at zero current, in ascending order."""
     release_current: float | None
@@ -150,7 +150,7 @@ def release_current(hammer: HammerLike) -> float:
     """Return the smallest current that lifts the armature off the backstop, A.
 
     At that current the force of magnet and spring at the position of the backstop vanishes. For equation (3),
-    I = (Am - sqrt((F0 + Fs(b)) sqrt(b))) / Bm. Of two solutions of opposite sign, the one of smaller
+    I = (Am - sqrt((F0 + Fs(b)) sqrt(b))) / Bm. Of two solutions of opposite sign, the solution of smaller
     magnitude is returned; 0 if the net force at zero current is not negative.
 
     Raises

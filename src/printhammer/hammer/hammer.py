@@ -289,7 +289,7 @@ class Hammer:
         """Digest of the physics: laws, SI values, options and tables, in hexadecimal.
 
         Names, notes, units, sources, statuses, errors, comments and file names do not affect the digest; an
-        option or constant at its default equals a missing one.
+        option or constant at its default equals a missing option or constant.
         """
         content: dict[str, Any] = {"mass": self.mass.hex()}
         if self.platen is not None:

@@ -69,7 +69,7 @@ class Statics(NamedTuple):
     platen: float
     """Position of the platen, m; NaN without a platen."""
     thickness: float
-    """Thickness of the pack, m; NaN without one."""
+    """Thickness of the pack, m; NaN without a pack."""
 
 
 def free_force(x: float, current: float, s: Statics) -> float:

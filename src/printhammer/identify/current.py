@@ -201,7 +201,7 @@ FIT: Final = "fit"
 """Value of a probe-error option that requests a fit of the error."""
 
 NOMINAL: Final = {"offset": 0.0, "gain": 1.0, "delay": 0.0, "time constant": 0.0}
-"""Offset, gain, delay and time constant of an ideal probe, SI."""
+"""Offset, gain, delay and time constant of an ideal probe, by definition, SI."""
 
 UNITS: Final = {"offset": "A", "gain": "1", "delay": "s", "time constant": "s"}
 

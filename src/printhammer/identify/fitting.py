@@ -27,8 +27,8 @@ def fit(
         "magnet": F0, Am, Bm (and Bs, As) from forces over displacement and current; "solenoid": the
         magnetic circuit of the law `reluctance` from forces and inductances over the gap; "spring": Bs, As
         from forces of the spring alone; "pack": the stiffness from load cycles; "backstop": l/k, and l, from
-        rebounds; "motion": mass, damping and others from records of single shots; "coil": resistance,
-        inductance and others from records of the current under a voltage.
+        rebounds; "motion": mass, damping and so on from records of single shots; "coil": resistance,
+        inductance and so on from records of the current under a voltage.
     path : path, or sequence of path
         The table, CSV with units in its heading; several for "motion" and "coil", and for "magnet" optionally
         a second table without currents, for the spring alone.

@@ -118,7 +118,7 @@ class Solution(Declared, eq=False):
     condition_number: float = part("condition number of the weighted Jacobian with normalised columns")
     exact: bool = part("whether the residuals are only rounding errors")
     parameters: Parameters = part("initial guess, bounds and prior")
-    free: BoolArray = part("mask of the parameters that the data determine; the others are held. Shape (n,)")
+    free: BoolArray = part("mask of the parameters that the data determine, not held; shape (n,)")
 
     @property
     def used(self) -> BoolArray:

@@ -138,7 +138,7 @@ class Fit(Result):
         "keys of the constants in the covariance",
         "key",
         name="key",
-        more="may lack a constant from which another one was computed",
+        more="may lack a constant from which another constant was computed",
     )
     covariance: FloatArray = column("SI", "covariance of two constants", "key other_key")
     abscissa: FloatArray = column("SI", "abscissa of the datum", "datum")
@@ -321,7 +321,7 @@ class Fit(Result):
         Raises
         ------
         InputError
-            A law of the hammer differs from the fitted one, or a constant differs from the value taken as
+            A law of the hammer differs from the fitted law, or a constant differs from the value taken as
             known.
         """
         known = hammer.constants

@@ -11,7 +11,7 @@ both schemes, and the order of the method shows only in smooth motion. The schem
 the paper, not for production runs.
 
 The paper states "typical step sizes" but not when the short step begins and ends. `READINGS` lists possible
-rules; the claims use the first one.
+rules; the claims use the first rule.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ Scheme = Literal["trapezoid", "runge-kutta-4"]
 Reading = Literal["look-ahead", "inside", "grid", "no-late-step", "firings"]
 READINGS: Final[tuple[Reading, ...]] = get_args(Reading)
 """Rules for when the short step is used. "look-ahead": if x < b, or if the next free step would end there.
-"inside": only if x < b, so that the first step into the backstop is a long one. "grid": a free step that
-begins or would end there is divided into ten short ones, so that free steps always begin on a grid of 10 us.
+"inside": only if x < b, so that the first step into the backstop is long. "grid": a free step that
+begins or would end there is divided into ten short steps, so that free steps begin on a grid of 10 us.
 "no-late-step": like "look-ahead", with short steps late in the settle-out as well. "firings": like
 "look-ahead", and a step ends at each firing, where the state of Fig. 11 is read."""
 

@@ -57,7 +57,7 @@ class Reopened(Declared):
         "arrays as a Dataset; of a table (.csv, .parquet), the columns over the dimension `row`", repr=False
     )
     dataframe: pd.DataFrame = part(
-        "columns as a table; of a Dataset, the arrays over the dimensions of the first one", repr=False
+        "columns as a table; of a Dataset, the arrays over the dimensions of the first array", repr=False
     )
 
     @property

@@ -118,7 +118,7 @@ class Store:
             raise self._refusal(error) from None
 
     def finish(self, now: str) -> None:
-        """Add the time stamp of completion to a complete store, unless the store has one."""
+        """Add the time stamp of completion to a complete store, unless the stamp is already present."""
         root = _root(self.path)
         if root["attributes"].get("finished"):
             return

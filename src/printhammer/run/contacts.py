@@ -45,7 +45,7 @@ class Contact(Declared):
         " pack contact: so far, what it stores included",
     )
     firing: int | None = part("index of the latest firing at or before the touch")
-    extra: bool = part("whether the contact is a pack contact after the first one of its firing")
+    extra: bool = part("whether the contact is a pack contact after the first pack contact of its firing")
     initial: bool = part("whether the contact was open at the start of the run")
 
 

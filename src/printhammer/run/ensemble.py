@@ -333,7 +333,7 @@ class Ensemble:
         times : array, optional
             Ascending times, s, at which the displacement is stored.
         x : float32 array, shape (M, T), optional
-            Array for the displacements; by default a new one.
+            Array for the displacements; by default a new array.
         threads : int, optional
             Number of threads; by default the number of cores.
         progress : callable, optional

@@ -203,7 +203,7 @@ def _scales(
     way, typical = scales_of(hammer, first_drive, (float(x[0]), 0.0), static)
     if len(own) == 1:
         return [(way, max(typical, abs(float(v[0]))))], np.zeros(1, np.int64)
-    # Only displacements or speeds beyond the typical ones have separate scales.
+    # Only displacements or speeds beyond the typical scales have separate scales.
     speeds, which = np.unique(np.maximum(np.abs(v), typical), return_inverse=True)
     return [(way, speed) for speed in speeds.tolist()], which
 

@@ -76,7 +76,7 @@ def least_wait(waveform: Waveform) -> float:
 
 
 def wait_of(hammer: Hammer, waveform: Waveform | None = None) -> float:
-    """Compute the time from last firing to end of run, s, by default for the hammer's waveform."""
+    """Compute the time from the last firing to the end of a run, s, by default for the hammer's waveform."""
     pulse = hammer.waveform if waveform is None else waveform
     return CYCLE if pulse is None else _window_of(hammer, pulse).wait
 

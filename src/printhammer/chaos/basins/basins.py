@@ -202,7 +202,7 @@ class Basins(Result, rows="v x"):
         dtype=np.int32,
     )
     attractors: tuple[Attractor, ...] = part(
-        "attractors, sorted by period (strange ones last), then by least displacement"
+        "attractors, sorted by period (strange attractors last), then by least displacement"
     )
     firings: IntArray = column(
         "1",

@@ -6,7 +6,7 @@ Strictly, each train begins where the preceding train ended, which is a serial c
 are divided into strands of `STRAND` successive values. The first train of a strand begins at rest, states are
 passed on within the strand, and all strands run in parallel. Then successive strands are joined: the first
 train of a strand is run again from the final state of the preceding strand. If the train reaches the same
-attractor as before, the rest of the strand is kept. Otherwise the new train replaces the former one, and its
+attractor as before, the rest of the strand is kept. Otherwise the new train replaces the old train, and its
 final state is passed on through the strand until a train reaches the same attractor as before. If no train of
 the strand does, the next strand is joined in the same way.
 
@@ -246,7 +246,7 @@ class DiagramBuilder:
         self.run(rows, np.array(states))
 
     def is_different(self, place: int, neighbour: int) -> bool:
-        """Whether trains at two parameter values differ in status or period, or in orbit by over `JUMP`."""
+        """Whether trains at two values differ in status or period, or have orbits more than `JUMP` apart."""
         table = self.table
         for way in range(len(self.ways)):
             a, b = self.rows([place, neighbour], way)

@@ -58,7 +58,7 @@ class Columns(Declared):
     )
     status: TextArray = column("", "status of each run; `NOT_RUN` before the run", "train")
     last: FloatArray = part(
-        "state from which the next train can continue, at the firing after the last requested one, shape (M,"
+        "state from which the next train can continue, one firing after the last requested firing, shape (M,"
         " 7): displacement, velocity, branch of the pack or -1, memory, and the electric part of the state;"
         " `FROM_REST` if no train can continue"
     )

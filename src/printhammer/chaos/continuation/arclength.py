@@ -255,7 +255,7 @@ def _lost(node: Node, trouble: str, *, jumped: bool = False) -> Stop:
     at = f"the parameter {node.parameter:.9g}"
     reason, sentence = "lost", f"the curve was lost at {at}: Newton's method does not converge beyond"
     if jumped:
-        reason, sentence = "jump", f"the curve was lost at {at}: Newton's method converges to another one"
+        reason, sentence = "jump", f"the curve was lost at {at}: Newton's method converges to another curve"
     if trouble:
         reason, sentence = "no value", f"the map has no value beyond {at}: {trouble}"
     return Stop(reason, node.parameter, node.state, sentence)

@@ -180,7 +180,7 @@ def curve_point_of(node: Node) -> CurvePoint:
 _PHASES: Final = 0.2
 """Scale of the phase of a touch, as a fraction of the period; arbitrary."""
 _IN_TRACE: Final = {"fold": -1.0, "period doubling": 1.0, "Neimark-Sacker": 0.0}
-"""Coefficient c of the test function f = 1 + det J + c tr J, by kind; 0 for Neimark-Sacker, f = det J - 1."""
+"""Coefficient c of the test function f = 1 + det J + c tr J by definition; Neimark-Sacker: f = det J - 1."""
 
 
 def _flight(

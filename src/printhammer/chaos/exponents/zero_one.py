@@ -73,7 +73,7 @@ class ZeroOne(Result):
     k: float = scalar(
         "1",
         "median of the correlations",
-        more="near 0 for a regular series, near 1 for a chaotic one, nan where the series has gaps",
+        more="near 0 for a regular series, near 1 for a chaotic series, nan where the series has gaps",
     )
     verdict: str = scalar(
         "", 'classification by K: "regular" up to 0.2, "chaotic" from 0.8 on, else "undecided"'

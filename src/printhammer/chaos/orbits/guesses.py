@@ -135,7 +135,7 @@ def spread(regime: Regime, count: int, visited: FloatArray) -> FloatArray:
 
 
 def first_state(regime: Regime) -> tuple[float, float]:
-    """Return the rest state of the hammer or, if it has none, the middle of its window."""
+    """Return the rest state of the hammer; without a rest state, the middle of the hammer's window."""
     try:
         return rest_state(regime.hammer), 0.0
     except InputError:
@@ -178,7 +178,7 @@ def close_returns(
         return [], []
     gap = np.abs(scaled[:, period:] - scaled[:, :count]).max(axis=2)
     gap = np.where(records.usable[:, period:] & records.usable[:, :count], gap, np.inf)
-    # The first record is the long one.
+    # The first record is the long record.
     rows = slice(1, None) if records.begins else slice(None)
     gap[rows, max(within - period + 1, 0) :] = np.inf
     # Late returns are close to attractors, early returns cover the plane.

@@ -1,7 +1,7 @@
 """Stable and unstable manifolds of saddles of the strobe map, as curves in the plane of states.
 
 The unstable manifold of a saddle is the set of states whose backward orbits converge to it, the stable
-manifold the set of states whose forward orbits do; the latter bounds basins. Both are tangent at the saddle
+manifold the set of states whose forward orbits do, which bounds basins. Both are tangent at the saddle
 to an eigenvector of the monodromy matrix. The unstable manifold is grown from a fundamental segment on that
 eigenvector, whose images under the map are the whole curve; where two images lie too far apart or the curve
 bends too much, a point of the segment between them is added (D. Hobson, J. Comput. Phys. 104 (1993) 14). The

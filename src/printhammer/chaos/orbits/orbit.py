@@ -34,7 +34,7 @@ UNDECIDED: Final = "undecided"
 KINDS: Final = (STABLE, SADDLE, UNSTABLE, UNDECIDED)
 
 NEUTRAL: Final = 1e-6
-"""Distance of the absolute value of a multiplier from 1 within which stability is undecided; arbitrary."""
+"""Distance of a multiplier from the unit circle within which stability is undecided; arbitrary."""
 
 CLOSES: Final = 1e-6
 """Largest closing error of a valid orbit over a whole period, in half-widths of the strobe window.

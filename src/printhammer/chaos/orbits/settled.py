@@ -2,7 +2,7 @@
 
 States that agree q firings apart do not prove a period q. Near a period doubling the states alternate about
 an orbit that they approach with a multiplier close to -1: states two firings apart agree long before states
-one firing apart do. Near an unstable orbit, and near the birth of a stable one, states move so slowly that
+one firing apart do. Near an unstable orbit, and near the birth of a stable orbit, states move so slowly that
 they seem stationary. Therefore the states alone prove a period q only if
 
 - states q firings apart agree as closely as the noise of the runs allows, and

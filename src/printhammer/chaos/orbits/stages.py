@@ -275,7 +275,7 @@ class Search:
         backstop, lowest = self.regime.hammer.backstop, np.full(2, -np.inf)
         if backstop is not None and backstop.law == "rigid":
             lowest[0] = self.regime.hammer.position
-        # The same displacements for every orbit, so that a larger search includes those of a smaller one.
+        # The same displacements for every orbit, so that a larger search includes those of a smaller search.
         sizes = 10.0 ** rng.uniform(*_SIZES, (_NEAR, 1, 1))
         moves = sizes * self.scales * rng.uniform(-1.0, 1.0, (_NEAR, period, 2))
         own = [known.closing for known in different if known.closing.firings.sum() == period]

@@ -326,7 +326,7 @@ def mirror_image(regime: Regime, state: FloatArray, tolerance: float) -> FloatAr
 
 
 def _center(hammer: Hammer) -> float | None:
-    """Return the position, m, about which the contacts of a hammer are symmetric; None without one."""
+    """Return the position, m, about which the contacts of a hammer are symmetric; None if they are not."""
     front, backstop = hammer.pack, hammer.backstop
     if front is None and backstop is None:
         return hammer.origin

@@ -57,7 +57,7 @@ class Verdict(Declared):
     )
     nearest: int | None = part(
         "number of firings, at most 64, after which the states come closest to repeating",
-        more="the period, if there is one",
+        more="equal to the period of a periodic train",
     )
     exponent: float = part("largest exponent of the strobe map, per firing; NaN if not computed")
     standard_error: float = part("standard error of the exponent")

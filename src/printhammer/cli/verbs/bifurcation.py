@@ -28,7 +28,7 @@ _of = partial(opt.text, panel=_PARAMETER)
     " --direction both --out bifurcation.png",
     {
         "transient": opt.whole(
-            "Number of firings to discard at each value (default: all but the last 200; at least a third)."
+            "Number of firings to discard at each value (default: a third, or all but the last 200 if more)."
         ),
         "refine": opt.whole(
             "Number of times to halve the step where the classification of neighbouring motions differs.",
@@ -56,12 +56,13 @@ def bifurcation(
     rate: str | None = _of("RATE", "Firings per second, if the parameter is neither period nor rate."),
     direction: str = opt.choice(
         "from-rest|up|down|both",
-        "Initial state of a train: rest, or the final state at the next lower (up) or higher (down) value.",
+        "Initial state of a train: rest, or the final state of the preceding train in rising (up) or falling"
+        " (down) order.",
         default="from-rest",
     ),
     firings: int = opt.whole("Number of firings at each value.", default=1000),
     exponents: bool = opt.switch(
-        "Compute Lyapunov exponents, to separate strange (chaotic) motions from undecided ones.", default=True
+        "Compute Lyapunov exponents, to separate strange (chaotic) from undecided motions.", default=True
     ),
     show: str = opt.choice("x|v", "Quantity on the vertical axis of the plot.", default="x"),
     **passed: Any,

@@ -240,7 +240,7 @@ def curve(
 ) -> Answer:
     """Continue a fold, period doubling or grazing of a periodic orbit in two parameters.
 
-    Reports where the curve ends, and the codimension-two points on it.
+    Reports where the curve ends, and the codimension-two points on the curve.
     """
     from printhammer.chaos.continuation.continuation import continuation
     from printhammer.chaos.curves.bifurcation_curve import bifurcation_curve

@@ -25,7 +25,7 @@ _MOST_RATES: Final = 200  # Largest number of rates; each takes seconds to minut
     {
         "dots": opt.whole("Number of dots in the burst.", default=8),
         "force": opt.number(
-            "Smallest peak force of a dot, as a fraction of the single pulse's (default: 0.9).",
+            "Smallest peak force of a dot, relative to that of a single pulse (default: 0.9).",
             flag="--least-force",
         ),
         "largest": opt.text(

@@ -46,7 +46,9 @@ _measured = partial(opt.source, argument=True)
 _earlier = partial(opt.source, panel="Tables of the parts, fitted before the records")
 
 _HAMMER: Final = opt.text(
-    "HAMMER", "Hammer file or name that supplies the known constants; template for --into.", is_input=True
+    "HAMMER",
+    "Hammer file, or shipped hammer, with the known constants; --into writes a fitted copy.",
+    is_input=True,
 )
 _STRICT: Final = opt.switch("Exit with status 1 if the data reject the law.")
 _PASSED: Final = {
@@ -112,7 +114,7 @@ def solenoid(
     ),
     turns: float | None = opt.number("Number of turns of the coil.", metavar="N"),
     current: float | None = opt.quantity(
-        "A", "CURRENT", "Current of all rows, if the table has no column of currents."
+        "A", "CURRENT", "Current of all rows, if the table has no current column."
     ),
     example: bool = opt.switch("Print the published table of a pot magnet, as an example."),
     hammer: str | None = _HAMMER,

@@ -63,7 +63,7 @@ def measure(
     hammer: Hammer = opt.HAMMER,
     out: Path | None = opt.folder("Output file (.csv), or output folder if KIND is all.", metavar="FILE"),
     exact: bool = opt.switch(
-        "Start from error-free sensors instead of ordinary bench sensors.", panel=_SENSORS
+        "Use error-free sensors, except for the errors set by other options.", panel=_SENSORS
     ),
     seed: int = opt.whole("Seed of the random number generator.", default=0),
     **passed: Any,

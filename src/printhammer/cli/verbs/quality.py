@@ -90,7 +90,7 @@ def quality(
         "Find the highest rate up to which all patterns of eight slots are printed within the limits."
     ),
     yield_: int | None = opt.whole(
-        "Number of random hammers; report the yield at --rate or, without --rate, their safe rates.",
+        "Number of random hammers; report the yield at --rate or, without --rate, the safe rates.",
         flag="--yield",
         panel=_MORE,
     ),
@@ -112,11 +112,13 @@ def quality(
         " engraved (10 %, 15 µs).",
         default="slots",
     ),
-    force_limit: str | None = _grid("X", "Limit on the force deviation, e.g. 10%, instead of the preset's."),
+    force_limit: str | None = _grid(
+        "X", "Limit on the force deviation, e.g. 10% (default: that of the preset)."
+    ),
     arrival_limit: float | None = opt.quantity(
         "s",
         "TIME",
-        "Limit on the deviation of the arrival time, e.g. 50us, instead of the preset's.",
+        "Limit on the deviation of the arrival time, e.g. 50us (default: that of the preset).",
         panel=_GRID,
     ),
     extra_contacts: int | None = opt.whole(

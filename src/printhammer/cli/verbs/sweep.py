@@ -34,7 +34,9 @@ def sweep(
     ),
     threads: int | None = opt.THREADS,
     dask: str | None = opt.text("ADDRESS", "Address of the scheduler of a Dask cluster that runs the sweep."),
-    check: bool = opt.switch("Show the plan and the disk space it needs, without running it."),
+    check: bool = opt.switch(
+        "Show the plan of the sweep and the required disk space, without running the sweep."
+    ),
     example: bool = opt.switch("Print an example specification file."),
     schema: bool = opt.switch("Print the JSON schema of specification files."),
 ) -> Answer:

@@ -205,7 +205,8 @@ _PANEL: Final = "The sensor"
         ),
         "forgetting": opt.number("Fraction of the earlier corrections that each stage undoes.", default=0.02),
         "doubt": opt.number(
-            "Maximum fraction of posterior samples that may print fewer dots with the table than without.",
+            "Maximum fraction of posterior samples that may print fewer dots with the table than in open"
+            " loop.",
             default=0.0,
         ),
         "serial": opt.text("TEXT", "Serial number of the calibrated unit.", default="unit"),

@@ -175,7 +175,7 @@ def feedback(
     rate : float or str
         Slot rate, Hz, or text with a unit.
     driven : Hammer, optional
-        The driven hammer; by default the nominal one.
+        The driven hammer; by default the nominal hammer.
     sensor : PositionSensor, optional
         Sensor of the controller; by default with noise of 1 % of the stroke and a delay of 20 us.
     current : float or str, optional

@@ -171,7 +171,7 @@ BAD: Final = 10.0  # Arbitrary
 """Final objective of a stage (`Update.left`) above which the learner tries another starting table."""
 
 _SLOW: Final = 0.85
-"""Largest ratio of successive objective values with which the iteration goes on; arbitrary."""
+"""Largest ratio of successive objective values with which the iteration continues; arbitrary."""
 _LEAST_LAW: Final = 1e-2  # Lower bound of the fraction a of the model error that is corrected; arbitrary
 _OTHERS: Final = 4  # Number of posterior samples on which the convergence condition is checked; arbitrary
 _ALIKE: Final = 24  # Number of posterior samples on which table and open loops are compared; arbitrary
@@ -241,7 +241,7 @@ class Update(NamedTuple):
 
 
 class _Unit(NamedTuple):
-    """Posterior modes of a unit's constants, as hammers with weights and model error."""
+    """Hammers at the posterior modes of a unit's constants, their weights, and the model error."""
 
     hammers: Sequence[Hammer]  # Hammers with the constants of the modes, the most probable first
     weights: FloatArray  # Posterior probabilities of the modes

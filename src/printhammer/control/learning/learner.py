@@ -24,7 +24,7 @@ _FLOOR: Final = 0.01
 _STARTS: Final = 6  # Number of simulated hammers from which searches begin; arbitrary
 _OUTLIER: Final = 6.0  # Readings farther from the median are rejected, in standard deviations; arbitrary
 _FEWEST: Final = 3
-"""Smallest number of readings whose median exposes an outlier: of two readings, either may be the outlier."""
+"""Smallest number of readings whose median exposes an outlier, since of two either may be the outlier."""
 MISFIT: Final = 2.0
 """Largest misfit with which a table is used: RMS of the residuals, in standard deviations of the noise.
 
@@ -50,7 +50,7 @@ class Learner:
     An open loop is used during the first stage. Later stages use an open loop in three cases: no hammer of
     the production explains the readings; more posterior samples than the doubt allows would print fewer dots
     within limits with the table than in open loop, or a row in which errors grow; or the mean gain is below
-    2 % of the dots. The open loop is the one that prints more dots over the production, unless the
+    2 % of the dots. The open loop used prints more dots over the production than the other, unless the
     readings of the unit in both open loops show that the other open loop prints more dots.
 
     Parameters

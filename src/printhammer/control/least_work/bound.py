@@ -60,7 +60,7 @@ def bound(hammer: Hammer, single: Nominal, force: float, largest: float) -> Boun
     deepest, loading = _indentation(static, single, force)
     x = np.linspace(rest_state(hammer), static.front + deepest, _POINTS)
     thrown = _strongest(static, x, largest)
-    # Trapezoidal rule from every point to the last one.
+    # Trapezoidal rule from every point to the last point.
     parts = 0.5 * float(x[1] - x[0]) * (thrown[1:] + thrown[:-1])
     supplied = np.append(np.cumsum(parts[::-1])[::-1], 0.0)
     enough = np.flatnonzero(supplied >= loading)

@@ -7,7 +7,7 @@ brake and lower for the landing.
 Profiles are parameterised by a few numbers in [0, 1], called shares. A Sobol sequence of profiles is
 evaluated, and each of the best is refined by a deterministic local search over a shrinking cloud of points.
 Without the refinement SLSQP would stop in one of many local minima, and rounding errors that differ between
-processors would decide in which.
+processors would select the minimum.
 
 SLSQP (D. Kraft, DFVLR-FB 88-28 (1988)) is used as implemented in SciPy. The derivatives are finite
 differences, all of whose simulations form one ensemble.
@@ -46,12 +46,12 @@ def descend(
     linear: tuple[FloatArray, FloatArray] | None = None,
     inward: bool = False,
 ) -> tuple[FloatArray, float]:
-    """Minimise an objective by SLSQP, with optional constraints; `measured` evaluates all of these.
+    """Minimise an objective by SLSQP, with optional constraints; `measured` evaluates all functions.
 
     `measured` maps points (places, n) to rows (1 or 3, places). With `conditions` there are three rows: the
     objective, an equality constraint (second row = 0) and an inequality constraint (third row >= 0). `bounds`
     apply to every variable. `linear`, an offset and a matrix, are linear inequality constraints, offset +
-    matrix @ y >= 0. With `inward`, the difference step points away from the nearer one of the bounds 0 and 1.
+    matrix @ y >= 0. With `inward`, the difference step points away from the nearer of the bounds 0 and 1.
     Returns the final point and its objective.
     """
     from scipy import optimize

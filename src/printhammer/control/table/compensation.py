@@ -386,7 +386,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return {name: getattr(self, name) for name in (*HEAD, *OPTIONAL)}
 
     def save(self, path: str | Path) -> None:
-        """Write the table in the format of the file suffix, a C header (.h) among others, atomically.
+        """Write the table in the format of the file suffix, such as a C header (.h), atomically.
 
         `load_table` reads CSV and JSON files.
 

@@ -146,7 +146,7 @@ class Draft:
 
         `values`, shape (cells, 2), are advance and width of the last dots, s, and `shifts`, shape (shifts,
         2), are trial changes of both. With `dense`, each entry is evaluated in several patterns, see
-        `gaps_before`; an entry with fewer patterns than the others repeats its first pattern. With `whole`,
+        `gaps_before`; an entry with fewer patterns than another repeats its first pattern. With `whole`,
         the result is the largest deviation of all dots of a pattern that share the history of the last dot.
         The result, shape (cells, shifts, deviations), is a fraction of the limits; the last axis runs over
         hammers, patterns, force and arrival. NaN marks a lost dot or a pattern with extra contacts.

@@ -63,7 +63,7 @@ def whole_ticks(
     widest = math.floor(max(float(times[name].max()) for name in ("width", "brake_width")) / tick + near)
     for pulses in (width, brake):
         np.minimum(pulses, max(widest, 1), out=pulses)
-    # A dot that is fired later may delay the next one.
+    # A dot that is fired later may delay the next dot.
     for _ in range(gaps + 1):
         for row, rate in enumerate(rates.tolist()):
             for history in histories(gaps, reach):

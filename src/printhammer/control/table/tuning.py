@@ -181,9 +181,9 @@ def tune(
         `hammer` alone.
     driver : str, optional
         Driver of the coil, one of `DRIVERS` in `printhammer.control.table.drive`: "own", the pulse of the
-        hammer or the driver of its coil; "switch", a fast unipolar switch; or "bridge", an H-bridge. The
-        latter two replace a current; their dot from rest has the same force as with the hammer's own pulse,
-        and is fired later so that it arrives at the same time.
+        hammer or the driver of its coil; "switch", a fast unipolar switch; or "bridge", an H-bridge. A
+        switch or bridge replaces a current; its dot from rest has the force of the hammer's own pulse,
+        and is fired later, to arrive at the same time.
     variability : Variability, optional
         Variability of the constants from unit to unit. The cost of a candidate is then the RMS deviation of
         a row of dots over `hammer` and the sigma points of the variability.

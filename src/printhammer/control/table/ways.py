@@ -137,7 +137,7 @@ _ROUNDING: Final = 1e-12
 class Ways(NamedTuple):
     """Candidate pulses for a dot: arrays (ways,) of times after the slot of the preceding dot, s.
 
-    The dot is due at `period`. A brake pulse of width `brake` begins at `delay`, both 0 without one; the dot
+    The dot is due at `period`. A brake pulse of width `brake` begins at `delay`, both 0 if omitted; the dot
     is `fired` with a pulse of `width`. `cost` is the deviation of a row of such dots; see `costs`.
     """
 

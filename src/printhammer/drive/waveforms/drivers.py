@@ -171,7 +171,7 @@ class Switched(Waveform):
     Attributes
     ----------
     at : tuple of float
-        Switching times since the firing, s or strings with units, ascending, the first one not
+        Switching times since the firing, s or strings with units, ascending, the first time not
         negative.
     levels : tuple of float
         Level after each switching, A, or strings with units; in N for a force. The last level is 0.

@@ -61,7 +61,7 @@ def plot(
         Quantity on the vertical axis: "x" for displacements at the firings, "v" for velocities.
     orbits : iterable, optional
         Orbits to draw on top in green: periodic orbits of `printhammer.orbits` (filled circles if stable,
-        else open ones), branches of `printhammer.continuation` (solid if stable, else dotted), and
+        else open circles), branches of `printhammer.continuation` (solid if stable, else dotted), and
         collections of both.
     limits : tuple of float, optional
         Range of displacement or velocity shown, SI; by default it excludes one point in a thousand at each

@@ -201,7 +201,7 @@ def _from_firing(orbit: Orbit, motion: Motion) -> tuple[FloatArray, FloatArray]:
     if orbit.phase == 0.0:
         return since, motion.x
     late = int(np.searchsorted(since, (1.0 - 1e-9) * orbit.period))
-    # The last point repeats the first one.
+    # The last point repeats the first point.
     times = np.concatenate([since[late:-1] - orbit.period, since[:late]])
     return times, np.concatenate([motion.x[late:-1], motion.x[:late]])
 

@@ -2,7 +2,7 @@
 
 True values are computed (`benches`), pass through the sensors (`sensor`), and become a table like those of a
 real laboratory. Each kind of measurement and each column has its own random number stream, so that a change
-of one does not affect the others.
+of one stream does not affect the other streams.
 """
 
 from __future__ import annotations

@@ -201,7 +201,7 @@ def fit_motion(
         Bandwidth of the sensor (-3 dB), Hz; by default the value in a comment ``# bandwidth: 200 kHz`` in the
         record, else unlimited. The current probe is assumed to have the same bandwidth.
     earlier : sequence of Fit, optional
-        Fits to apply to the hammer first. For a constant in several fits, the first one counts.
+        Fits to apply to the hammer first. For a constant in several fits, the first fit counts.
 
     Returns
     -------
@@ -212,7 +212,7 @@ def fit_motion(
     ------
     InputError
         A record is invalid, misses the impact, or is too short or too coarse; the hammer's constants were
-        already fitted to the record; or a constant is not determined, or not distinguishable from others.
+        already fitted to the record; or a constant is not determined, or not separable from another constant.
     """
     if isinstance(paths, str) or not paths:
         raise InputError.of("paths", paths, "a sequence of at least one record")

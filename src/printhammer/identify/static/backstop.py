@@ -246,7 +246,7 @@ def _why(solution: Solution, speed: FloatArray, back: FloatArray) -> str:
     order = np.argsort(speed[used], kind="stable")
     middle = len(order) // 2
     slow, fast = (float(np.median(share[half])) for half in (order[:middle], order[middle:]))
-    trend = f"the restitution is {slow:.3g} at the slower impacts and {fast:.3g} at the faster ones"
+    trend = f"the restitution is {slow:.3g} at the slower impacts and {fast:.3g} at the faster impacts"
     if flat_misses < law_misses:
         return f"{trend}, and a constant restitution of {constant:.3g} describes the rebounds better"
     return f"{trend}, which no value of l/k gives; slow rebounds would have to lose nearly nothing"

@@ -117,7 +117,7 @@ def start_of(table: Readings, levels: int, zero: float) -> FloatArray:
             f"{table.path}: at 0 A the force does not follow an inverse root of the displacement",
             file=table.path,
             key="force",
-            expected="a pull: negative forces near the magnet, weaker ones farther away",
+            expected="a pull: negative forces near the magnet, weaker forces farther away",
         )
     am = math.sqrt(square)
     strongest = float(current[np.argmax(np.abs(current))])

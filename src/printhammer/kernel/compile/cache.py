@@ -137,13 +137,12 @@ def _alone(path: Path) -> Iterator[None]:
         while handle < 0:
             handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o600)
             fcntl.flock(handle, fcntl.LOCK_EX)
-            # The previous owner of the lock has deleted the lock file, so another process may hold a new one:
-            # retry.
+            # The previous owner has deleted the lock file, so another process may hold a new file: retry.
             if os.fstat(handle).st_nlink == 0:
                 os.close(handle)
                 handle = -1
     except (ImportError, OSError):
-        # Without a lock, two processes may make the same content; the last one replaces the file.
+        # Without a lock, two processes may make the same content; the last process replaces the file.
         pass
     try:
         yield
@@ -157,7 +156,7 @@ def _alone(path: Path) -> Iterator[None]:
 class File:
     """File of the disk cache, named after the digest of its sources.
 
-    The file is looked up in the folders up to and including the first writable one, and is written to that
+    The file is looked up in the folders up to and including the first writable folder, and is written to that
     folder. Read and write errors never stop the program: the content is then made again.
     """
 

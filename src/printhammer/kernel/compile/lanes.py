@@ -40,7 +40,7 @@ def _choices(laws: Laws) -> dict[str, bool]:
 
 
 def specialise_lanes(laws: Laws, kinds: LaneKinds) -> Kernel:
-    """Return the lane kernel for `laws` and for a drive with the kinds of pieces `kinds`.
+    """Return the lane kernel for the force laws `laws` and for a drive with waveform pieces of `kinds`.
 
     The entry point of the kernel is `lanes`; see :mod:`printhammer.kernel.lanes.lanes`.
     """

@@ -266,7 +266,7 @@ def turn_in_pack(
 ) -> int:
     """Select the next mode after the velocity has become zero inside the pack at displacement `x`.
 
-    The rule is the one of :func:`printhammer.kernel.single.around.reversed_mode`. A member whose armature
+    The rule is that of :func:`printhammer.kernel.single.around.reversed_mode`. A member whose armature
     would rest leaves the lanes.
     """
     # As in the scalar kernel, oscillations too small to distinguish from rest would never end.

@@ -2,7 +2,7 @@
 
 A thread has up to `LANES` active members, stored in pools, one pool per mode. A sweep takes one step in every
 lane of every pool, then handles the lanes with events. When a member is finished, the next member takes its
-lane. The results of a member do not depend on other members: all lanes of a block, including idle ones, are
+lane. The results of a member do not depend on other members: all lanes of a block, including idle lanes, are
 always computed by the same machine code.
 """
 

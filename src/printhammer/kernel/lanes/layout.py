@@ -108,7 +108,7 @@ NEW_A = OWN + 7
 LENGTH = OWN + 8
 """Row of the length of the latest step."""
 FOLLOWING = OWN + 9
-"""Row of the proposed length of the step after the latest one."""
+"""Row of the proposed length of the step after the latest step."""
 EVENT = OWN + 10
 ROWS = OWN + 11
 

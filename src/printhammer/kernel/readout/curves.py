@@ -19,7 +19,7 @@ def write_times(nodes: Any, fewest: int, most: int, out: Any) -> int:
 
     Every step is divided: into parts of at most 1 / `fewest` of the run, and into three at least if there are
     fewer steps than `fewest`. If there are more than `most` nodes, only `most` of them are used, evenly
-    spaced by index. `out` needs `fewest` + 3 times the number of nodes as its length.
+    spaced by index. The length of `out` must be at least `fewest` + 3 times the number of nodes.
     """
     last = nodes.shape[0] - 1
     used = min(last + 1, most)

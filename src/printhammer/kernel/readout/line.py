@@ -126,7 +126,7 @@ def write_totals(dots: Any, status: Any, out: Any) -> None:
     """Summarise a line in `out`, shape (11,).
 
     Numbers of good dots and of dots with each of the five faults, least and largest force ratio and
-    placement error [m] of the printed dots (NaN without one), and number of runs that ended early.
+    placement error [m] of the printed dots (NaN without a printed dot), and number of runs that ended early.
     """
     for k in range(11):
         out[k] = math.nan if 6 <= k < 10 else 0.0

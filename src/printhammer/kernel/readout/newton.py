@@ -1,7 +1,7 @@
 """Damped Newton's method for one periodic orbit of a strobe map, and whether a motion has settled to it.
 
 The unknowns are the states at successive firings, as in `printhammer.chaos.orbits.newton`: the image of each
-state has to be the next state, and that of the last state the first one. The caller computes the images at
+state has to be the next state, and the image of the last state the first state. The caller computes images at
 the trial states, with their derivatives, and calls `improve`, until the orbit is closed or given up.
 """
 
@@ -49,7 +49,7 @@ half-widths of the window, and the scaled derivative by rows."""
 
 
 def write_guess(states: Any, scales: Any, period: int, count: int, orbit: Any, trial: Any) -> int:
-    """Write the initial guess of an orbit of `count` firings; return 0 if the states are too far from any.
+    """Write the initial guess of an orbit of `count` firings; return 0 if the states are not near an orbit.
 
     If the states alternate about the orbit, their mean is closer to the orbit than any single state.
 
@@ -89,7 +89,7 @@ def write_image(
     ends : float64 array, shape (2, any)
         States at both ends; see `printhammer.kernel.variational.layout.Carried`.
     current : float
-        Coil current at the end as a fraction of a typical one.
+        Coil current at the end as a fraction of a typical current.
     columns : float64 array, shape (any, 2)
         Changes at the end by changes of displacement and velocity at the start.
     smooth : float
@@ -125,7 +125,7 @@ def improve(images: Any, usable: bool, scales: Any, orbit: Any, trial: Any, sear
     images : float64 array, shape (m, 7)
         Images of the trial states; see `IMAGE`.
     usable : bool
-        Whether (x, v) is the complete state in all images; if not in those of the guess, the orbit has no
+        Whether (x, v) is the complete state in all images; if not for the initial guess, the orbit has no
         derivative.
     scales : float64 array
         Half-widths of the window.
@@ -248,7 +248,7 @@ def has_settled(states: Any, scales: Any, orbit: Any, search: Any, outcome: int,
     Parameters
     ----------
     states : float64 array, shape (n, any)
-        States at successive firings: displacement, m, velocity, m/s, and others, which are ignored.
+        States at successive firings: displacement, m, velocity, m/s, and more columns, which are ignored.
     scales : float64 array
         Half-widths of the window, m and m/s, first.
     orbit : float64 array, shape (m, 10)
@@ -291,7 +291,7 @@ def gap_at(states: Any, scales: Any, orbit: Any, block: int, shift: int) -> floa
 def is_approaching(states: Any, scales: Any, orbit: Any, lies_on: float) -> bool:
     """Whether states lie on an orbit or approach it; see `printhammer.chaos.orbits.settled`.
 
-    Arrays as for `has_settled`; `lies_on` is the distance, in half-widths, within which states lie on it.
+    Arrays as for `has_settled`; `lies_on`, in half-widths, is the distance of states that lie on the orbit.
     """
     count = orbit.shape[0]
     blocks = states.shape[0] // count
@@ -315,6 +315,6 @@ def is_approaching(states: Any, scales: Any, orbit: Any, lies_on: float) -> bool
 def is_planar(hammer: Any) -> int:
     """Whether displacement and velocity are the complete state at a section without coil current.
 
-    They are not if the coil has a shorted turn or the supply a capacitor.
+    False if the coil has a shorted turn or the supply has a capacitor.
     """
     return 0 if hammer[TURN_RESISTANCE] > 0.0 or hammer[CAPACITANCE] > 0.0 else 1

@@ -133,7 +133,7 @@ def write_distances(states: Any, branches: Any, scales: Any, distances: Any) -> 
     Returns
     -------
     tuple
-        Smallest q at which all states agree, and the same q or else that of the smallest distance; or 0.
+        Smallest q at which all states agree, 0 without such a q; and that q or else the q of least distance.
     """
     n, parts = states.shape
     period, nearest, least = 0, 0, math.inf
@@ -202,7 +202,7 @@ def settled_period(states: Any, scales: Any, period: int, planar: bool) -> int:
 
     The period is 0 if the states do not decide it. The rules are those of
     `printhammer.chaos.orbits.settled`, without Newton's method: a `planar` motion
-    that the states alone do not decide is undecided here. One that is not planar has more components of
+    that the states alone do not decide is undecided here. A motion that is not planar has more components of
     the state than displacement and velocity at a section; its states decide unless they still move.
     `states` and `scales` are as for `write_distances`.
     """

@@ -95,7 +95,7 @@ def branch_of(mode: int) -> int:
 def state_in_step(
     t: float, t0: float, x0: float, v0: float, mode: int, kept: float, hammer: Hammer, drive: Drive
 ) -> tuple[float, float, float]:
-    """Return displacement [m], velocity [m/s] and w [m^0.5] at time `t` [s] in the step after a node."""
+    """Return x [m], v [m/s] and w = sqrt(b - x) [m^0.5] at time `t` [s] in the step after a node."""
     if mode >= M.RESTING or t <= t0:
         return x0, v0, kept if mode in (M.BACKSTOP, M.HELD) else 0.0
     if mode == M.BACKSTOP:

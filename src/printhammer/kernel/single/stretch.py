@@ -144,7 +144,7 @@ def note_states(
 ) -> tuple[int, int]:
     """Compute strobes and samples, beginning at the indices `strobe` and `sample`, to the end of a segment.
 
-    A time at the end of a segment belongs to the next segment, unless this one is `final`. Returns the
+    A time at the end of a segment belongs to the next segment, unless this segment is `final`. Returns the
     indices of the first strobe and the first sample that remain.
     """
     n = nodes.shape[0]

@@ -2,7 +2,7 @@
 
     Fb + Fe = k delta^1.5 - l v delta^1.5,     delta = b - x > 0
 
-Source: F. Hendriks, IBM J. Res. Develop. 27 (1983), equations (6) and (7), the latter after Hunt and
+Source: F. Hendriks, IBM J. Res. Develop. 27 (1983), equations (6) and (7); (7) is after Hunt and
 Crossley; the program adds the unit step that (6) lacks in print. k may follow from radii and Young's moduli,
 l from a restitution (`printhammer.parts.backstop._hertz`).
 Validity: quasi-static contact within the elastic limit. Weakness: (7) can pull once v > k/l; a free rebound

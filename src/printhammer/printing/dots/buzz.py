@@ -95,7 +95,7 @@ class BuzzTrain(Run):
     kind: Literal["uniform", "delayed"] = part(
         '"uniform": pulses one period apart; "delayed": each a constant delay after leaving the pack'
     )
-    interval: float = part("period of a uniform train or delay of a delayed one, s")
+    interval: float = part("period of an even train, or delay of a delayed train, s")
     times: tuple[float, ...] = part("firing times, s")
     peak_current: float = part("largest value of the drive, A (N for a force drive)")
 

@@ -335,7 +335,7 @@ def rate_grid(first: float | str, last: float | str, step: float | str) -> Float
         read_positive(value, "Hz", name) for value, name in ((first, "first"), (last, "last"), (step, "step"))
     )
     if high < low:
-        raise InputError.of("last", last, f"a rate not below the first one, {low:g} Hz")
+        raise InputError.of("last", last, f"a rate not below the first rate, {low:g} Hz")
     # The last rate belongs to the grid even if the division is rounded down.
     count = math.floor((high - low) / apart * (1.0 + 1e-12)) + 1
     if count > MOST_RATES:

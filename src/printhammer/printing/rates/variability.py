@@ -211,7 +211,7 @@ class Variability(Declared):
         Raises
         ------
         InputError
-            A standard deviation is nonzero, but the hammer has none of the constants that it refers to.
+            A standard deviation is nonzero, but the hammer has none of the constants concerned.
         """
         spread: dict[str, float] = {}
         known = hammer.constants

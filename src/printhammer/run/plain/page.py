@@ -95,7 +95,7 @@ def fill_constants(
     Parameters
     ----------
     body : float64 array, shape (3,)
-        Mass, kg; position of the backstop and front of the pack, m, NaN without one.
+        Mass, kg; position of the backstop and front of the pack, m, NaN if missing.
     damping, spring, pack, backstop, coil, magnet : float64 arrays
         Numbers of the parts (`printhammer.parts.base.Part.numbers`), empty for an absent part.
     constants : float64 array
@@ -126,7 +126,7 @@ def statics_at(constants: Any, limits: Any) -> Statics:
     """Build the functions and constants of the static force from the constants of a hammer.
 
     `limits` are the range of the law of the magnet, m, the position of the platen and the thickness of the
-    pack, m, NaN without one, and the mass, kg.
+    pack, m, NaN if missing, and the mass, kg.
     """
     rigid, rigid_front, memory, has_magnet = False, False, False, False
     if RIGID:
@@ -294,7 +294,7 @@ def fill_scales(
 def begin_window(about: Any, rest: float, front: float, out: Any) -> int:
     """Write the smallest window of a device, s; return whether a single pulse has to confirm the window.
 
-    `about` are the numbers about the pulse, `rest` and `front` positions, m, the latter NaN without a pack.
+    `about` are the numbers about the pulse, `rest` and `front` positions, m; `front` is NaN without a pack.
     """
     support = about[tables.SUPPORT]
     out[0] = least_window(support, about[tables.REPLACES] != 0.0)

@@ -60,7 +60,7 @@ PART: Final = 1.0 / 6.0
 
 
 def is_the_paper(position: float, front: float) -> bool:
-    """Whether backstop and pack have the positions of the paper, m; NaN for a missing one."""
+    """Whether backstop and pack have the positions of the paper, m; NaN for a missing part."""
     near = abs(position - PAPER_BACKSTOP) <= SAME * max(abs(position), PAPER_BACKSTOP)
     return near and abs(front - PAPER_FRONT) <= SAME * max(abs(front), PAPER_FRONT)
 
@@ -74,7 +74,7 @@ def write_half_widths(way: float, speed: float, position: float, front: float, o
     """Write the half-widths of the strobe window, m and m/s; see `printhammer.run.regime.window_of`.
 
     `way` and `speed` are the scales of a hammer that starts at its origin, m and m/s; `position` and `front`
-    are those of backstop and pack, m, NaN without one.
+    are those of backstop and pack, m, NaN if missing.
     """
     part = part_of_window(position, front)
     out[0], out[1] = part * way, part * speed
@@ -120,7 +120,7 @@ def sustained_current(
 ) -> tuple[float, float]:
     """Return the current that a voltage can sustain in a coil, A, with and without the limit of a chopper.
 
-    `upper` is the current at which the chopper switches off, A, NaN without one.
+    `upper` is the current at which the chopper switches off, A, NaN without a chopper.
     """
     resistance = coil.resistance + series
     if resistance > 0.0:
@@ -175,7 +175,7 @@ def typical_scales(
     """Return a typical displacement, m, and speed, m/s; see `printhammer.run.problem.scales_of`.
 
     `current` and `push` are the largest current, A, and force of the drive, N; `period` is that of the drive,
-    s, NaN without one.
+    s, NaN without a period.
     """
     origin = origin_of(s)
     if s.position > -math.inf and s.front < math.inf:

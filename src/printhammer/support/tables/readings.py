@@ -414,7 +414,7 @@ def _in_time(
 ) -> tuple[dict[str, FloatArray], IntArray]:
     """Remove column delays by interpolation to common times; drop incomplete rows.
 
-    The times of the first column are shifted; the others are interpolated linearly.
+    The times of the first column are shifted; all other columns are interpolated linearly.
     """
     times = values["time"]
     names = [name for name in values if name != "time"]
