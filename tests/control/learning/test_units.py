@@ -17,6 +17,10 @@ from printhammer.control.table.drive import with_pulse
 from printhammer.printing.rates.variability import Variability
 
 RATE = 1275.0
+FEWER = (1, 3, 36)
+"""Stages of as many runs as those of a unit, half of the work; `docs/measure/learning.py` has all stages of a
+hundred units at four rates, and counts those that print fewer dots than in the better open loop."""
+
 SENSOR = ImpactSensor(force=0.03)
 
 
@@ -101,10 +105,12 @@ def worse(law: LearningLaw, unit: ph.Hammer, stages: list[Progress], number: int
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("delay", [-50e-6, 20e-6])
-def test_a_hidden_offset_of_the_sensor_costs_nothing(by_time: LearningLaw, delay: float) -> None:
+def test_a_hidden_offset_of_the_sensor_costs_nothing(
+    by_time: LearningLaw, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The offset is an unknown: it is estimated, and no stage prints fewer dots than the better open loop."""
-    (unit,) = Variability().draw(nominal(), 1, 5)
+    monkeypatch.setattr("printhammer.control.learning.learn.RUNS", FEWER[:2])
+    (unit,), delay = Variability().draw(nominal(), 1, 5), -50e-6
     (learner,), stages = calibrate(by_time, [unit], ImpactSensor(delay=delay))
     assert (worse(by_time, unit, stages) <= 0.0).all()
     assert learner.belief is not None
@@ -113,8 +119,11 @@ def test_a_hidden_offset_of_the_sensor_costs_nothing(by_time: LearningLaw, delay
 
 
 @pytest.mark.slow
-def test_nothing_is_lost_where_the_own_pulse_prints_every_dot(at_safe_rate: LearningLaw) -> None:
+def test_nothing_is_lost_where_the_own_pulse_prints_every_dot(
+    at_safe_rate: LearningLaw, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Near the safe rate the fast switch loses a third of a row that the own pulse of the hammer prints."""
+    monkeypatch.setattr("printhammer.control.learning.learn.RUNS", RUNS[:1])
     (unit,) = Variability().times(0.5).draw(nominal(), 1, 1)
     _learners, stages = calibrate(at_safe_rate, [unit], ImpactSensor(seed=7))
     assert (worse(at_safe_rate, unit, stages) <= 0.0).all()
@@ -134,7 +143,7 @@ def test_no_unit_is_below_the_better_open_loop_where_the_readings_decide(
 ) -> None:
     """After one run of random units at the safe rate; otherwise the result says that they do not decide."""
     monkeypatch.setattr("printhammer.control.learning.learn.RUNS", RUNS[:1])
-    units = Variability().draw(nominal(), 6, 4403)
+    units = Variability().draw(nominal(), 2, 4403)
     stages = calibrate(at_safe_rate, units, Hidden(seed=3))[1]
     below = np.array([worse(at_safe_rate, unit, stages, k)[0] for k, unit in enumerate(units)])
     decided = stages[1].learned | (stages[1].loop_certainty >= SURE)
@@ -182,8 +191,11 @@ def test_it_gains_where_the_force_is_measured(learned: tuple[list[Learner], list
 
 
 @pytest.mark.slow
-def test_it_gains_with_another_sensor_than_it_was_designed_for(law: LearningLaw) -> None:
+def test_it_gains_with_another_sensor_than_it_was_designed_for(
+    law: LearningLaw, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The sensor misses impacts, reports false ones, and has coloured noise and a gain."""
+    monkeypatch.setattr("printhammer.control.learning.learn.RUNS", FEWER)
     units = Variability().draw(nominal(), 1, 5)
     sensor = ImpactSensor(force=0.03, missed=0.1, false=0.01, colour=0.8, gain=0.02, seed=7)
     first, *others = calibrate(law, units, sensor)[1]
@@ -196,7 +208,7 @@ def test_it_gains_with_another_sensor_than_it_was_designed_for(law: LearningLaw)
 
 
 class Timed(NamedTuple):
-    """Four units that learn from times alone."""
+    """Two units that learn from times alone."""
 
     law: LearningLaw
     rows: list[np.ndarray]  # Their constants, in standard deviations
@@ -210,8 +222,10 @@ def timed() -> Timed:
     """Return what the units learn with a sensor that is known to have no offset."""
     sensor = ImpactSensor(offset=0.0)
     law = law_for(nominal(), RATE, sensor=sensor, members=150)[0]
-    rows, units = zip(*Variability().draw_rows(nominal(), 4, 5), strict=True)
-    return Timed(law, list(rows), list(units), *calibrate(law, units, sensor))
+    rows, units = zip(*Variability().draw_rows(nominal(), 2, 5), strict=True)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("printhammer.control.learning.learn.RUNS", FEWER)
+        return Timed(law, list(rows), list(units), *calibrate(law, units, sensor))
 
 
 @pytest.mark.slow
@@ -240,7 +254,7 @@ def test_units_print_all_dots_and_none_fewer_than_in_the_better_open_loop(timed:
 
 @pytest.mark.slow
 def test_constants_lie_where_they_are_said_to_lie(timed: Timed) -> None:
-    """Of 32 constants; 95 of 100 within two standard deviations."""
+    """Of 16 constants, 95 of 100 within two standard deviations: two or more outside come in 1 of 5 draws."""
     off = [np.abs(apart(each, row)) for each, row in zip(timed.learners, timed.rows, strict=True)]
     assert (np.concatenate(off) < 2.0).mean() > 0.88
     assert (np.concatenate(off) < 3.0).mean() > 0.95
