@@ -47,7 +47,7 @@ def test_contacts_of_the_file_have_name_side_and_position() -> None:
 def test_every_law_has_its_equation_or_first_line(name: str) -> None:
     hammer = load(name)
     for role, part in hammer.parts.items():
-        assert len(controls.equation_of(role, part.law)) > 10
+        assert len(controls.equation_of(role, part)) > 10
 
 
 def test_the_equations_are_of_laws_that_there_are() -> None:

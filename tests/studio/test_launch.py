@@ -16,7 +16,7 @@ from tests.studio.reading import without_modules
 
 from printhammer.hammer.hammer import load
 from printhammer.studio import Shelf, launch, live_page, widget
-from printhammer.studio.bundle import deltas, merged, page_files, sources, style
+from printhammer.studio.bundle import deltas, merged, page_files, sources
 from printhammer.studio.live import content_of
 
 TEXT = CRUDE.read_text("utf-8")
@@ -195,11 +195,6 @@ def test_nothing_is_fetched_from_elsewhere() -> None:
     assert {place for list_ in found.values() for place in list_} <= {b"http://www.w3"}
 
 
-def test_the_style_holds_that_of_the_curves() -> None:
-    assert ".uplot" in style()
-    assert ".studio" in style()
-
-
 @pytest.mark.parametrize("name", sorted(name for name in page_files() if name.endswith(".js")))
 def test_every_part_is_a_module_that_can_be_parsed(name: str, tmp_path: Path) -> None:
     if (program := shutil.which("node")) is None:
@@ -219,4 +214,5 @@ def test_the_widget_holds_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
     without_modules(monkeypatch)
     hammer = load(CRUDE)
     made: Any = widget(hammer, state="rate=900", height="500px")
+    assert ".uplot" in made.page
     assert (made.page, made.state, made.height) == (live_page(Shelf(hammer, only=True)), "rate=900", "500px")

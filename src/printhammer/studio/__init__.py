@@ -3,8 +3,7 @@
 `live_page` returns the page, `widget` shows it in a notebook and needs the extra `notebook`.
 """
 
-from printhammer.studio.live import live_page
+from printhammer.studio.live import live_page, widget
 from printhammer.studio.shelf import Shelf
-from printhammer.studio.widget import widget
 
 __all__ = ["Shelf", "live_page", "widget"]

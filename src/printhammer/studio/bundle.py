@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import posixpath
 import re
 from functools import lru_cache
@@ -22,24 +21,20 @@ _SHORTEST: Final = 32  # Arbitrary
 @lru_cache
 def page_files() -> dict[str, bytes]:
     """Load the files of the page; return their content by name."""
-    contents: dict[str, bytes] = {}
     root = files("printhammer.studio").joinpath("web")
-    for place in ("", "vendor/", "engine/"):
-        for entry in root.joinpath(place).iterdir():
-            if entry.name.endswith(_ENDINGS):
-                contents[place + entry.name] = entry.read_bytes()
+    contents = {
+        place + entry.name: entry.read_bytes()
+        for place in ("", "vendor/", "engine/")
+        for entry in root.joinpath(place).iterdir()
+        if entry.name.endswith(_ENDINGS)
+    }
     # Vendored files are stored unmodified; the `export` statements of modules are added here.
     contents["vendor/uPlot.js"] = contents["vendor/uPlot.iife.min.js"] + b"\nexport default uPlot;\n"
     toml = root.joinpath("vendor", "smol-toml.min.cjs").read_bytes()
-    module = b"export const parseToml = ((exports) => {\n%b\nreturn exports.parse;\n})({});\n" % toml
-    contents["vendor/toml.js"] = module
+    wrapped = b"export const parseToml = ((exports) => {\n%b\nreturn exports.parse;\n})({});\n"
+    contents["vendor/toml.js"] = wrapped % toml
     contents["engine/call.js"] = files("printhammer.kernel.compile.web").joinpath("call.mjs").read_bytes()
     return contents
-
-
-def inside(content: object) -> str:
-    """Escape "<" in JSON text, so that no text ends the enclosing script element."""
-    return json.dumps(content).replace("<", "\\u003c")
 
 
 def merged(wanted: str) -> str:
@@ -49,7 +44,6 @@ def merged(wanted: str) -> str:
 
 def sources(wanted: str) -> list[tuple[str, str]]:
     """Return a module and its dependencies in order of import, as pairs of path and text."""
-    texts = {name: data.decode() for name, data in page_files().items() if name.endswith(".js")}
     ordered: dict[str, str] = {}
 
     def add(name: str) -> None:
@@ -62,16 +56,11 @@ def sources(wanted: str) -> list[tuple[str, str]]:
             add(part)
             return f'from "./{part}"'
 
-        ordered[name] = _IMPORT.sub(place, texts[name])
+        ordered[name] = _IMPORT.sub(place, page_files()[name].decode())
 
     add(wanted)
     # A module follows the modules that it imports.
     return list(ordered.items())
-
-
-def style() -> str:
-    """Return all style sheets of the page as one text."""
-    return "\n".join(page_files()[name].decode() for name in ("vendor/uPlot.min.css", "studio.css"))
 
 
 def deltas(content: bytes) -> bytes:
@@ -98,9 +87,8 @@ def deltas(content: bytes) -> bytes:
         first = at
         while first > begin and first > distance and content[first - 1] == content[first - 1 - distance]:
             first -= 1
-        last = _common_end(content, at, distance)
         # A copy may not overlap its source.
-        last = min(last, first + distance)
+        last = min(_common_end(content, at, distance), first + distance)
         if last - first < _SHORTEST:
             at += 1
             continue

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import math
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final, get_args
+from typing import Any, Final, get_args
 
 from printhammer.drive.waveforms.drivers import DRIVERS, Rail
 from printhammer.drive.waveforms.shapes import SHAPES, Sine, Waveform
+from printhammer.hammer.hammer import Hammer
+from printhammer.hammer.names import Range
 from printhammer.parts.base import Part
+from printhammer.parts.coil import Winding
 from printhammer.parts.friction import DryFriction
-from printhammer.parts.spring.forces import ForceSum, LinearContact
-from printhammer.studio import bounds
-from printhammer.studio.coil import by_voltage, open_constants, rail_of, span_of
-from printhammer.support.constants import quantities
+from printhammer.parts.spring.forces import LinearContact
+from printhammer.studio.coil import open_constants, rail_of, span_of
+from printhammer.support.constants import Constant, quantities
 from printhammer.units import from_si
-
-if TYPE_CHECKING:
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.hammer.names import Range
-    from printhammer.support.constants import Constant
 
 SHOWN: Final = {
     "m": ("um", "mil"),
@@ -58,22 +55,16 @@ EQUATIONS: Final = {
 }
 """Equations of the laws of the paper; other laws show the first line of their module docstring."""
 
-_SUMS: Final[dict[tuple[str, str], type[Part]]] = {
-    ("damping", DryFriction.law): DryFriction,
-    ("spring", ForceSum.law): ForceSum,
-}
-"""Parts that a hammer file does not name, because they are sums of its forces and contacts."""
+
+def _half_sine(amplitude: float, width: float, quantity: str) -> dict[str, Any]:
+    return {"shape": "half-sine", "amplitude": amplitude, "width": width, "quantity": quantity}
+
 
 # Period chosen such that a hop of the ball lasts about one period.
-_HOPS: Final[dict[str, Any]] = {
-    "waveform": {"shape": "half-sine", "amplitude": 0.5, "width": 3e-4, "quantity": "force"},
-    "rate": 50.0,
-    "low": 20.0,
-    "high": 100.0,
-}
+_HOPS: Final = {"waveform": _half_sine(0.5, 3e-4, "force"), "rate": 50.0, "low": 20.0, "high": 100.0}
 # Two pushes, separated by the free period of 2 pi s.
-_PUSHES: Final[dict[str, Any]] = {
-    "waveform": {"shape": "half-sine", "amplitude": 10.0, "width": 0.02, "quantity": "force"},
+_PUSHES: Final = {
+    "waveform": _half_sine(10.0, 0.02, "force"),
     "rate": 10.0,
     "pattern": "1" + 62 * "0" + "1",
     "low": 10.0,
@@ -81,13 +72,11 @@ _PUSHES: Final[dict[str, Any]] = {
 }
 
 
-def _shaken(
-    amplitude: float, angular: float, phase: float, low: float, high: float, pulses: int = 20
-) -> dict[str, Any]:
+def _shaken(amplitude: float, angular: float, phase: float, low: float, high: float) -> dict[str, Any]:
     """Build the initial page state of an oscillator under a sinusoidal force; frequencies in rad/s."""
     wave = {"shape": "sine", "amplitude": amplitude, "phase": phase, "quantity": "force"}
     rates = {"rate": angular, "low": low, "high": high}
-    return {"waveform": wave, "pulses": pulses} | {
+    return {"waveform": wave, "pulses": 20} | {
         name: float(f"{value / (2.0 * math.pi):.6g}") for name, value in rates.items()
     }
 
@@ -125,23 +114,19 @@ def describe(hammer: Hammer) -> dict[str, Any]:
     Returns
     -------
     dict
-        `name`, `title`, `note`, `constants` (a list), `open` (coil constants that the file leaves open),
-        `rail` (default rail driver, or None), `combined` (controls that change several constants),
-        `waveform` (shape and constants, or None), `start` (entries of the initial state that differ from the
-        default), `places` (positions), `contacts` (name, side and position of each contact of the file), the
-        nouns `strike`, `struck` and `mover`, `views` (those listed in the hammer file), `rigid` and
-        `rigid_front` (whether backstop and front are rigid), and `dry` (whether dry friction acts and the
-        hammer has a magnet: a voltage may then drive the coil, without exponents).
+        `name`, `title`, `note`, `strike`, `struck`, `mover` and `views` of the file, `constants` (a list),
+        `open` (coil constants that the file leaves open), `rail` (default rail driver, or None), `combined`
+        (controls that change several constants), `waveform` (shape and constants, or None), `start` (entries
+        of the initial state that differ from the default), `places` (positions), `contacts` (name, side and
+        position), `rigid` and `rigid_front` (whether backstop and front are rigid), and `dry` (whether dry
+        friction acts and the hammer has a magnet: a voltage may then drive the coil, without exponents).
     """
-    constants = []
-    for key, constant in hammer.constants.items():
-        if (span := span_of(hammer, key, bounds.SPAN)) is not None:
-            constants.append(_control(hammer, constant, span))
+    spans = [(constant, span_of(hammer, constant)) for constant in hammer.constants.values()]
     return {
         "name": hammer.name,
         "title": hammer.title,
         "note": hammer.note,
-        "constants": constants,
+        "constants": [_control(hammer, constant, span) for constant, span in spans if span is not None],
         "open": [_control(hammer, constant, span) for constant, span in open_constants(hammer).values()],
         "rail": rail_of(hammer),
         "combined": combined_of(hammer),
@@ -165,11 +150,10 @@ def describe(hammer: Hammer) -> dict[str, Any]:
 
 def _control(hammer: Hammer, constant: Constant, span: Range) -> dict[str, Any]:
     section = constant.key.partition(".")[0]
-    part = hammer.parts.get(section)
-    law = getattr(part, "law", "winding" if section == "coil" else "")
+    part = hammer.parts.get(section) or (Winding() if section == "coil" else None)
     return {
         "key": constant.key,
-        "section": section if part is not None or law else "armature",
+        "section": "armature" if part is None else section,
         "symbol": constant.symbol,
         "meaning": constant.meaning,
         "value": constant.si,
@@ -179,30 +163,25 @@ def _control(hammer: Hammer, constant: Constant, span: Range) -> dict[str, Any]:
         "log": span.logarithmic,
         "status": constant.status,
         "source": constant.source,
-        "equation": equation_of(section, law),
+        "equation": equation_of(section, part),
     }
 
 
 def opening_of(hammer: Hammer) -> dict[str, Any]:
     """Return the initial page settings of a hammer that has no pulse or is unlike a print hammer."""
+    opening = OPENINGS.get(hammer.name, {})
     if hammer.waveform is not None:
-        return OPENINGS.get(hammer.name, {})
+        return opening
     quantity = "current" if "magnet" in hammer.parts else "force"
-    pulse = {"shape": "half-sine", "amplitude": 1.0, "width": 3e-4, "quantity": quantity}
-    opening: dict[str, Any] = {"waveform": pulse, **OPENINGS.get(hammer.name, {})}
-    return opening
+    return {"waveform": _half_sine(1.0, 3e-4, quantity), **opening}
 
 
-def equation_of(section: str, law: str) -> str:
-    """Return the equation of a law, or else the first line of its module docstring."""
-    known = EQUATIONS.get(f"{section}.{law}" if law else section)
-    if known is not None or not law:
-        return known or ""
-    from printhammer.parts import PARTS
-
-    part = _SUMS.get((section, law)) or PARTS[section, law]
-    text = import_module(part.__module__).__doc__ or ""
-    return text.strip().partition("\n")[0]
+def equation_of(section: str, part: Part | None) -> str:
+    """Return the equation of the law of a part, or else the first line of its module docstring."""
+    if part is None:
+        return EQUATIONS.get(section, "")
+    text = import_module(type(part).__module__).__doc__ or ""
+    return EQUATIONS.get(f"{section}.{part.law}", text.strip().partition("\n")[0])
 
 
 def combined_of(hammer: Hammer) -> list[dict[str, Any]]:
@@ -214,27 +193,19 @@ def combined_of(hammer: Hammer) -> list[dict[str, Any]]:
     keys = hammer.constants
     if not {"platen", "pack.front", "pack.thickness"} <= set(keys):
         return []
-    distance = keys["platen"].si - hammer.origin
+    distance, front = (keys[key].si - hammer.origin for key in ("platen", "pack.front"))
     thickness = keys["pack.thickness"].si
+    distance_text = "platen from backstop; the pack moves with it"
+    thickness_text = "thickness of ribbon and paper on the platen; the front moves toward the hammer"
+    spans = (distance - 0.8 * front, 1.4 * distance), (0.3 * thickness, thickness + 0.8 * front)
+    moves = {"platen": 1.0, "pack.front": 1.0}, {"pack.thickness": 1.0, "pack.front": -1.0}
+    controls = [
+        ("platen distance", distance_text, distance, spans[0], moves[0]),
+        ("forms thickness", thickness_text, thickness, spans[1], moves[1]),
+    ]
     return [
-        {
-            "key": "platen distance",
-            "meaning": "platen from backstop; the pack moves with it",
-            "value": distance,
-            "unit": "m",
-            "low": distance - 0.8 * (keys["pack.front"].si - hammer.origin),
-            "high": 1.4 * distance,
-            "moves": {"platen": 1.0, "pack.front": 1.0},
-        },
-        {
-            "key": "forms thickness",
-            "meaning": "thickness of ribbon and paper on the platen; the front moves toward the hammer",
-            "value": thickness,
-            "unit": "m",
-            "low": 0.3 * thickness,
-            "high": thickness + 0.8 * (keys["pack.front"].si - hammer.origin),
-            "moves": {"pack.thickness": 1.0, "pack.front": -1.0},
-        },
+        {"key": key, "meaning": text, "value": value, "unit": "m", "low": low, "high": high, "moves": moved}
+        for key, text, value, (low, high), moved in controls
     ]
 
 
@@ -249,10 +220,9 @@ def fields_of(waveform: Waveform) -> dict[str, Any]:
 
 def units_of(hammer: Hammer) -> dict[str, list[dict[str, Any]]]:
     """Return the units in which the page shows the quantities of a hammer, with factors, by SI unit."""
-    named = {**SHOWN, **_large(hammer)}
     return {
         si: [{"name": _signed(name), "factor": from_si(1.0, si, name)} for name in names]
-        for si, names in named.items()
+        for si, names in {**SHOWN, **_large(hammer)}.items()
     }
 
 
@@ -281,12 +251,13 @@ def _field(shape: type[Waveform], name: str) -> dict[str, Any]:
 
 def _large(hammer: Hammer) -> dict[str, tuple[str, str]]:
     """Return larger units of time and length for devices slower and larger than printers."""
-    places = [place for place in (hammer.position, hammer.front) if place is not None]
     units: dict[str, tuple[str, str]] = {}
-    if by_voltage(hammer.waveform) and getattr(hammer.waveform, "width", 0.0) > _SLOW:
-        units["s"] = ("ms", "ms")
-    if places and by_voltage(hammer.waveform) and max(places) - min(places) > _WIDE:
-        units["m"] = ("mm", "in")
+    if hammer.waveform is not None and hammer.waveform.quantity == "voltage":
+        if getattr(hammer.waveform, "width", 0.0) > _SLOW:
+            units["s"] = ("ms", "ms")
+        places = [place for place in (hammer.position, hammer.front) if place is not None]
+        if max(places, default=0.0) - min(places, default=0.0) > _WIDE:
+            units["m"] = ("mm", "in")
     return units | {si: (unit, _INCHES.get(unit, unit)) for si, unit in hammer.shown_units.items()}
 
 

@@ -45,20 +45,13 @@ def read_start(written: str) -> tuple[dict[str, Any] | str, Hammer | None]:
     path = Path(written)
     text = read_text(path, "the state")
     if len(text) > LARGEST_MESSAGE:
-        raise InputError(
-            f"{path}: {len(text)} characters",
-            file=path,
-            key="characters",
-            expected=f"at most {LARGEST_MESSAGE}",
-        )
+        raise InputError.of("characters", len(text), f"at most {LARGEST_MESSAGE}", file=path)
     try:
         content = json.loads(text)
     except (ValueError, RecursionError):
         content = None
     if not isinstance(content, dict) or content.get("kind") != KIND:
-        raise InputError(
-            f"{path}: expected a state file of the studio, as its export saves it", file=path, key="state"
-        )
+        raise InputError(f"{path}: expected a state file, as the studio exports it", file=path, key="state")
     if content.get("format") != FORMAT:
         form = str(content.get("format"))[:40]
         raise InputError.of("format", form, FORMAT, file=str(path), written=form)
@@ -67,26 +60,17 @@ def read_start(written: str) -> tuple[dict[str, Any] | str, Hammer | None]:
         raise InputError(f"{path}: state is expected to be a table", file=path, key="state")
     if not (isinstance(own := state.get("text"), str) and own):
         return state, None
-    hammer = hammer_inside(own, f"{path}, text")
+    hammer = _hammer_inside(own, f"{path}, text")
     return {**state, "hammer": hammer.name, "text": ""}, hammer
 
 
-def hammer_inside(text: str, where: str) -> Hammer:
-    """Parse a hammer file embedded in another file; a reference to further files is refused.
-
-    Raises
-    ------
-    InputError
-        The text is not a hammer file, or refers to a table.
-    """
+def _hammer_inside(text: str, where: str) -> Hammer:
+    """Parse a hammer file embedded in another file; a reference to further files is refused."""
     # The parse time of a key grows with the square of the number of its dots.
     dots = max(part.count(".") for part in re.split(r"[\n,=\[\]{}]", text))
     if len(text) > LARGEST_FILE or dots > MOST_DOTS:
-        raise InputError(
-            f"{where}: expected at most {LARGEST_FILE} characters, and keys of at most {MOST_DOTS} dots",
-            file=where,
-            key="text",
-        )
+        expected = f"at most {LARGEST_FILE} characters, and keys of at most {MOST_DOTS} dots"
+        raise InputError(where, file=where, key="text", expected=expected)
     try:
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -94,11 +78,8 @@ def hammer_inside(text: str, where: str) -> Hammer:
         raise InputError(f"{where}: expected a TOML file ({reason})", file=where, key="text") from None
     for name, section in document.items():
         if isinstance(section, Mapping) and "file" in section:
-            raise InputError(
-                f"{where}: {name}.file names another file, which the studio does not read",
-                file=where,
-                key=f"{name}.file",
-            )
+            message = f"{where}: {name}.file names another file, which the studio does not read"
+            raise InputError(message, file=where, key=f"{name}.file")
     hammer = Hammer.from_toml(text, name=where)
     hammer.check()
     return hammer

@@ -13,14 +13,16 @@ import math
 import re
 import struct
 from base64 import b64decode, b64encode
+from collections.abc import Iterable, Mapping
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from printhammer import __version__
 from printhammer.drive.waveforms.drivers import DECAYS
 from printhammer.drive.waveforms.shapes import SHAPES, Sine
-from printhammer.errors import InputError
+from printhammer.errors import InputError, missing_extra
 from printhammer.hammer.file import VIEWS
+from printhammer.hammer.hammer import Hammer
 from printhammer.run.energy import Ledger
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.run.plain.entries import numbers_of, page_module
@@ -28,23 +30,14 @@ from printhammer.run.plain.page import REFUSALS
 from printhammer.run.problem import TOLERANCE, constants_of, fresh_carry, laws_of
 from printhammer.run.window import THRESHOLDS
 from printhammer.studio import bounds
-from printhammer.studio.bundle import deltas, inside, merged, page_files, sources, style
+from printhammer.studio.bundle import deltas, merged, page_files, sources
 from printhammer.studio.controls import SINE, describe, units_of, vocabulary
 from printhammer.studio.launch import FORMAT, KIND
+from printhammer.studio.shelf import Shelf
 from printhammer.support.constants import quantities
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from printhammer.hammer.hammer import Hammer
     from printhammer.kernel.model.laws import Laws
-    from printhammer.studio.shelf import Shelf
-
-_SENTENCES: Final = {
-    "kinds": "this page has no kernel for such a drive of this hammer: expected one whose first hammer it is,"
-    " made with the extra `page`",
-}
-"""Messages of the page about computations that only Python performs, by name."""
 
 
 def live_page(shelf: Shelf, start: Mapping[str, Any] | str = "") -> str:
@@ -73,9 +66,10 @@ def live_page(shelf: Shelf, start: Mapping[str, Any] | str = "") -> str:
     text = json.dumps(content, allow_nan=False, separators=(",", ":")).encode()
     packed = gzip.compress(struct.pack("<I", len(text)) + text + deltas(b"".join(modules)), 9, mtime=0)
     parts = {
-        "style": style(),
+        "style": "\n".join(page_files()[name].decode() for name in ("vendor/uPlot.min.css", "studio.css")),
         "icon": b64encode(page_files()["icon.svg"]).decode(),
-        "start": inside({"text": start} if isinstance(start, str) else {"state": start}),
+        # Without "<", no text ends the enclosing script element.
+        "start": json.dumps({"text" if isinstance(start, str) else "state": start}).replace("<", "\\u003c"),
         "content": b64encode(packed).decode(),
     }
     return re.sub(r"{{(\w+)}}", lambda place: parts[place[1]], page_files()["page.html"].decode())
@@ -84,21 +78,31 @@ def live_page(shelf: Shelf, start: Mapping[str, Any] | str = "") -> str:
 def content_of(shelf: Shelf) -> Any:
     """Compose the content of the page as plain data for JSON."""
     modules: dict[Laws, str] = {}
-    described = {name: _hammer(shelf, name, modules) for name in shelf.names}
-    for name, entry in described.items():
-        entry["modules"] = _places(shelf.hammer(name), entry["described"], modules)
-        entry["described"]["quantities"] = list(entry["modules"])
-    content = {
-        "version": __version__,
-        "names": shelf.names,
-        "vocabulary": vocabulary(),
-        "hammers": described,
-        "modules": list(modules.values()),
-        "limits": _limits(),
-        "sentences": _SENTENCES,
-        "stateFile": {"kind": KIND, "format": FORMAT},
-    }
-    return _plain(content)
+    hammers = {name: _hammer(shelf, name, modules) for name in shelf.names}
+    places = {laws: place for place, laws in enumerate(modules)}
+    for name, entry in hammers.items():
+        hammer, described = shelf.hammer(name), entry["described"]
+        current = [] if hammer.magnet is None else ["current"]
+        voltage = [] if described["rail"] is None else ["voltage"]
+        laws = {quantity: laws_of(hammer, quantity) for quantity in [*current, "force", *voltage]}
+        # Hammers with equal laws share modules.
+        entry["modules"] = {quantity: places[own] for quantity, own in laws.items() if own in places}
+        described["quantities"] = list(entry["modules"])
+    return _plain(
+        {
+            "version": __version__,
+            "names": shelf.names,
+            "vocabulary": vocabulary(),
+            "hammers": hammers,
+            "modules": list(modules.values()),
+            "limits": _limits(),
+            "sentences": {
+                "kinds": "this page has no kernel for such a drive of this hammer: expected one whose first"
+                " hammer it is, made with the extra `page`",
+            },
+            "stateFile": {"kind": KIND, "format": FORMAT},
+        }
+    )
 
 
 def _plain(value: Any) -> Any:
@@ -113,9 +117,7 @@ def _plain(value: Any) -> Any:
 
 def _limits() -> dict[str, Any]:
     """Return the limits of page states and of computation, by name."""
-    named = {name: getattr(bounds, name) for name in vars(bounds) if name.isupper()}
-    named["VIEWS"] = VIEWS
-    named["WAVEFORMS"] = {
+    waveforms = {
         name: {
             "known": ["shape", "quantity", *shape.model_fields],
             "fields": list(quantities(shape)),
@@ -125,18 +127,19 @@ def _limits() -> dict[str, Any]:
         for name, shape in SHAPES.items()
     }
     # The frequency of a continuous force is the rate. Its code is the number of shapes, as in `drive.tables`.
-    named["WAVEFORMS"][Sine.shape] = {
-        "known": ["shape", "quantity", *SINE],
-        "fields": list(SINE),
-        "voltages": [],
-        "decays": False,
+    sine = {"known": ["shape", "quantity", *SINE], "fields": list(SINE), "voltages": [], "decays": False}
+    return {
+        **{name: getattr(bounds, name) for name in vars(bounds) if name.isupper()},
+        "VIEWS": VIEWS,
+        "WAVEFORMS": {**waveforms, Sine.shape: sine},
+        "ENERGIES": [field.name for field in fields(Ledger)],
+        "LINE": _line(),
+        "DISPLAY_TOLERANCE": DISPLAY_TOLERANCE,
+        "TOLERANCE": TOLERANCE,
+        "REFUSALS": REFUSALS,
+        "DECAYS": DECAYS,
+        "WINDOW": THRESHOLDS,
     }
-    named["ENERGIES"] = [field.name for field in fields(Ledger)]
-    named["LINE"] = _line()
-    named |= {"DISPLAY_TOLERANCE": DISPLAY_TOLERANCE, "TOLERANCE": TOLERANCE, "REFUSALS": REFUSALS}
-    named["DECAYS"] = DECAYS
-    named["WINDOW"] = THRESHOLDS
-    return named
 
 
 def _line() -> dict[str, Any]:
@@ -164,59 +167,32 @@ def _line() -> dict[str, Any]:
 
 
 def _hammer(shelf: Shelf, name: str, modules: dict[Laws, str]) -> dict[str, Any]:
-    """Compose the page entry of a hammer, and add its WebAssembly modules to `modules`."""
-    hammer = shelf.hammer(name)
-    described = describe(hammer)
-    entry: dict[str, Any] = {
-        "described": described,
-        "units": units_of(hammer),
-        "text": hammer.to_toml(),
-        "shipped": shelf.is_shipped(name),
-    }
-    _add_modules(hammer, described, name == shelf.names[0], modules)
-    return entry | _numbers(hammer)
-
-
-def _add_modules(hammer: Hammer, described: dict[str, Any], first: bool, modules: dict[Laws, str]) -> None:
-    """Add the modules of a hammer by laws.
+    """Compose the page entry of a hammer, and add its WebAssembly modules to `modules`.
 
     Every hammer has the module of its pulse, or of the pulse that the page initially shows; the first hammer
     also has the modules of a current and of a voltage.
     """
+    hammer = shelf.hammer(name)
+    described = describe(hammer)
     pulse = described["waveform"] or described["start"]["waveform"]
-    further = ["current", "voltage"] if first and described["rail"] is not None else []
+    further = ["current", "voltage"] if name == shelf.names[0] and described["rail"] is not None else []
     for quantity in [pulse["quantity"], *further]:
         laws = laws_of(hammer, quantity)
         if laws in modules:
             continue
         try:
-            content = page_module(laws).content()
+            modules[laws] = b64encode(gzip.compress(page_module(laws).content(), 1)).decode()
         except InputError:
             # Without the linker, modules of other driving quantities are omitted.
             if quantity == pulse["quantity"]:
                 raise
-            continue
-        modules[laws] = b64encode(gzip.compress(content, 1)).decode()
-
-
-def _places(hammer: Hammer, described: dict[str, Any], modules: dict[Laws, str]) -> dict[str, int]:
-    """Return the module indices of a hammer by driving quantity; hammers with equal laws share modules."""
-    possible = {
-        "current": hammer.magnet is not None,
-        "force": True,
-        "voltage": described["rail"] is not None,
-    }
-    indices = {laws: index for index, laws in enumerate(modules)}
-    found = {name: indices.get(laws_of(hammer, name)) for name, may in possible.items() if may}
-    return {name: index for name, index in found.items() if index is not None}
-
-
-def _numbers(hammer: Hammer) -> dict[str, Any]:
-    """Return the arguments of the kernel for a hammer."""
-    numbers = numbers_of(hammer)
     carry = fresh_carry(0.0, (math.pi, 0.0))
     return {
-        "numbers": {name: (keys, _numbers_of(own)) for name, (keys, own) in numbers.items()},
+        "described": described,
+        "units": units_of(hammer),
+        "text": hammer.to_toml(),
+        "shipped": shelf.is_shipped(name),
+        "numbers": {role: (keys, _numbers_of(own)) for role, (keys, own) in numbers_of(hammer).items()},
         "size": len(constants_of(hammer)),
         "carry": _numbers_of(carry),
         "placeOfRest": carry.tolist().index(math.pi),
@@ -230,3 +206,42 @@ def _numbers_of(values: Iterable[float]) -> list[float | str]:
         value if math.isfinite(value) else repr(value).replace("inf", "Infinity").replace("nan", "NaN")
         for value in map(float, values)
     ]
+
+
+def widget(*hammers: Hammer, state: str = "", height: str = "760px") -> Any:
+    """Return the studio as a notebook widget (anywidget), for Jupyter and marimo.
+
+    Parameters
+    ----------
+    *hammers : Hammer
+        Hammers of the page; by default all shipped hammers.
+    state : str, optional
+        State, in the form of the page's address after the #.
+    height : str, optional
+        Height, in the syntax of a style sheet.
+
+    Returns
+    -------
+    anywidget.AnyWidget
+        Widget whose trait `state` follows the settings; setting `state` changes them.
+
+    Raises
+    ------
+    InputError
+        The extra `notebook` is not installed, or a hammer has laws of its own and the extra `page` is not.
+    """
+    try:
+        import anywidget
+        import traitlets
+    except ImportError as error:
+        raise missing_extra(f"the widget needs {error.name}", "notebook") from None
+
+    class StudioWidget(anywidget.AnyWidget):
+        """Notebook widget that shows the page."""
+
+        _esm = page_files()["widget.mjs"].decode()
+        page = traitlets.Unicode("").tag(sync=True)
+        state = traitlets.Unicode("").tag(sync=True)
+        height = traitlets.Unicode("").tag(sync=True)
+
+    return StudioWidget(page=live_page(Shelf(*hammers, only=True)), state=state, height=height)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from printhammer.errors import InputError
-
-if TYPE_CHECKING:
-    from printhammer.hammer.hammer import Hammer
+from printhammer.hammer.hammer import Hammer, load, shipped
 
 DEFAULT: Final = "hendriks-1983"
 """Name of the hammer that a studio page displays by default."""
+
+_load: Final = lru_cache(maxsize=32)(load)
 
 
 class Shelf:
@@ -31,8 +31,6 @@ class Shelf:
     """
 
     def __init__(self, *own: Hammer, only: bool = False) -> None:
-        from printhammer.hammer.hammer import shipped
-
         self.own: dict[str, Hammer] = {}
         for hammer in own:
             if self.own.setdefault(hammer.name, hammer).fingerprint != hammer.fingerprint:
@@ -48,17 +46,8 @@ class Shelf:
 
     def is_shipped(self, name: str) -> bool:
         """Whether the hammer with the name `name` is an unmodified shipped hammer."""
-        from printhammer.hammer.hammer import shipped
-
-        return name in shipped() and self.hammer(name).fingerprint == _shipped(name).fingerprint
+        return name in shipped() and self.hammer(name).fingerprint == _load(name).fingerprint
 
     def hammer(self, name: str) -> Hammer:
         """Return the hammer with the name `name`."""
-        return self.own.get(name) or _shipped(name)
-
-
-@lru_cache(maxsize=32)
-def _shipped(name: str) -> Hammer:
-    from printhammer.hammer.hammer import load
-
-    return load(name)
+        return self.own.get(name) or _load(name)
