@@ -11,7 +11,9 @@ from tests.hammers import CRUDE
 from tests.studio.reading import without_modules
 
 import printhammer as ph
-from printhammer.studio import launch
+from printhammer.cli import runner
+from printhammer.kernel.compile.modules import WebModule
+from printhammer.studio import launch, live
 
 
 @pytest.fixture
@@ -38,6 +40,20 @@ def test_the_page_is_written_and_opened(opened: list[str], cli: Callable) -> Non
     assert cli("studio", CRUDE, "--only", "--no-open").status == 0
     assert len(opened) == 1
     assert len(list(path.parent.iterdir())) == 2
+
+
+def test_the_compilation_of_a_module_is_announced(
+    opened: list[str], cli: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[str] = []
+    monkeypatch.setattr(runner, "say", said.append)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    module = WebModule("no sources", lambda: b"\0asm", "a law that no shipped hammer has")
+    monkeypatch.setattr(live, "page_module", lambda _laws: module)
+    assert cli("studio", CRUDE, "--only", "--no-open").status == 0
+    (sentence,) = [each for each in said if "a law that no shipped hammer has" in each]
+    assert sentence.startswith("compiling WebAssembly")
+    assert opened == []
 
 
 def test_a_page_is_written_to_be_sent_around(opened: list[str], cli: Callable, tmp_path: Path) -> None:

@@ -11,7 +11,15 @@ from threading import Thread
 from typing import TYPE_CHECKING, Final
 
 from printhammer.cli import options as opt
-from printhammer.cli.runner import Answer, Content, Job, load_hammer, tables_beside, verb
+from printhammer.cli.runner import (
+    Answer,
+    Content,
+    Job,
+    announce_compiling,
+    load_hammer,
+    tables_beside,
+    verb,
+)
 from printhammer.cli.screen import Column, table
 from printhammer.cli.terminal import say
 
@@ -52,6 +60,8 @@ def studio(
     for name in hammers or []:
         own.append(load_hammer(name, fired=False))
         job.check(*tables_beside(Path(name), own[-1].magnet, own[-1].waveform))
+    # A page with laws that no shipped hammer has compiles a WebAssembly module.
+    announce_compiling()
     start, inside = read_start(state) if state else ("", None)
     shelf = Shelf(*([inside] if inside else []), *own, only=only)
     if job.outputs:
@@ -107,9 +117,9 @@ def _compile_code(name: str, hammer: Hammer) -> tuple[str, float]:
 
 
 def _announce(sentences: SimpleQueue[str | None]) -> None:
-    from printhammer.run.simulate import announce_compiling
+    from printhammer.run.simulate import announce_compiling as announce
 
-    announce_compiling(sentences.put)
+    announce(sentences.put)
 
 
 @contextmanager

@@ -136,9 +136,9 @@ class WebModule(Module):
         self._label = label
 
     def content(self) -> bytes:
-        """Return the content of the module; announce its compilation, which takes up to a minute."""
+        """Return the content of the module; announce its compilation, which takes up to two minutes."""
         if not self.is_there():
-            say_once(f"compiling WebAssembly ({self._label}): up to a minute; once, kept on disk")
+            say_once(f"compiling WebAssembly ({self._label}): up to two minutes; once, kept on disk")
         return super().content()
 
     @staticmethod
