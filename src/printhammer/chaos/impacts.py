@@ -68,7 +68,9 @@ class Section(Result):
     t_out: FloatArray = column(
         "s", "time of leaving", "touch", more="nan if the contact is open at the end of the run"
     )
-    v_out: FloatArray = column("m/s", "velocity at leaving", "touch", more="nan likewise")
+    v_out: FloatArray = column(
+        "m/s", "velocity at leaving", "touch", more="nan if the contact is open at the end of the run"
+    )
     wanted: int = scalar(
         "1",
         "number of touches requested",

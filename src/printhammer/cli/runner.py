@@ -230,9 +230,9 @@ def verb(
 
     The function declares its options as default values of its parameters; a parameter `job` receives the
     `Job`. `passed` declares options by the parameter names of the library function that the verb calls; the
-    verb receives, as keywords, only those that the user sets. `files` declares the options for output files,
-    in the order of writing. The runner adds --force to verbs that write new files, and --part to verbs that
-    read a hammer or a spec file or have `part` in `passed`.
+    verb receives, as keywords, only the options that the user sets. `files` declares the options for output
+    files, in the order of writing. The runner adds --force to verbs that write new files, and --part to verbs
+    that read a hammer or a spec file or have `part` in `passed`.
     """
 
     def made(function: Callable[..., Answer]) -> Verb:
@@ -367,14 +367,14 @@ def ended_early(statuses: Iterable[object], total: int | None = None) -> list[st
 
 
 def period_text(hammer: Hammer, period: float) -> str:
-    """Scale a period [s] of the paper's hammer to the time scale of a hammer; format it as "1.05 ms"."""
+    """Scale a period [s] of the paper's hammer to the time scale of a hammer; return text like "1.05 ms"."""
     from printhammer.run.window import time_scale
 
     return f"{1e3 * period * time_scale(hammer):.4g} ms"
 
 
 def rate_text(hammer: Hammer, rate: float) -> str:
-    """Scale a rate [Hz] of the paper's hammer to the time scale of a hammer; format it as "952 Hz"."""
+    """Scale a rate [Hz] of the paper's hammer to the time scale of a hammer; return text like "952 Hz"."""
     from printhammer.run.window import scaled_rate
 
     return f"{scaled_rate(hammer, rate):.4g} Hz"
@@ -391,9 +391,10 @@ def firing_of(
 ) -> Firing:
     """Extract the firing options from `passed`; return them as keywords of `Regime.of`.
 
-    If `timed`, exactly one of period and rate is required; a drive file may replace both: a continuous
-    periodic force, or pulses at a constant rate. Error messages suggest a `period`, s, scaled to the device.
-    Raises InputError for a hammer without a waveform, any other drive file, or superfluous options.
+    If `timed`, exactly one of period and rate is required; a drive file may replace period and rate: a
+    continuous periodic force, or pulses at a constant rate. Error messages suggest a `period`, s,
+    scaled to the device. Raises InputError for a hammer without a waveform, any other drive file, or
+    superfluous options.
     """
     file: Path | None = passed.pop("drive", None)
     train = {name: passed.pop(name, None) for name in ("period", "rate", "overlap")}

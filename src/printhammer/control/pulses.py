@@ -97,7 +97,7 @@ def widest(
     """Bisect for the largest pulse width, s, at which the peak current stays within a bound, A.
 
     The search covers the widths from `low` to `high`. The bound is assumed to hold at `low`, which is
-    returned if it holds nowhere above. `peak` maps a pulse to its largest current, A.
+    returned if the bound holds at no larger width. `peak` maps a pulse to its largest current, A.
     """
     if peak(of_width(pulse, high)) <= bound:
         return high

@@ -147,7 +147,7 @@ def integrate(
     Returns
     -------
     SchemeRun
-        States at the start and at the end of every step, or at `moments`; after a failure, only those
+        States at the start and at the end of every step, or at `moments`; after a failure, only the states
         reached.
 
     Raises

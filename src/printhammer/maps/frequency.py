@@ -262,8 +262,8 @@ def rms_difference(computed: xr.Dataset, measured: xr.Dataset) -> tuple[FloatArr
     rates : array, shape (n,)
         Rates common to both maps, Hz.
     difference : array, shape (n,)
-        Root mean square of the difference of their displacements, m, over the times at which both are known;
-        NaN if no such time exists.
+        Root mean square of the difference of their displacements, m, over the times at which both are
+        known; NaN if no such time exists.
     """
     rows, others = matching(computed, measured)
     times = max((chart["time"].values for chart in (measured, computed)), key=_spacing)

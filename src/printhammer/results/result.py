@@ -180,7 +180,7 @@ class Result:
     def save(self, path: str | Path) -> None:
         """Write the result atomically, in a format chosen by the file ending.
 
-        `printhammer.results.reopen` reads it; `printhammer.results.files` describes the formats.
+        `printhammer.results.reopen` reads the file; `printhammer.results.files` describes the formats.
 
         Raises
         ------

@@ -41,8 +41,8 @@ class Contact(Declared):
     loss: float = scalar(
         "J",
         "energy of the armature that the contact dissipated",
-        more="minus the work of the whole pack force, or of the viscous force of the backstop; of an open"
-        " pack contact: so far, what it stores included",
+        more="minus the work of the whole pack force, or of the viscous force of the backstop; for a"
+        " pack contact still open at the end of the run, up to then, stored energy included",
     )
     firing: int | None = part("index of the latest firing at or before the touch")
     extra: bool = part("whether the contact is a pack contact after the first pack contact of its firing")

@@ -248,11 +248,11 @@ class Motion(Result, fields=False):
         return table[:, 0], table[:, 1]
 
     def state_at(self, t: float) -> tuple[float, ...]:
-        """Return the state at a time of the run, s, from which another run can continue: see `simulate`.
+        """Return the state at a time of the run, s, from which another run can start: see `simulate`.
 
-        Displacement, m, velocity, m/s, branch of the pack (-1 outside of it) and memory, m; under a voltage
-        also the currents in the coil and in its shorted turn, A, and the voltage of the supply's capacitor,
-        V. A run that begins with this state and with a firing continues exactly as this run does.
+        Displacement, m, velocity, m/s, branch of the pack (-1 outside the pack) and memory, m; under a
+        voltage also the currents in the coil and in its shorted turn, A, and the voltage of the supply's
+        capacitor, V. A run that begins with this state and with a firing continues exactly as this run does.
 
         Raises
         ------

@@ -107,7 +107,7 @@ def simulate(
 
 
 def announce_compiling(callback: Callable[[str], None], *, helped: bool = True) -> Callable[[], None]:
-    """Register a callback for messages before compilation; return a function that unregisters it.
+    """Register a callback for messages before compilation; return a function that unregisters the callback.
 
     A message names the compiled functions and the expected duration. Further messages report, once each, that
     machine code cannot be cached, or why cached code is invalid. If `helped`, a second process compiles the
@@ -184,7 +184,7 @@ class Touches(Declared):
         "time, s, and velocity, m/s, at touch and at leaving, shape (n, 4)",
         more="NaN for a contact that is open at the end",
     )
-    status: str = part("how the run ended", more='"ok" also where it was ended because of touches enough')
+    status: str = part("how the run ended", more='"ok" also if the run ended after the requested touches')
     reached: float = scalar("s", "time that the run has reached")
 
 

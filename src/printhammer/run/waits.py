@@ -30,7 +30,7 @@ from printhammer.support.arrays import FloatArray
 def waits_of(
     hammers: Sequence[Hammer], waveforms: Sequence[Waveform], threads: int | None = None
 ) -> FloatArray:
-    """Compute the time from last firing to end of each run, s, like `wait_of`, but with ensembles.
+    """Compute the time from the last firing to the end of each run, s, like `wait_of`, by ensembles.
 
     One hammer and one waveform for each run, shape (runs,); equal objects are simulated once. Devices whose
     armature does not rest clear of a pack are simulated singly: most of the work is then the search for the

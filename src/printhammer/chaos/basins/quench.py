@@ -1,9 +1,9 @@
 """Quench map: the effect of a second pulse as a function of its time and its width.
 
 Fig. 6 of F. Hendriks, *Bounce and Chaotic Motion in Impact Print Hammers* (1983), shows two cases: fired
-again after 660 µs, the hammer is braked and prints no second dot; after 700 µs it makes a complete excursion.
-The quench map extends the two cases to a plane: the time between two firings against the width of the second
-pulse, with an unchanged first pulse. Where pulses overlap, their currents add.
+again after 660 µs, the hammer is braked and prints no second dot; after 700 µs the hammer makes a complete
+excursion. The quench map extends the two cases to a plane: the time between two firings against the width of
+the second pulse, with an unchanged first pulse. Where pulses overlap, their currents add.
 
 A drive fires a single waveform. To fire two different pulses without compiling another kernel, one waveform
 contains both pulses, far apart. The drive has four firings, timed so that only the first pulse, at the start
@@ -85,7 +85,9 @@ class QuenchMap(Result):
     single_force: float = scalar(
         "N", "largest pack force of the first pulse alone", more="nan if it makes no dot"
     )
-    single_flight_time: float = scalar("s", "flight time of the first pulse alone", more="nan likewise")
+    single_flight_time: float = scalar(
+        "s", "flight time of the first pulse alone", more="nan if it makes no dot"
+    )
     tail: float = scalar("s", "time after the second firing within which a contact counts as the second dot")
     tolerance: float = part("tolerance of the integration")
 

@@ -133,7 +133,7 @@ class Bifurcation(Result, rows="direction column"):
         "1", "number of the firing", "firing", more="the first firing of a train is number 1", dtype=np.int32
     )
     x: FloatArray = column("m", "displacement", "direction column firing", more="nan after the end of a run")
-    v: FloatArray = column("m/s", "velocity", "direction column firing", more="nan likewise")
+    v: FloatArray = column("m/s", "velocity", "direction column firing", more="nan after the end of a run")
     branch: npt.NDArray[np.int8] = column(
         "1",
         "mode of motion",

@@ -71,7 +71,7 @@ _ASIDE: Final = 0.5
 _NEW_MULTIPLIER: Final = 0.3
 """Largest distance from 1 of a doubled orbit's nearest multiplier, near its period doubling; arbitrary."""
 _HALF_NEAR: Final = 0.05  # Arbitrary
-"""Largest scaled distance between an orbit and one of half its period, for both to meet at a doubling."""
+"""Largest scaled distance at which an orbit and an orbit of half its period meet at a doubling."""
 _HALF_DOUBLES: Final = 0.5
 """Largest distance of a multiplier from -1 at which a nearby period doubling is searched for; arbitrary."""
 

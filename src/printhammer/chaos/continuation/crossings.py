@@ -2,9 +2,9 @@
 
 At a crossing the corrector's matrix A = [dG/du - I, dG/dp] has a null space of two dimensions. With the
 left null vector l of A and the second derivative B of G, the tangents of the two curves are the directions z
-in it for which the equation of the crossing, l B(z, z) = 0, holds (W. J. F. Govaerts, *Numerical Methods for
-Bifurcations of Dynamical Equilibria*, SIAM 2000; H. B. Keller, in P. H. Rabinowitz (ed.), *Applications of
-Bifurcation Theory*, Academic Press 1977, 359).
+in this space for which the equation of the crossing, l B(z, z) = 0, holds (W. J. F. Govaerts, *Numerical
+Methods for Bifurcations of Dynamical Equilibria*, SIAM 2000; H. B. Keller, in P. H. Rabinowitz (ed.),
+*Applications of Bifurcation Theory*, Academic Press 1977, 359).
 
 Where one of the two curves turns back in the parameter, the crossing is a pitchfork; otherwise it is
 transcritical.
@@ -138,7 +138,7 @@ def follow_crossing(
     Raises
     ------
     InputError
-        The direction of the crossing curve is undetermined, or no fixed point lies along it.
+        The direction of the crossing curve is undetermined, or no fixed point lies in this direction.
     """
     corrector = Corrector(family, scales, steps.precision)
     begin, tangents = corrector.point(node), crossing_tangents(corrector, node)

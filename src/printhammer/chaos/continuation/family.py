@@ -61,7 +61,7 @@ class Touch(Declared):
 class Passage(Declared):
     """Contacts of a motion between two sections, with the drive period and the number of firings."""
 
-    touches: tuple[Touch, ...] = part("in order")
+    touches: tuple[Touch, ...] = part("touches in order of time")
     period: float = scalar("s", "time between firings")
     firings: int = part("number of firings between the two sections")
 

@@ -127,7 +127,7 @@ class BifurcationCurve(Result, rows="point"):
         return Summary([Grid(columns), "", self.message])
 
     @property
-    @derived("1", "whether stability is lost, the other multiplier being inside the unit circle", "point")
+    @derived("1", "whether a stable orbit loses its stability at the point", "point")
     def limits(self) -> BoolArray:
         """Mask, shape (N,), of the points at which a stable orbit loses its stability."""
         if self.kind == "grazing":

@@ -48,8 +48,8 @@ def index_sums(orbits: Sequence[tuple[int, npt.NDArray[np.complex128]]], longest
 
     The index of a fixed point is the sign of det(I - M), with M the derivative of the map over that number of
     firings: -1 for a saddle with a multiplier beyond +1, else +1. If the map is continuous and maps a disc
-    into itself, the indices of all fixed points in it add up to 1 (S. Lefschetz, Trans. Am. Math. Soc. 28
-    (1926) 1). `orbits` are pairs of the number of firings and the multipliers of an orbit.
+    into itself, the indices of all fixed points in the disc add up to 1 (S. Lefschetz, Trans. Am. Math. Soc.
+    28 (1926) 1). `orbits` are pairs of the number of firings and the multipliers of an orbit.
     """
     sums = {}
     for count in range(1, longest + 1):

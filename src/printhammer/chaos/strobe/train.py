@@ -275,7 +275,7 @@ FINER: Final = (0.1, 0.01)
 def _at_finer(
     trains: Sequence[Train], judged: tuple[int, int], effort: Effort
 ) -> list[tuple[tuple[float, str], ...]]:
-    """Recompute the periods of trains at a tenth and a hundredth of the tolerance; return both as text.
+    """Recompute the periods of trains at a tenth and a hundredth of the tolerance, as text.
 
     Between two rests small errors grow; if they reach the size of the motion, rounding decides its period.
     """

@@ -1,7 +1,7 @@
 """Closed-loop simulation: hammers, position sensor, and a controller that decides before pack contacts.
 
 All runs are advanced from decision to decision together. At each decision the controller knows the sensor
-readings so far, and nothing else of the driven hammer. The result is an ordinary drive.
+readings so far, and nothing else about the driven hammer. The result is an ordinary drive.
 """
 
 from __future__ import annotations

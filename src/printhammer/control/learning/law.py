@@ -176,9 +176,9 @@ _LEAST_LAW: Final = 1e-2  # Lower bound of the fraction a of the model error tha
 _OTHERS: Final = 4  # Number of posterior samples on which the convergence condition is checked; arbitrary
 _ALIKE: Final = 24  # Number of posterior samples on which table and open loops are compared; arbitrary
 _GAIN: Final = 0.02
-"""Smallest mean gain of a table, as a fraction of the dots, with which it is used; arbitrary."""
+"""Smallest mean gain, as a fraction of the dots, at which a table is used; arbitrary."""
 SURE: Final = 0.9
-"""Smallest fraction of posterior samples that favour an open loop for it to be chosen; arbitrary."""
+"""Smallest fraction of posterior samples that have to favour an open loop for its choice; arbitrary."""
 
 TRIED: Final = slots_of(cycle_with_lead_in(6, 0))
 """Slots of the line on which corrections are evaluated in simulation: the de Bruijn cycle of order 6."""

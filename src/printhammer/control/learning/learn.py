@@ -333,9 +333,9 @@ def learn(
     the posterior explains the readings, and if no posterior sample prints fewer dots of the test cycle and of
     rows of 200 slots with the table than in open loop, or a row in which errors grow from dot to dot.
     Otherwise one of two open-loop drives is used: the pulse of the driver, or the hammer's own pulse. Before
-    the first run, the unit prints a short line in both. Of the two, the drive that prints more dots over the
+    the first run, the unit prints a short line with each of the two. The drive that prints more dots over the
     production is used, unless 90 % of the posterior samples given all readings print no fewer dots with the
-    other. `loop_certainty` of the result is that fraction for the drive in use; below 0.9, or NaN, the
+    other drive. `loop_certainty` of the result is that fraction for the drive in use; below 0.9, or NaN, the
     readings do not decide between the two drives.
 
     Parameters

@@ -233,7 +233,8 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         Parameters
         ----------
         hammer : Hammer
-            The hammer for which the table was tuned. The strategy may then drive hammers that differ from it.
+            The hammer for which the table was tuned. The strategy may then drive hammers that differ
+            from this hammer.
         serial : str, optional
             Serial number of the driven unit; `ANY_UNIT` drives any unit with a table that was learned on one
             unit. A table that was not learned is valid for every unit.
@@ -422,7 +423,7 @@ def mixed(first: Settings, second: Settings, share: float) -> Settings:
 
 
 def checked_tick(tick: float | str) -> float:
-    """Convert a tick to seconds; raise `InputError` unless it is a whole number of nanoseconds."""
+    """Convert a tick to seconds; raise `InputError` unless the tick is a whole number of nanoseconds."""
     asked = read_positive(tick, "s", "tick")
     count = round(asked / NANOSECOND)
     if count < 1 or abs(asked / NANOSECOND - count) > _NEAR * count:

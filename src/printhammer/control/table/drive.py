@@ -65,7 +65,7 @@ def number_of(history: Sequence[int], reach: int) -> int:
 
 
 def histories(gaps: int, reach: int) -> list[History]:
-    """List all distinct histories, those with the fewest gaps before a rest first."""
+    """List all distinct histories, sorted by the number of gaps before a rest."""
     every = itertools.product(range(reach + 1), repeat=gaps)
     return sorted((row for row in every if row == plain(row)), key=lambda row: (gaps - row.count(REST), row))
 

@@ -78,8 +78,8 @@ class TableReport(Result, rows=_AXES):
         "1",
         "multiplier of a small error from dot to dot in a row",
         "strategy driven rate",
-        more="the larger one of rows with a dot in every slot and in every second slot; NaN if neither is a"
-        " periodic orbit",
+        more="the larger multiplier of rows with a dot in every slot and in every second slot; NaN if neither"
+        " is a periodic orbit",
     )
     force_deviation: FloatArray = part(
         "relative force deviation of every dot of the cycle at the first rate, for the table's hammer, shape"

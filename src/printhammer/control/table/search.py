@@ -66,7 +66,7 @@ _CLOSE: Final = 8e-6  # Spacing of the periods of the close search, s; arbitrary
 _LATER: Final = (-22e-6, -8e-6, 8e-6, 22e-6)
 _WIDER: Final = (0.75, 0.9, 1.0, 1.15, 1.35)  # Brake width factors of the close search; arbitrary
 _LEAST_BRAKE: Final = 0.05
-"""Smallest width of a brake pulse, as a fraction of the hammer's own width; arbitrary."""
+"""Smallest width of a brake pulse, as a fraction of the width of the hammer's own pulse; arbitrary."""
 # Penalty for a change of branch between neighbouring periods, where the table is not interpolated; arbitrary
 _SWITCH: Final = 0.15
 _SAME: Final = 1e-6  # Firing-time difference below which two candidates are duplicates, s; arbitrary

@@ -128,8 +128,8 @@ class Task:
     def brake_from(self) -> float:
         """Earliest time of a brake pulse, s, measured from the slot of the preceding dot.
 
-        By then the armature has left the pack and the print pulse has decayed, even if it is late or wide by
-        `_WIDE`.
+        By then the armature has left the pack and the print pulse has decayed, even if the pulse is late or
+        wide by `_WIDE`.
         """
         return float(max(self.single.left, self.width + _WIDE * self.scale + self.faded))
 

@@ -40,7 +40,7 @@ def solve(
     bounded: Bounded,
     longest: float = LONGEST_STEP,
 ) -> FloatArray:
-    """Minimise each dot's deviation over firing time and width, s; return both, shape (dots, 2).
+    """Minimise each dot's deviation over firing time and width; return these values, s, shape (dots, 2).
 
     The method is Levenberg-Marquardt (J. Nocedal and S. J. Wright, *Numerical Optimization*, ch. 10).
 

@@ -133,7 +133,7 @@ def new_figure(height: float, width: float = WIDTH, layout: _Layout = "constrain
 
 
 def new_panel(height: float, width: float = WIDTH) -> tuple[Figure, Axes]:
-    """Create a figure with a single panel, sizes in inches; return both."""
+    """Create a figure with a single panel, sizes in inches; return figure and panel."""
     figure = new_figure(height, width)
     return figure, figure.add_subplot()
 

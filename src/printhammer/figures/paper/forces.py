@@ -329,7 +329,7 @@ def _colours(count: int) -> list[str]:
 def _label_curves(
     ax: Axes, x: FloatArray, lines: FloatArray, curves: dict[str, FloatArray], further: list[FloatArray]
 ) -> None:
-    """Label each of `curves` far from the other curves, from those in `further`, and from position lines."""
+    """Label each of `curves` far from the other curves, the curves `further`, and the position lines."""
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
     across = (x - left) / (right - left)
     up = {name: (values - bottom) / (top - bottom) for name, values in curves.items()}

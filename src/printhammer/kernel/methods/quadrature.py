@@ -96,7 +96,7 @@ def powers(
 
 @compiled
 def electric_powers(t: float, x: float, hammer: Hammer, drive: Drive) -> tuple[float, float, float, float]:
-    """Return the power delivered by the supply and those dissipated in coil, driver and shorted turn [W].
+    """Return the powers delivered by the supply and dissipated in coil, driver and shorted turn [W].
 
     Losses in the supply's internal resistance and in the diodes are counted as driver losses.
     """

@@ -124,7 +124,7 @@ def bicubic(table: Grid) -> FloatArray:
 
 
 def cell_at_zero(table: Grid) -> tuple[int, float]:
-    """Return the index of the interval of currents that contains 0 A, and the offset of 0 A in it, A."""
+    """Return the index of the interval of currents around 0 A, and the offset of 0 A from its start, A."""
     import numpy as np
 
     current = table.current

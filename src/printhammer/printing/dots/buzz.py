@@ -350,7 +350,7 @@ class _Search:
         intervals: Sequence[float],
         trains: Sequence[tuple[float, ...]],
     ) -> list[BuzzTrain]:
-        """Simulate trains; return those with a dot in the force range and a current within the limit."""
+        """Simulate trains; return the trains with a dot in the force range and a current within the limit."""
         self.tried += len(trains)
         judged = []
         for interval, times in zip(intervals, trains, strict=True):

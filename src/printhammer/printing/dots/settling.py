@@ -80,7 +80,7 @@ class Settling(Declared):
 
 
 def settle(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float = TOLERANCE) -> Settling:
-    """Simulate one pulse from rest (default: the hammer's own); compute settling and backstop wear."""
+    """Simulate one pulse from rest, by default the hammer's; compute settling and backstop wear."""
     if hammer.position is None:
         raise InputError(
             f"{hammer.path}: the hammer has no backstop",

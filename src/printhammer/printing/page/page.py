@@ -372,7 +372,7 @@ def print_page(
         Slot rate, Hz, or text with a unit: the largest firing rate of a wire. The carriage moves one pitch
         per slot.
     waveform : Waveform, optional
-        Waveform of every firing in open loop, and of the single pulse; by default the hammer's own.
+        Waveform of every firing in open loop, and of the single pulse; by default the waveform of the hammer.
     strategy, limits
         As for `printhammer.safe_rate`.
     head : Head, optional

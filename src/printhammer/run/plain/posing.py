@@ -1,4 +1,4 @@
-"""Scales of a run, coil circuit, and window (time from last firing to end of run), as plain functions.
+"""Scales of a run, coil circuit, and window (from the last firing to the end of a run), as plain functions.
 
 `printhammer.run.problem`, `printhammer.run.supply` and `printhammer.run.window` call these functions, and so
 do the entry points of a page in `printhammer.run.plain.page`.
@@ -25,19 +25,19 @@ CYCLE: Final = 4e-3
 """Smallest default time from switch-off of the supply to the end of a run, s."""
 
 FLIGHTS: Final = 3.0
-"""Smallest time from last firing to end of run, in flight times of a single pulse."""
+"""Smallest time from the last firing to the end of a run, in flight times of a single pulse."""
 
 SETTLED: Final = 0.05
 """Largest distance from rest at the end of a run, as a fraction of the distance from rest to the pack."""
 
 PATIENCE: Final = 16.0
-"""Largest time from last firing to end of run if the armature does not settle, in flight times."""
+"""Largest time from the last firing to the end of a run if the armature does not settle, in flight times."""
 
 LONGEST: Final = 64.0
-"""Largest time from last firing to end of run if no dot is made, in units of displacement over speed."""
+"""Largest time from the last firing to the end of a run without a dot, in displacement over speed."""
 
 LAST: Final = 1.0
-"""Upper limit of the time from last firing to end of run, s."""
+"""Upper limit of the time from the last firing to the end of a run, s."""
 
 
 PAPER_X: Final = (38.1e-6, 88.9e-6)
