@@ -65,6 +65,7 @@ def lowered_modules() -> Files:
     from printhammer.parts import PARTS
     from printhammer.parts.friction import DryFriction
     from printhammer.parts.spring.forces import ForceSum
+    from printhammer.parts.spring.sums import DampedForceSum
     from printhammer.run.plain import entries
 
     def lowered(module: Module) -> tuple[str, Callable[[], bytes | None]]:
@@ -80,7 +81,7 @@ def lowered_modules() -> Files:
     yield from map(lowered, (*every_template(), *entries.templates(), scheme))
     for role in LAW_FUNCTIONS:
         parts = {part.__module__ for (known, _), part in PARTS.items() if known == role}
-        parts |= {part.__module__ for part in (ForceSum, DryFriction) if part.role == role}
+        parts |= {part.__module__ for part in (DampedForceSum, DryFriction, ForceSum) if part.role == role}
         for name in ("", *sorted(parts)):
             bindings = bindings_of(Laws(**{**_ABSENT, role: name}))
             yield from (lowered(laws_of(role, bindings, for_lanes)) for for_lanes in (False, True))

@@ -39,6 +39,7 @@ DIMENSIONS: dict[str, str] = {
     "N/m": "a stiffness",
     "N/m^3": "a cubic stiffness",
     "N s/m": "a linear damping",
+    "s/m": "a damping relative to the contact force",
     "N/m^1.5": "a Hertz stiffness",
     "N s/m^2.5": "a contact damping",
     "N^0.5 m^0.25": "a root of force times the fourth root of length",

@@ -112,6 +112,23 @@ def test_lists_are_edited_in_place() -> None:
     assert more.replace("contact.back.side", "front").fingerprint != more.fingerprint
 
 
+def test_a_contact_with_damping_dissipates() -> None:
+    elastic = ph.Hammer.from_toml(WHOLE)
+    damped = elastic.replace("contact.no.damping", "300 ms/m")
+    assert (elastic.is_damped, damped.is_damped) == (False, True)
+    assert damped.constants["contact.no.damping"].si == pytest.approx(0.3)
+    assert "contact.no.damping" not in elastic.constants
+    assert ph.Hammer.from_toml(damped.to_toml()) == damped
+    spring = damped.spring
+    assert spring is not None
+    viscous = spring.function("spring_viscous")
+    c = spring.packed(0.1e-3)
+    assert viscous(c, 0.39e-3, 1.0) == 0.0
+    assert viscous(c, 0.6e-3, 0.5) == pytest.approx(-3000.0 * 0.2e-3 * 0.15)
+    # The contact opens faster than its elastic force allows: the whole force is 0, it does not pull.
+    assert viscous(c, 0.6e-3, -5.0) == pytest.approx(3000.0 * 0.2e-3)
+
+
 def test_a_weight_follows_the_mass_and_needs_no_spring() -> None:
     hammer = ph.Hammer.from_toml(HEAD + WEIGHT)
     for mass in (2e-3, 5e-3):
@@ -133,6 +150,8 @@ def test_a_weight_follows_the_mass_and_needs_no_spring() -> None:
         (CONTACT.replace('side = "front"\n', ""), "contact.no.side"),
         (CONTACT.replace('"front"', '"top"'), "contact.no.side"),
         (CONTACT.replace("0.4", "0.05"), "contact.no.position"),
+        (CONTACT + f"damping = {written(0.0, 's/m')}\n", "contact.no.damping"),
+        (CONTACT + f"damping = {written(0.3, 'N s/m')}\n", "contact.no.damping"),
         (CONTACT + POLE.replace("0.5", "0.4"), "contact.pole.position"),
         ("".join(WEIGHT.replace('"weight"', f'"w{k}"') for k in range(12)), "force"),
     ],

@@ -90,7 +90,23 @@ def solver(
     """DOP853 from state ``z`` at ``t`` to ``end``, with errors measured by the scales of the system."""
     scales: Any = np.full(z.size, system.mass * system.speed**2)
     scales[:2] = system.length, system.speed
-    return DOP853(rates, t, z, end, rtol=TOLERANCE, atol=TOLERANCE * scales, first_step=first_step)
+    # The force of a damped contact grows with depth times speed: a trial step far too long would overflow.
+    times = (
+        math.sqrt(system.mass / (contact.stiffness * system.length ** (contact.exponent - 1.0)))
+        for contact in system.contacts
+        if contact.loss
+    )
+    longest = min(times, default=math.inf)
+    return DOP853(
+        rates,
+        t,
+        z,
+        end,
+        rtol=TOLERANCE,
+        atol=TOLERANCE * scales,
+        first_step=None if first_step is None else min(first_step, longest),
+        max_step=longest,
+    )
 
 
 def flow(system: System, rates: Rates, t: float, z: Array, end: float) -> Array:

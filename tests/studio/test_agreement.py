@@ -225,8 +225,12 @@ def test_a_page_fires_records_and_drivers_of_the_coil(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("dry", "front"), [(False, False), (True, False), (False, True)])
-def test_a_page_follows_forces_and_contacts(tmp_path: Path, dry: bool, front: bool) -> None:
+@pytest.mark.parametrize(
+    ("dry", "front", "damping"), [(False, False, 0.4), (True, False, None), (False, True, None)]
+)
+def test_a_page_follows_forces_and_contacts(
+    tmp_path: Path, dry: bool, front: bool, damping: float | None
+) -> None:
     contact = {"law": "hertz", "side": "front", "position": 0.3e-3, "stiffness": 1e5}
     hammer = ph.Hammer.build(1e-3, name="listed").replace(
         {
@@ -238,6 +242,8 @@ def test_a_page_follows_forces_and_contacts(tmp_path: Path, dry: bool, front: bo
     )
     if dry:
         hammer = hammer.replace("force.guide", {"law": "friction", "kinetic": 0.1, "static": 0.3})
+    if damping:
+        hammer = hammer.replace("contact.make.damping", damping)
     if front:
         hammer = hammer.replace("pack", {"law": "rigid", "front": 0.4e-3, "restitution": 0.6})
     # Without a magnet no voltage drives the device, so that its exponents exist under dry friction, too.

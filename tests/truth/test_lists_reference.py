@@ -20,11 +20,12 @@ STROKE = 1e-3
 
 
 def draw(
-    rng: np.random.Generator, *, dry: bool = False, front: bool = False
+    rng: np.random.Generator, *, dry: bool = False, front: bool = False, lossy: bool = False
 ) -> tuple[ph.Hammer, ph.PulseTrain, System]:
     """Return a hammer with a rigid backstop at 0, its drive, and the same system for the oracle.
 
-    With `dry`, the hammer has dry friction; with `front`, also a rigid stop on the paper side.
+    With `dry`, the hammer has dry friction; with `front`, also a rigid stop on the paper side; with `lossy`,
+    most of its contacts are damped.
     """
 
     def log(low: float, high: float) -> float:
@@ -52,7 +53,10 @@ def draw(
         k = log(1e3, 1e6) * (1e4**0.5 if exponent == 1.5 else 1.0)
         law = "hertz" if exponent == 1.5 else "linear"
         terms[f"contact.c{i}"] = {"law": law, "side": side, "position": position, "stiffness": k}
-        contacts.append(Contact(f"c{i}", side, position, k, exponent))
+        loss = log(0.02, 2.0) if lossy and rng.random() < 0.8 else 0.0
+        if loss:
+            terms[f"contact.c{i}"]["damping"] = loss
+        contacts.append(Contact(f"c{i}", side, position, k, exponent, loss))
     frictions = []
     if dry:
         kinetic = log(0.1, 1.0)
@@ -87,15 +91,18 @@ def horizon(system: System, x: float, v: float, times: np.ndarray, truth: Run) -
     return int(np.argmax(apart)) if apart.any() else times.size
 
 
-def check(seed: int, count: int, *, dry: bool = False, front: bool = False) -> tuple[int, int, int]:
+def check(
+    seed: int, count: int, *, dry: bool = False, front: bool = False, lossy: bool = False
+) -> tuple[int, int, int]:
     """Compare random hammers; return the numbers of closings, sticking phases and impacts compared."""
-    rng = np.random.default_rng([38, seed, 1 + 2 * front] if dry or front else [38, seed])
+    kind = 1 + 2 * front + 4 * lossy
+    rng = np.random.default_rng([38, seed, kind] if dry or front or lossy else [38, seed])
     closings = sticks = impacts = 0
     times = np.linspace(0.0, END, 121)
     # At 1e-12, one of 160 hammers, with 18 closings of Hertz contacts, differs by 1.1e-8 strokes.
     tolerance = 1e-13 if front else 1e-12
     for _ in range(count):
-        hammer, drive, system = draw(rng, dry=dry, front=front)
+        hammer, drive, system = draw(rng, dry=dry, front=front, lossy=lossy)
         x, v = float(rng.uniform(0.05, 0.3)) * STROKE, float(rng.uniform(-0.5, 0.5))
         motion = ph.simulate(hammer, drive, duration=END, times=times, state=(x, v), tolerance=tolerance)
         truth = simulate(system, x, v, END)
@@ -172,3 +179,14 @@ def test_random_lists_between_two_stops(dry: bool) -> None:
 @pytest.mark.parametrize("seed", [200, 201])
 def test_many_random_lists_between_two_stops(seed: int) -> None:
     assert check(seed, 40, dry=seed % 2 == 1, front=True)[2] > 60
+
+
+@pytest.mark.parametrize("dry", [False, True])
+def test_random_lists_with_damped_contacts(dry: bool) -> None:
+    assert check(3, 8, dry=dry, lossy=True)[0] > 12
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(300, 304))
+def test_many_random_lists_with_damped_contacts(seed: int) -> None:
+    assert check(seed, 40, dry=seed % 2 == 1, lossy=True)[0] > 60

@@ -268,8 +268,10 @@ class _Look:
         """Compute the acceleration at a touch, m/s^2, before an impact if the surface is rigid."""
         row = self.problem.resample(self.record, np.array([contact.t_in]))[0]
         if contact.peak_force is None:
-            damping, constants = law_of(self.problem.hammer, self.problem.hammer.damping, "damping_force")
-            row[8] = damping(constants, contact.v_in)
+            hammer = self.problem.hammer
+            damping, constants = law_of(hammer, hammer.damping, "damping_force")
+            viscous, rows = law_of(hammer, hammer.spring, "spring_viscous")
+            row[8] = damping(constants, contact.v_in) + viscous(rows, row[0], contact.v_in)
         return _acceleration(self.problem, row, *without)
 
     def _in_pack(

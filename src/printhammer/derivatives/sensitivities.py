@@ -311,7 +311,7 @@ def sensitivities(
     record = problem.run(end)
     motion = Motion(problem, record, end, np.array([0.0]), "default")
     scales = np.array([parameter.scale for parameter in wanted])
-    energies = [name for name in RUN_QUANTITIES if name != "damping_loss" or hammer.damping is not None]
+    energies = [name for name in RUN_QUANTITIES if name != "damping_loss" or hammer.is_damped]
     run = np.array([getattr(motion.energy, name) for name in energies])
     shape = (len(motion.dots), len(DOT_QUANTITIES))
     if motion.ok:

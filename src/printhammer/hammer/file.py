@@ -31,7 +31,8 @@ from printhammer.parts import PARTS, ROLES, BackstopPart, MagnetPart, PackPart, 
 from printhammer.parts.friction import DryFriction, with_friction
 from printhammer.parts.functions import check_functions
 from printhammer.parts.outside import load_installed
-from printhammer.parts.spring.forces import TERMS, ForceSum, Friction, Term, sum_of
+from printhammer.parts.spring.forces import TERMS, ForceSum, Friction, Term
+from printhammer.parts.spring.sums import sum_of
 from printhammer.support.constants import (
     STATUSES,
     Constant,

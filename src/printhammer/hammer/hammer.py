@@ -233,6 +233,11 @@ class Hammer:
         return part if isinstance(part, DampingPart) else None
 
     @property
+    def is_damped(self) -> bool:
+        """Whether a damping, or a contact of the list ``[[contact]]``, dissipates energy of the armature."""
+        return self.damping is not None or (self.spring is not None and self.spring.viscous)
+
+    @property
     def parts(self) -> Mapping[str, Part]:
         """Parts of the hammer that are present, by role."""
         return MappingProxyType(self._contents.parts)

@@ -13,7 +13,9 @@ magnet    ``magnet_force(c, x, current)``, ``magnet_energy(c, x)``; for a coil d
           ``magnet_inductance(c, x, current)`` and ``magnet_current(c, x, linkage, inductance)``
 coil      none: its circuit is the kernel's, `printhammer.kernel.model.circuit`
 spring    ``spring_force(c, x)``, ``spring_energy(c, x)``; a law whose slope jumps also ``LEVELS`` = True and
-          ``spring_level(c, k)``, the position of the k-th jump
+          ``spring_level(c, k)``, the position of the k-th jump; one that dissipates energy ``VISCOUS`` =
+          True and ``spring_viscous(c, x, v)``, its force at the velocity v, 0 at rest;
+          if its slope jumps also ``spring_switch(c, v)``
 pack      ``MEMORY``, ``pack_loading(c, x, v)``, ``pack_memory(c, peak)``, ``pack_unloading(c, x, v, q)``,
           ``pack_switch(c, x, v)``; a rigid stop instead ``RIGID_FRONT`` = True and
           ``pack_rebound(c, v_in)``

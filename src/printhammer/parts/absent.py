@@ -12,6 +12,7 @@ MEMORY = False
 RIGID_FRONT = False
 RIGID = False
 LEVELS = False
+VISCOUS = False
 FRICTION = False
 
 
@@ -58,6 +59,16 @@ def spring_energy(c: Any, x: float) -> float:
 def spring_level(c: Any, k: float) -> float:
     """Return infinity: the force of the spring has no kink."""
     return math.inf
+
+
+def spring_viscous(c: Any, x: float, v: float) -> float:
+    """Return 0 N, the dissipative force: the spring is elastic."""
+    return 0.0
+
+
+def spring_switch(c: Any, v: float) -> float:
+    """Return 1, without a sign change: the dissipative force has no kink."""
+    return 1.0
 
 
 def pack_loading(c: Any, x: float, v: float) -> float:

@@ -130,9 +130,17 @@ class CoilPart(Part):
 
 
 class SpringPart(Part):
-    """Base class of springs, with the law `spring_force(c, x)` and `spring_energy(c, x)`."""
+    """Base class of springs, with the law `spring_force(c, x)` and `spring_energy(c, x)`.
+
+    A spring that dissipates energy also has `VISCOUS` and `spring_viscous`.
+    """
 
     role: ClassVar[str] = "spring"
+
+    @property
+    def viscous(self) -> bool:
+        """Whether the spring dissipates energy."""
+        return bool(self.function("VISCOUS"))
 
 
 class PackPart(Part):

@@ -223,7 +223,7 @@ class Motion(Result, fields=False):
         drive = table[:, 2] if self.drive.quantity == "force" else np.zeros(len(table))
         columns = [*table[:, 3:9].T, drive]
         named = dict(zip(FORCES, [*columns, np.sum(columns, axis=0)], strict=True))
-        if self.hammer.damping is None:
+        if not self.hammer.is_damped:
             del named["drag"]
         return MappingProxyType(named)
 
@@ -420,7 +420,7 @@ class Motion(Result, fields=False):
             if force
             else f"coil {quantity(energy.coil_work, 'J')}"
         )
-        damping = "" if self.hammer.damping is None else f" + damping {quantity(energy.damping_loss, 'J')}"
+        damping = f" + damping {quantity(energy.damping_loss, 'J')}" if self.hammer.is_damped else ""
         balance = (
             f"{work} = pack {quantity(energy.pack_loss, 'J')}"
             f" + backstop {quantity(energy.backstop_loss, 'J')}"

@@ -51,9 +51,9 @@ class SchemeProblem(Problem):
     ) -> None:
         if not (math.isfinite(scale) and scale > 0.0):
             raise InputError.of("step_scale", scale, "a positive number")
-        if hammer.damping is not None:
+        if hammer.is_damped:
             raise InputError(
-                f"{hammer.path}: the schemes of 1983 expect a hammer without [damping]",
+                f"{hammer.path}: the schemes of 1983 expect a hammer without damping",
                 file=hammer.path,
                 key="damping",
             )

@@ -196,7 +196,7 @@ def _hammer(shelf: Shelf, name: str, modules: dict[Laws, str]) -> dict[str, Any]
         "size": len(constants_of(hammer)),
         "carry": _numbers_of(carry),
         "placeOfRest": carry.tolist().index(math.pi),
-        "damped": hammer.damping is not None,
+        "damped": hammer.is_damped,
     }
 
 

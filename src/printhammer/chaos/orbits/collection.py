@@ -71,13 +71,13 @@ def fewest_missing(sums: Mapping[int, int]) -> int:
 def indices_add_up(regime: Regime) -> bool:
     """Whether the fixed-point indices sum to 1 by theory: without a pack, and with damping or a backstop."""
     hammer = regime.hammer
-    return hammer.pack is None and (hammer.damping is not None or hammer.backstop is not None)
+    return hammer.pack is None and (hammer.is_damped or hammer.backstop is not None)
 
 
 def energies_of(regime: Regime) -> list[str]:
     """Return the names of the energies in a summary: drive work, and losses of the hammer's components."""
     work = "drive_work" if regime.fired.quantity == "force" else "coil_work"
-    damping = [] if regime.hammer.damping is None else ["damping_loss"]
+    damping = ["damping_loss"] if regime.hammer.is_damped else []
     return [work, "pack_loss", "backstop_loss", *damping]
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _CHOICES = {
     "pack": ("MEMORY", "RIGID_FRONT"),
     "backstop": ("RIGID",),
-    "spring": ("LEVELS",),
+    "spring": ("LEVELS", "VISCOUS"),
     "damping": ("FRICTION",),
 }
 """Choices that the module of a part sets, by role."""
@@ -70,6 +70,7 @@ def bindings_of(laws: Laws) -> Bindings:
         choices[f"HAS_{role.upper()}"] = bool(name)
         for choice in _CHOICES.get(role, ()):
             choices[choice] = bool(getattr(module, choice, False))
+    choices["HAS_DAMPING"] |= choices["VISCOUS"]
     return Bindings(names, choices, digests, packing)
 
 

@@ -42,9 +42,11 @@ if TYPE_CHECKING:
         LEVELS,
         MEMORY,
         PACK_PULLS,
+        VISCOUS,
         backstop_switch,
         pack_switch,
         spring_level,
+        spring_switch,
     )
 
 State = Any
@@ -235,6 +237,29 @@ def land_on_push(start: State, h: float, upper: float, law: ForceLaw, control: C
     return t + high * h, x1, v1, a1
 
 
+@inlined
+def is_cut(v0: float, v1: float, hammer: Hammer) -> bool:
+    """Whether the dissipative force of the spring has a kink between two velocities [m/s]."""
+    return spring_switch(hammer[SPRING:PACK], v0) * spring_switch(hammer[SPRING:PACK], v1) < 0.0
+
+
+@called
+def land_on_cut(start: State, h: float, upper: float, law: ForceLaw, control: Control) -> State:
+    """Locate by bisection a kink of the dissipative force in a step `h`, up to fraction `upper`."""
+    t, x, v, a = start
+    low, high = 0.0, upper
+    while (high - low) * h > 1e-15 * control[0] / control[1]:
+        middle = 0.5 * (low + high)
+        if not (low < middle < high):
+            break
+        if is_cut(v, plain_step(t, x, v, a, middle * h, law)[1], law.hammer):
+            high = middle
+        else:
+            low = middle
+    x1, v1, a1, _ex, _ev = plain_step(t, x, v, a, high * h, law)
+    return t + high * h, x1, v1, a1
+
+
 @compiled
 def level_switch(
     start: State, end: State, h: float, level: float, sign: float, law: ForceLaw, control: Control
@@ -386,6 +411,9 @@ def advance(
             end = (turn[0], turn[1], turn[2], turn[3])
         else:
             end = land_on_level(start, h, fraction, upper, level, sign, law, control)
+        if VISCOUS and end[0] > t and is_cut(v, end[2], law.hammer):
+            end = land_on_cut(start, h, min(1.0, (end[0] - t) / h), law, control)
+            switch = M.REACHED_LEVEL
         if LEVELS and h > shortest and end[0] > t and is_near_level(x, end[1], law.hammer):
             # Near a kink, a law may be a fractional power of the distance: the error of the step is then as
             # large as its estimate, and must meet the smaller tolerance.

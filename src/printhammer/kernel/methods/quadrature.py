@@ -19,7 +19,6 @@ from printhammer.kernel.model.layout import (
     CHARGED,
     CHARGING,
     COILS,
-    DAMPING,
     DECAY_PIECE,
     FRONT,
     INVERSE_MASS,
@@ -27,7 +26,6 @@ from printhammer.kernel.model.layout import (
     POSITION,
     RESERVOIR_PIECE,
     RESISTANCE,
-    SPRING,
     TURN_RESISTANCE,
     Train,
 )
@@ -42,7 +40,7 @@ if TYPE_CHECKING:
         path_of,
         source_of,
     )
-    from printhammer.kernel.model.forces import Hammer, friction, pack_force, value_at
+    from printhammer.kernel.model.forces import Hammer, friction, pack_force, value_at, viscous_force
     from printhammer.kernel.model.laws import (
         FORCE_DRIVE,
         FRICTION,
@@ -50,7 +48,6 @@ if TYPE_CHECKING:
         RIGID_FRONT,
         backstop_energy,
         backstop_viscous,
-        damping_force,
         magnet_force,
     )
     from printhammer.kernel.model.pulses import Drive, edges_at, pass_edges
@@ -88,7 +85,7 @@ def powers(
     backstop = 0.0
     if mode == M.BACKSTOP:
         backstop = -backstop_viscous(hammer[BACKSTOP_PART:MAGNET], w, v) * v
-    damping = -damping_force(hammer[DAMPING:SPRING], v) * v
+    damping = -viscous_force(x, v, hammer) * v
     if FRICTION:
         damping -= friction(mode, memory, hammer) * v
     return coil, force, pack, backstop, damping

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
         HAS_PACK,
         MEMORY,
         RIGID_FRONT,
+        VISCOUS,
         backstop_elastic,
         backstop_viscous,
         damping_force,
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
         pack_loading,
         pack_unloading,
         spring_force,
+        spring_viscous,
     )
     from printhammer.kernel.model.pulses import Drive, drive_value
 
@@ -71,10 +73,18 @@ def undamped_force(t: float, x: float, hammer: Hammer, drive: Drive) -> float:
 
 
 @inlined
+def viscous_force(x: float, v: float, hammer: Hammer) -> float:
+    """Return the sum of the damping force and of the dissipative force of the spring [N]."""
+    if VISCOUS:
+        return damping_force(hammer[DAMPING:SPRING], v) + spring_viscous(hammer[SPRING:PACK], x, v)
+    return damping_force(hammer[DAMPING:SPRING], v)
+
+
+@inlined
 def field_force(t: float, x: float, v: float, hammer: Hammer, drive: Drive) -> float:
     """Return the sum of magnet, spring, damping and drive force [N]; equations (3) and (4) of the paper."""
     if HAS_DAMPING:
-        return undamped_force(t, x, hammer, drive) + damping_force(hammer[DAMPING:SPRING], v)
+        return undamped_force(t, x, hammer, drive) + viscous_force(x, v, hammer)
     return undamped_force(t, x, hammer, drive)
 
 

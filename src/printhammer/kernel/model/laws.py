@@ -67,7 +67,7 @@ LAW_FUNCTIONS = {
         "magnet_inductance",
         "magnet_current",
     ),
-    "spring": ("spring_force", "spring_energy", "spring_level"),
+    "spring": ("spring_force", "spring_energy", "spring_level", "spring_viscous", "spring_switch"),
     "pack": ("pack_loading", "pack_memory", "pack_unloading", "pack_switch", "pack_rebound"),
     "backstop": (
         "backstop_elastic",
@@ -101,6 +101,7 @@ MEMORY: bool
 RIGID_FRONT: bool
 RIGID: bool
 LEVELS: bool
+VISCOUS: bool
 FRICTION: bool
 FORCE_DRIVE: bool
 PACK_PULLS: bool
@@ -140,6 +141,11 @@ spring_energy: Law1
 spring_level: Law1
 """Position [m] at which the slope of the spring force changes; argument: index of the position, from 0;
 infinity if there are fewer positions."""
+spring_viscous: Law2
+"""Dissipative force of the spring [N], zero at zero velocity; arguments: displacement [m], velocity [m/s]."""
+spring_switch: Law1
+"""Sign function of the dissipative force, which changes sign where the slope of this force jumps; argument:
+velocity [m/s]."""
 damping_force: Law1
 """Damping force on the armature [N], a differentiable function; argument: velocity [m/s]."""
 friction_force: Law1

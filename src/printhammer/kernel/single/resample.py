@@ -14,7 +14,6 @@ from printhammer.kernel.model import modes as M
 from printhammer.kernel.model.circuit import BLOCKED
 from printhammer.kernel.model.layout import (
     BACKSTOP_PART,
-    DAMPING,
     ELECTRIC,
     INVERSE_MASS,
     MAGNET,
@@ -40,7 +39,14 @@ if TYPE_CHECKING:
         take_path,
         turn_current,
     )
-    from printhammer.kernel.model.forces import Hammer, acceleration, friction, pack_force, value_at
+    from printhammer.kernel.model.forces import (
+        Hammer,
+        acceleration,
+        friction,
+        pack_force,
+        value_at,
+        viscous_force,
+    )
     from printhammer.kernel.model.laws import (
         FORCE_DRIVE,
         FRICTION,
@@ -50,7 +56,6 @@ if TYPE_CHECKING:
         RIGID_FRONT,
         backstop_elastic,
         backstop_viscous,
-        damping_force,
         magnet_force,
         pack_memory,
         spring_force,
@@ -195,7 +200,7 @@ def resample(
         compressed = mode in (M.BACKSTOP, M.HELD)
         out[row, 6] = backstop_elastic(hammer[BACKSTOP_PART:MAGNET], w) if compressed else 0.0
         out[row, 7] = backstop_viscous(hammer[BACKSTOP_PART:MAGNET], w, v) if compressed else 0.0
-        out[row, 8] = damping_force(hammer[DAMPING:SPRING], v)
+        out[row, 8] = viscous_force(x, v, hammer)
         if FRICTION:
             memory = memory_of(mode, kept, hammer)
             out[row, 8] += friction(mode, memory, hammer)

@@ -134,7 +134,7 @@ def whole_field_slope(x: float, y: Any, setting: Setting) -> float:
     """Return d(magnet and spring force)/d(displacement) [N/m], at fixed flux linkage."""
     scales, bounds, hammer, live, _forcing = setting
     value = value_at(y[V.TIME], x, hammer, driven(live, electric_in(y)))
-    field = field_slope(x, value, scales, bounds, hammer)
+    field = field_slope(x, y[1], value, scales, bounds, hammer)
     if HAS_CIRCUIT:
         with_x, _with_linkage, force = current_slopes(x, electric_in(y), hammer, live)
         return field + force * with_x

@@ -106,15 +106,15 @@ def column_rates(
         rates[1] = acceleration(y[V.TIME], y[0], v, mode, memory, hammer, drive)
     rates[V.TIME] = pace
     slopes = force_slopes(y, mode, memory, peak, peaks, setting)
+    x = hammer[POSITION] - y[0] * y[0] if HAS_BACKSTOP and mode == BACKSTOP else y[0]
     by_x = (pace * slopes[0] + slopes[1]) * hammer[INVERSE_MASS]
-    by_v = pace * (slopes[2] + damping_slope(v, scales, hammer)) * hammer[INVERSE_MASS]
+    by_v = pace * (slopes[2] + damping_slope(x, v, scales, hammer)) * hammer[INVERSE_MASS]
     by_peak = slopes[3] * hammer[INVERSE_MASS]
     for k in range(columns.shape[1]):
         j = V.FIRST_COLUMN + CHANGING * k
         rates[j] = pace * y[j + 1]
         rates[j + 1] = by_x * y[j] + by_v * y[j + 1] + by_peak * columns[V.PEAK, k]
     if HAS_CIRCUIT:
-        x = hammer[POSITION] - y[0] * y[0] if mode == BACKSTOP else y[0]
         add_circuit(rates, y, columns.shape[1], x, True, setting)
         if FORCED:
             add_supply(rates, y, columns.shape[1], x, setting)
@@ -134,12 +134,12 @@ def longest_step(mode: int, memory: float, peak: float, work: Any, setting: Sett
     slopes = force_slopes(work[V.START], mode, memory, peak, work[V.MEMORIES], setting)
     pace = 2.0 * work[V.START, 0] if mode == BACKSTOP else 1.0
     by_x = (pace * slopes[0] + slopes[1]) * setting.hammer[INVERSE_MASS]
-    by_v = slopes[2] + damping_slope(work[V.START, 1], setting.scales, setting.hammer)
+    place = work[V.START, 0]
+    x = setting.hammer[POSITION] - place * place if mode == BACKSTOP else place
+    by_v = slopes[2] + damping_slope(x, work[V.START, 1], setting.scales, setting.hammer)
     by_v *= pace * setting.hammer[INVERSE_MASS]
     rate = max(math.sqrt(abs(pace * by_x)), abs(by_v))
     if HAS_CIRCUIT:
-        place = work[V.START, 0]
-        x = setting.hammer[POSITION] - place * place if mode == BACKSTOP else place
         rate = max(rate, pace * circuit_pace(x, work[V.START], setting))
     return LONGEST_PHASE / rate if rate > 0.0 else math.inf
 

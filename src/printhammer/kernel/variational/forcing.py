@@ -34,7 +34,7 @@ from printhammer.kernel.variational.slopes import BACKWARD, CENTRAL, FORWARD, OF
 
 if TYPE_CHECKING:
     from printhammer.kernel.model.circuit import driven
-    from printhammer.kernel.model.forces import Hammer, pack_force, value_at
+    from printhammer.kernel.model.forces import Hammer, pack_force, value_at, viscous_force
     from printhammer.kernel.model.laws import (
         BACKSTOP_PULLS,
         CHANGING,
@@ -46,6 +46,7 @@ if TYPE_CHECKING:
         LEVELS,
         PACK_PULLS,
         RIGID_FRONT,
+        VISCOUS,
         backstop_elastic,
         backstop_energy,
         backstop_rebound,
@@ -58,6 +59,8 @@ if TYPE_CHECKING:
         pack_switch,
         spring_force,
         spring_level,
+        spring_switch,
+        spring_viscous,
     )
     from printhammer.kernel.model.pulses import Drive, piece_change, piece_rate
     from printhammer.kernel.variational.circuit import (
@@ -173,13 +176,26 @@ def field_changes(
 
 
 @inlined
-def damping_change(v: float, k: int, forcing: Forcing) -> float:
-    """Return the derivative of the damping force with respect to constant k, at a fixed velocity."""
+def damping_change(x: float, v: float, k: int, setting: Setting) -> float:
+    """Return the derivative of damping and dissipative spring force with constant k, at a fixed state."""
+    forcing = setting.forcing
     total = 0.0
     if HAS_DAMPING and forcing.of_hammer[k] & V.DAMPING_MOVES:
         for i in range(POINTS[CENTRAL]):
             c = forcing.varied[k, V.MIDDLE + int(OFFSETS[CENTRAL, i])][DAMPING:SPRING]
             total += WEIGHTS[CENTRAL, i] * damping_force(c, v)
+    if VISCOUS and forcing.of_hammer[k] & V.FIELD_MOVES:
+        side = smooth_side(x, k, setting)
+        number = spring_switch(forcing.varied[k, V.MIDDLE][SPRING:PACK], v)
+        if side == CENTRAL and spring_switch(forcing.varied[k, V.MIDDLE + 2][SPRING:PACK], v) * number <= 0.0:
+            side = BACKWARD
+        elif (
+            side == CENTRAL and spring_switch(forcing.varied[k, V.MIDDLE - 2][SPRING:PACK], v) * number <= 0.0
+        ):
+            side = FORWARD
+        for i in range(POINTS[side]):
+            c = forcing.varied[k, V.MIDDLE + int(OFFSETS[side, i])][SPRING:PACK]
+            total += WEIGHTS[side, i] * spring_viscous(c, x, v)
     return float(total / V.SPACING)
 
 
@@ -290,12 +306,17 @@ def add_forcing(
     coil, coil_x = 0.0, 0.0
     if not FORCE_DRIVE and value != 0.0:
         coil = magnet_force(hammer[MAGNET:], x, value) - magnet_force(hammer[MAGNET:], x, 0.0)
-        coil_x = field_x - field_slope(x, 0.0, scales, bounds, hammer)
+        coil_x = field_x - field_slope(x, v, 0.0, scales, bounds, hammer)
     coil_linkage, main = 0.0, 0
     if HAS_CIRCUIT:
         current = current_slopes(x, electric_in(y), hammer, live)
         coil_linkage = current[2] * current[1]
         main = CHANGING - V.ELECTRICS + int(hammer[TURN_RESISTANCE] > 0.0)
+    drag_x = 0.0
+    if VISCOUS:
+        drag_x = field_slope(x, v, 0.0, scales, bounds, hammer) - field_slope(
+            x, 0.0, 0.0, scales, bounds, hammer
+        )
     loss = 0.0
     if compressed:
         loss = backstop_viscous(hammer[BACKSTOP_PART:MAGNET], w, v)
@@ -307,10 +328,12 @@ def add_forcing(
         change, coil_change, drive_part = field_changes(t, x, value, with_value, k, drive, setting)
         e = j + V.STATE - V.ENERGY
         if HAS_DAMPING:
-            drag = damping_change(v, k, forcing)
+            drag = damping_change(x, v, k, setting)
             change += drag
-            by_v = damping_slope(v, scales, hammer) * v + damping_force(hammer[DAMPING:SPRING], v)
+            by_v = damping_slope(x, v, scales, hammer) * v + viscous_force(x, v, hammer)
             rates[e + V.DAMPING_LOSS] = -pace * (drag * v + by_v * dv)
+            if VISCOUS:
+                rates[e + V.DAMPING_LOSS] -= pace * drag_x * dx * v
         surface, push, lost = 0.0, 0.0, 0.0
         if compressed:
             surface = moves[k, POSITION]

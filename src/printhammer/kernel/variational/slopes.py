@@ -15,7 +15,6 @@ import numpy as np
 from printhammer.kernel.compile.compiling import compiled, inlined
 from printhammer.kernel.model.layout import (
     BACKSTOP_PART,
-    DAMPING,
     FRONT,
     MAGNET,
     MOST_LEVELS,
@@ -25,7 +24,7 @@ from printhammer.kernel.model.layout import (
 from printhammer.kernel.model.modes import LOADING
 
 if TYPE_CHECKING:
-    from printhammer.kernel.model.forces import Hammer, pack_force
+    from printhammer.kernel.model.forces import Hammer, pack_force, viscous_force
     from printhammer.kernel.model.laws import (
         BACKSTOP_PULLS,
         FORCE_DRIVE,
@@ -34,16 +33,18 @@ if TYPE_CHECKING:
         LEVELS,
         MEMORY,
         PACK_PULLS,
+        VISCOUS,
         backstop_elastic,
         backstop_switch,
         backstop_viscous,
-        damping_force,
         magnet_force,
         pack_memory,
         pack_switch,
         pack_unloading,
         spring_force,
         spring_level,
+        spring_switch,
+        spring_viscous,
     )
 
 FIELD_SPACING = 2e-4
@@ -100,9 +101,10 @@ def smooth_bounds(node: Any, after: Any, bounds: Any, hammer: Hammer) -> Any:
 
 
 @compiled
-def field_slope(x: float, value: float, scales: Any, bounds: Any, hammer: Hammer) -> float:
+def field_slope(x: float, v: float, value: float, scales: Any, bounds: Any, hammer: Hammer) -> float:
     """Return the derivative of magnet and spring force with respect to displacement [N/m].
 
+    The spring force includes its dissipative part, at the velocity `v` [m/s]; `value` is that of the drive.
     `scales` holds the scales of displacement and velocity; `bounds` is the result of `smooth_bounds`.
     """
     to_end = min(x - bounds[0], bounds[1] - x)
@@ -121,20 +123,31 @@ def field_slope(x: float, value: float, scales: Any, bounds: Any, hammer: Hammer
         side = BACKWARD
     total = 0.0
     for k in range(POINTS[side]):
-        total += WEIGHTS[side, k] * field_at(x + OFFSETS[side, k] * spacing, value, hammer)
+        at = x + OFFSETS[side, k] * spacing
+        total += WEIGHTS[side, k] * field_at(at, value, hammer)
+        if VISCOUS:
+            total += WEIGHTS[side, k] * spring_viscous(hammer[SPRING:PACK], at, v)
     return float(total / spacing)
 
 
 @compiled
-def damping_slope(v: float, scales: Any, hammer: Hammer) -> float:
-    """Return the derivative of the damping force with respect to velocity [N s/m]."""
+def damping_slope(x: float, v: float, scales: Any, hammer: Hammer) -> float:
+    """Return the derivative of damping force and dissipative spring force with velocity [N s/m]."""
     if not HAS_DAMPING:
         return 0.0
     spacing = SPEED_SPACING * scales[1]
+    side = CENTRAL
+    if VISCOUS:
+        c = hammer[SPRING:PACK]
+        number = spring_switch(c, v)
+        if spring_switch(c, v + 2.0 * spacing) * number <= 0.0:
+            side = BACKWARD
+        elif spring_switch(c, v - 2.0 * spacing) * number <= 0.0:
+            side = FORWARD
     total = 0.0
-    for k in range(POINTS[CENTRAL]):
-        at = v + OFFSETS[CENTRAL, k] * spacing
-        total += WEIGHTS[CENTRAL, k] * damping_force(hammer[DAMPING:SPRING], at)
+    for k in range(POINTS[side]):
+        at = v + OFFSETS[side, k] * spacing
+        total += WEIGHTS[side, k] * viscous_force(x, at, hammer)
     return float(total / spacing)
 
 

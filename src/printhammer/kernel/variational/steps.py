@@ -125,7 +125,7 @@ def place_of_rest(t: float, node: Any, k: int, columns: Any, setting: Setting) -
     else:
         with_x = pack_slopes(x, 0.0, M.LOADING, 0.0, x, scales, hammer)[0]
         change += pack_change(x, 0.0, M.LOADING, k, forcing) - with_x * moves[k, FRONT]
-    with_x += field_slope(x, value, scales, bounds, hammer)
+    with_x += field_slope(x, 0.0, value, scales, bounds, hammer)
     if HAS_CIRCUIT:
         current_x, by_linkage, force = current_slopes(x, electric_at_node(node), hammer, live)
         main = ELECTRIC_ROW + int(hammer[TURN_RESISTANCE] > 0.0)
@@ -144,8 +144,8 @@ def settle(pause: float, node: Any, columns: Any, setting: Setting) -> float:
     scales, bounds, hammer = setting.scales, setting.bounds, setting.hammer
     x, w = node[1], node[4]
     slopes = contact_slopes(w, 0.0, scales, hammer)
-    by_x = (field_slope(x, 0.0, scales, bounds, hammer) - slopes[0] / (2.0 * w)) * hammer[INVERSE_MASS]
-    by_v = (slopes[1] + damping_slope(0.0, scales, hammer)) * hammer[INVERSE_MASS]
+    by_x = (field_slope(x, 0.0, 0.0, scales, bounds, hammer) - slopes[0] / (2.0 * w)) * hammer[INVERSE_MASS]
+    by_v = (slopes[1] + damping_slope(x, 0.0, scales, hammer)) * hammer[INVERSE_MASS]
     half = 0.5 * by_v
     under_root = half * half + by_x
     if under_root < 0.0:

@@ -221,7 +221,7 @@ def pass_release(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
     if rate * held <= 0.0:
         return False
     value = value_at(t, after[1], hammer, drive)
-    by_x = field_slope(after[1], value, setting.scales, setting.bounds, hammer)
+    by_x = field_slope(after[1], 0.0, value, setting.scales, setting.bounds, hammer)
     if HAS_PACK and mode == M.HELD_LOADING:
         by_x += pack_slopes(after[1], 0.0, M.LOADING, memory, node[4], setting.scales, hammer)[0]
     behind = acceleration_at(after, branch_of(int(after[3])), after[4], 0.0, hammer, drive)

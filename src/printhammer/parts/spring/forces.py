@@ -7,24 +7,24 @@ the position x0 of an entry and the indentation d of a contact, the sum is
        - sum of  K d^n,  d = x - x0 > 0                 contacts on the front side
        + sum of  K d^n,  d = x0 - x > 0                 contacts on the back side
 
-Source: Newton's law of gravity near the ground, Hooke's law; H. Hertz (1882) for n = 3/2. A contact is
-elastic, and its force is continuous when it closes. Several contacts may be closed at once, also together
-with pack or backstop: in a relay, the contact spring engages before the armature meets the pole. Validity:
-quasi-static contacts. Weakness: contacts have neither damping nor mass.
+Source: Newton's law of gravity near the ground, Hooke's law; H. Hertz (1882) for n = 3/2. The force of a
+contact is continuous when the contact closes. Several contacts may be closed at once, also together with pack
+or backstop: in a relay, the contact spring engages before the armature meets the pole. Contacts with damping
+have a dissipative part as well: `printhammer.parts.spring.sums`. Validity: quasi-static contacts. Weakness:
+contacts have no mass.
 
 Packed constants: c[0] is the number of rows. The five numbers of a row follow: 0, x0, F, B, D for a force; 1
-(front) or -1 (back), x0, K, n, 0 for a contact.
+(front) or -1 (back), x0, K, n, chi for a contact with the damping chi, 0 if the contact is elastic.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any, ClassVar, Final, Literal, Self
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, model_validator
 
-from printhammer.errors import InputError
 from printhammer.parts.base import SpringPart
 from printhammer.support.constants import quantity
 
@@ -191,7 +191,7 @@ class Friction(Term):
 
 
 class LinearContact(Term):
-    """Linear spring that acts on one side of a position."""
+    """Linear spring that acts on one side of a position, with or without damping."""
 
     law: ClassVar[str] = "linear"
     power: ClassVar[float] = 1.0
@@ -201,14 +201,22 @@ class LinearContact(Term):
     """Side of the armature that touches: the front if x > `position`, the back if x < `position`."""
     position: float = quantity("m", "x0", "position at which the contact closes")
     stiffness: float = quantity("N/m", "K", "stiffness of the contact", gt=0)
+    damping: float | None = quantity(
+        "s/m", "chi", "damping: share of the elastic force per unit speed of indentation", gt=0, default=None
+    )
+
+    @property
+    def sign(self) -> float:
+        """Direction of motion in which the indentation grows, 1 toward the paper, or -1."""
+        return FRONT if self.side == "front" else BACK
 
     def row(self, mass: float) -> Row:
         """Return the row of packed constants of the contact."""
-        return (FRONT if self.side == "front" else BACK, self.position, self.stiffness, self.power, 0.0)
+        return (self.sign, self.position, self.stiffness, self.power, self.damping or 0.0)
 
-    def force(self, depth: float) -> float:
-        """Return the contact force, N, at an indentation, m."""
-        return float(self.stiffness * depth**self.power)
+    def force(self, depth: Any, rate: Any = 0.0) -> Any:
+        """Return the contact force, N, at indentations, m, and their rates, m/s, numbers or arrays."""
+        return self.stiffness * depth**self.power * np.maximum(1.0 + (self.damping or 0.0) * rate, 0.0)
 
 
 class HertzContact(LinearContact):
@@ -244,49 +252,3 @@ class ForceSum(SpringPart):
         """Return the packed constants; `origin` is the position of the backstop, m."""
         constants = [0.0] * ROOM
         return tuple(constants[: spring_packed(self.numbers(), origin, constants)])
-
-
-def sum_of(spring: SpringPart | None, terms: Mapping[str, Term], mass: float) -> ForceSum:
-    """Build the sum of a spring, if any, and of additional forces and contacts.
-
-    Parameters
-    ----------
-    spring : SpringPart or None
-        Spring of the hammer.
-    terms : mapping
-        Forces and contacts by key, such as "force.weight".
-    mass : float
-        Mass of the armature, kg.
-
-    Raises
-    ------
-    InputError
-        The spring has a law that cannot be added, two contacts on the same side have the same position, or
-        there are more than `MOST` terms.
-    """
-    rows = [] if spring is None else [_spring_row(spring)]
-    taken: dict[tuple[float, float], str] = {}
-    for key, term in terms.items():
-        row = term.row(mass)
-        place = (row[0], row[1])
-        if row[0] != 0.0 and taken.setdefault(place, key) != key:
-            raise InputError.of(
-                f"{key}.position", row[1], f"another position than that of {taken[place]}", unit="m"
-            )
-        rows.append(row)
-    if len(rows) > MOST:
-        raise InputError.of("force", len(rows), f"at most {MOST} forces and contacts, the spring included")
-    return ForceSum(rows=tuple(rows))
-
-
-def _spring_row(spring: SpringPart) -> Row:
-    """Convert a spring to a row; raise InputError unless its law is `linear`, `preload` or `cubic`."""
-    values = {name: getattr(spring, name) for name in spring.names()}
-    if spring.law == "linear":
-        return (0.0, math.nan, values["Bs"], -values["Bs"] / values["As"], 0.0)
-    if spring.law == "preload":
-        return (0.0, math.nan, values["preload"], -values["stiffness"], 0.0)
-    if spring.law == "cubic":
-        return (0.0, values["center"], 0.0, -values["stiffness"], -values["cubic"])
-    expected = "linear, preload or cubic beside [[force]] and [[contact]]"
-    raise InputError.of("spring.law", spring.law, expected)

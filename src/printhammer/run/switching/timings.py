@@ -118,8 +118,7 @@ def _timing(
     # A short pulse may be over before the contact switches.
     released = [time for time in back if max(off, min(forth, default=math.inf)) <= time < end]
     operated = [time for time in forth if time < min(released, default=math.inf)]
-    place = float(problem.resample(record, np.array([min(off, end) if makes else end]))[0, 0])
-    depth = (place - contact.position) * (1.0 if makes else -1.0)
+    x, v = problem.resample(record, np.array([min(off, end) if makes else end]))[0, :2]
     during = [each for each in closings if each.t_in < end and (each.t_out is None or each.t_out > on)]
     return Timing(
         contact=name,
@@ -132,7 +131,7 @@ def _timing(
         release_time=released[0] - off if released else None,
         release_bounce=released[-1] - released[0] if released else None,
         largest_force=max((each.peak_force for each in during), default=0.0),
-        final_force=contact.force(max(depth, 0.0)),
+        final_force=float(contact.force(max(contact.sign * (x - contact.position), 0.0), contact.sign * v)),
     )
 
 
@@ -147,7 +146,8 @@ def timing_facts(timings: Sequence[Timing], closings: Sequence[Closing], end: fl
             mine = [each for each in closings if each.contact == name]
             count = f"{len(mine)} {'closing' if len(mine) == 1 else 'closings'}"
             most = quantity(max(each.peak_force for each in mine), "N")
-            rows.append((f"contact {name}", f"{count} from {quantity(mine[0].t_in, 's')}, up to {most}"))
+            span = f"{count} from {quantity(mine[0].t_in, 's')}"
+            rows.append((f"contact {name}", f"{span}, up to {most}{_lost(mine)}"))
     for name in dict.fromkeys(each.contact for each in timings):
         own = [each for each in timings if each.contact == name]
         forth, back = ("closes", "opens") if own[0].kind == "make" else ("opens", "closes")
@@ -156,7 +156,8 @@ def timing_facts(timings: Sequence[Timing], closings: Sequence[Closing], end: fl
             _phrase(back, "switch-off", [(each.release_time, each.release_bounce) for each in own]),
         ]
         largest = quantity(max(each.largest_force for each in own), "N")
-        rows.append((f"contact {name}", ", ".join([*told, f"up to {largest}"])))
+        lost = _lost([each for each in closings if each.contact == name])
+        rows.append((f"contact {name}", ", ".join([*told, f"up to {largest}{lost}"])))
     last = max((each.firing for each in timings), default=-1)
     held = [each for each in timings if each.firing == last and _is_held(each)]
     if held:
@@ -165,6 +166,12 @@ def timing_facts(timings: Sequence[Timing], closings: Sequence[Closing], end: fl
             ("release", f"not seen: the run ends at {quantity(end, 's')}, before the release of {names}")
         )
     return rows
+
+
+def _lost(closings: Sequence[Closing]) -> str:
+    """Describe the energy that a contact dissipated; an empty text for an elastic contact."""
+    loss = math.fsum(each.loss for each in closings)
+    return f", dissipates {quantity(loss, 'J')}" if loss else ""
 
 
 def _is_held(timing: Timing) -> bool:
