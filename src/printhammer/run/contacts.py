@@ -352,20 +352,25 @@ def _force_and_loss(
     """Return the largest force, N, and the loss, J, of a closing; `times` are the times of its nodes, s."""
     starts, lengths = times[:-1, np.newaxis], np.diff(times)[:, np.newaxis]
     points, weights = np.polynomial.legendre.leggauss(_POINTS)
+    places, shares = np.tile(0.5 * (points + 1.0), (len(starts), 1)), np.tile(0.5 * weights, (len(starts), 1))
+    # At the touch and at the opening, the power is a fractional power of the time: integrate over its root.
+    shares[0], places[0] = 2.0 * places[0] * shares[0], places[0] ** 2
+    if len(starts) > 1:
+        shares[-1], places[-1] = 2.0 * places[-1] * shares[-1], 1.0 - places[-1] ** 2
 
     def motion(at: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Compute indentations, m, and their rates, m/s, at given times, s."""
         states = problem.resample(record, at)
         return np.maximum(contact.sign * (states[:, 0] - contact.position), 0.0), contact.sign * states[:, 1]
 
-    depths, rates = motion((starts + 0.5 * lengths * (points + 1.0)).ravel())
+    depths, rates = motion((starts + lengths * places).ravel())
     powers = ((contact.force(depths, rates) - contact.force(depths)) * rates).reshape(-1, _POINTS)
     grid = np.append((starts + lengths * np.linspace(0.0, 1.0, _POINTS, endpoint=False)).ravel(), times[-1])
     for _ in range(_ZOOMS):
         sampled = contact.force(*motion(grid))
         best = int(np.argmax(sampled))
         grid = np.linspace(grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)], _POINTS)
-    return float(sampled[best]), float(0.5 * np.sum(powers @ weights * lengths[:, 0]))
+    return float(sampled[best]), float(np.sum(powers * shares * lengths))
 
 
 def _closed_steps(inside: FloatArray, inward: FloatArray) -> BoolArray:

@@ -23,9 +23,12 @@ from printhammer.kernel.model.layout import (
     FRONT,
     INVERSE_MASS,
     MAGNET,
+    MOST_LEVELS,
+    PACK,
     POSITION,
     RESERVOIR_PIECE,
     RESISTANCE,
+    SPRING,
     TURN_RESISTANCE,
     Train,
 )
@@ -46,9 +49,11 @@ if TYPE_CHECKING:
         FRICTION,
         HAS_CIRCUIT,
         RIGID_FRONT,
+        VISCOUS,
         backstop_energy,
         backstop_viscous,
         magnet_force,
+        spring_level,
     )
     from printhammer.kernel.model.pulses import Drive, edges_at, pass_edges
     from printhammer.kernel.single.resample import drive_at, drive_in_step, memory_of, state_in_step
@@ -130,6 +135,27 @@ def energy_behind(x: float, hammer: Hammer) -> float:
     return backstop_energy(hammer[BACKSTOP_PART:MAGNET], math.sqrt(max(hammer[POSITION] - x, 0.0)))
 
 
+@compiled
+def kink_side(node: Any, after: Any, hammer: Hammer) -> float:
+    """Return 1 if a step off the backstop begins on a kink of the spring law, -1 if it ends on one, else 0.
+
+    Beyond the kink, the dissipative force of a contact may be a fractional power of the distance, hence of
+    the time. The square root of the time since, or until, the kink makes the power smooth.
+    """
+    if int(node[3]) == M.BACKSTOP:
+        return 0.0
+    side = 0.0
+    for k in range(MOST_LEVELS):
+        level = spring_level(hammer[SPRING:PACK], float(k))
+        if math.isinf(level):
+            break
+        if node[1] == level:
+            return 1.0
+        if after[1] == level:
+            side = -1.0
+    return side
+
+
 @entry
 def quadratures(
     steps: Any,
@@ -184,6 +210,13 @@ def quadratures(
         if regular:
             low = s_at(starts[row], t0, kept, v0, kv0, hammer, start)
             high = s_at(ends[row], t0, kept, v0, kv0, hammer, start)
+        side = 0.0
+        if VISCOUS:
+            side = kink_side(nodes[i], nodes[min(i + 1, nodes.shape[0] - 1)], hammer)
+            if side != 0.0:
+                kink = t0 if side > 0.0 else nodes[i + 1, 0]
+                low = side * math.sqrt(max(side * (starts[row] - kink), 0.0))
+                high = side * math.sqrt(max(side * (ends[row] - kink), 0.0))
         for j in range(8):
             point = POINTS[j] if j < 4 else -POINTS[j - 4]
             weight = WEIGHTS[j] if j < 4 else WEIGHTS[j - 4]
@@ -195,6 +228,9 @@ def quadratures(
                 share *= 2.0 * w
             else:
                 t = place
+                if VISCOUS and side != 0.0:
+                    t = kink + side * place * place
+                    share *= 2.0 * side * place
                 x, v, w = state_in_step(t, t0, x0, v0, mode, kept, hammer, start)
             drive = drive_in_step(t, nodes[i], hammer, start)
             coil, force, pack, backstop, damping = powers(t, x, v, w, mode, memory, hammer, drive)
