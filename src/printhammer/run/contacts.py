@@ -24,7 +24,7 @@ from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 _BISECTIONS: Final = 52  # Number of bisections: the bits of a double's mantissa
 _POINTS: Final = 8  # Points per step, for the quadrature as in the energy ledger
-_ZOOMS: Final = 12  # Refinements of the time of the largest force, each by a factor of 3.5; by arithmetic
+_ZOOMS: Final = 12  # Refinements of the time of the largest force, each by a factor of 3.5; arbitrary
 
 
 class Contact(Declared):
