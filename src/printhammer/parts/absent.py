@@ -132,21 +132,21 @@ def backstop_rebound(c: Any, v_in: float) -> float:
 
 
 def magnet_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants of a law without its own packing function: the values before the domain."""
+    """Write the packed constants of a law that has no packing function: all values but the range."""
     for k in range(len(q) - 2):
         c[k] = q[k]
     return max(len(q) - 2, 0)
 
 
 def magnet_domain(q: Any, ends: Any) -> None:
-    """Write the displacement range, m, of a law without its own domain function: the last two numbers."""
+    """Write the displacement range, m: the last two values of a law that has no domain function."""
     ends[0], ends[1] = -math.inf, math.inf
     if len(q) > 1:
         ends[0], ends[1] = q[len(q) - 2], q[len(q) - 1]
 
 
 def _copy(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants of a law without its own packing function: the values of the part."""
+    """Write the packed constants of a law that has no packing function: the values of the part."""
     for k in range(len(q)):
         c[k] = q[k]
     return len(q)

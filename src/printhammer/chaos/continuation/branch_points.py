@@ -65,7 +65,7 @@ _AMPLITUDE: Final = 1e-2
 """First scaled distance from a period doubling at which to seek the doubled orbit; arbitrary."""
 _LEAST_AMPLITUDE: Final = 1e-6  # Smallest scaled distance from a period doubling to try; arbitrary
 _CLOSER: Final = 4.0  # Arbitrary
-"""Ratio of successive scaled distances from a period doubling at which the doubled orbit is sought."""
+"""Factor by which the distance from a period doubling shrinks after a failed search for the doubled orbit."""
 _ASIDE: Final = 0.5
 """Largest offset of a doubled orbit from the critical direction, relative to its distance; arbitrary."""
 _NEW_MULTIPLIER: Final = 0.3

@@ -41,7 +41,7 @@ _AMPLITUDE: Final = 1e-2
 """First scaled distance from a crossing at which to seek the crossing curve; arbitrary."""
 _LEAST_AMPLITUDE: Final = 1e-5  # Smallest scaled distance from a crossing to try; arbitrary
 _CLOSER: Final = 4.0
-"""Ratio of successive scaled distances from a crossing at which the crossing curve is sought; arbitrary."""
+"""Factor by which the distance from a crossing shrinks after a failed search for its curve; arbitrary."""
 _ASIDE: Final = 0.5  # Arbitrary
 """Largest distance of a point on the crossing curve from the predicted point, relative to the step."""
 

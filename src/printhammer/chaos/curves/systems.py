@@ -66,7 +66,7 @@ KINDS: Final = (*TESTS, GRAZING)
 SPACING: Final = 1e-6  # Arbitrary
 """Scaled step size of finite differences, whose errors affect only the convergence of Newton's method."""
 _PARTS: Final = 5.0  # Arbitrary
-"""Ratio of a parameter's range to its scale; the state is scaled by half-widths of the strobe window."""
+"""Ratio of a parameter's range to the unit of its scaled value; that of a state is a window's half-width."""
 
 
 @dataclass(frozen=True)

@@ -113,12 +113,12 @@ def quality(
         default="slots",
     ),
     force_limit: str | None = _grid(
-        "X", "Limit on the force deviation, e.g. 10% (default: that of the preset)."
+        "X", "Limit on the force deviation, e.g. 10% (default: limit of the preset)."
     ),
     arrival_limit: float | None = opt.quantity(
         "s",
         "TIME",
-        "Limit on the deviation of the arrival time, e.g. 50us (default: that of the preset).",
+        "Limit on the deviation of the arrival time, e.g. 50us (default: limit of the preset).",
         panel=_GRID,
     ),
     extra_contacts: int | None = opt.whole(

@@ -25,9 +25,9 @@ from printhammer.support.tables.readings import Readings, read_table
 class TotalLaw:
     """Force of magnet and spring at measured displacements, m, and currents, A, shape (m,).
 
-    With the position b of the backstop, m, p = [F0, Am, Bm, Bs, As]; without it p = [C, Am, Bm, K] and the
-    force is C - K x - (Am - Bm I)^2 / sqrt(x). A NaN current marks a row of the spring alone. `zero` is the
-    sensor reading at x = 0, m; with None it is fitted, as the last element of p.
+    If the position b of the backstop, m, is known, p = [F0, Am, Bm, Bs, As]; otherwise p = [C, Am, Bm, K] and
+    the force is C - K x - (Am - Bm I)^2 / sqrt(x). A NaN current marks a row of the spring alone. `zero` is
+    the sensor reading at x = 0, m; if None, the reading is fitted, as the last element of p.
     """
 
     def __init__(

@@ -102,7 +102,7 @@ def begin_member(
     control: Any,
     slot: Any,
 ) -> int:
-    """Write the initial state of a member into a lane; return its pool, or LEAVES if not supported."""
+    """Write the initial state of a member into a lane; return its pool, or LEAVES for the scalar kernel."""
     t, x, v = state[0], state[1], state[2]
     scale = control[0] / control[1]
     slot[R.FREE_STEP] = 0.02 * scale

@@ -44,8 +44,8 @@ IMAGE = 7
 rows, and 1 if the motion is differentiable."""
 
 ORBIT = 10
-"""Number of columns of an orbit: trial state, accepted state and direction of the step, each divided by the
-half-widths of the window, and the scaled derivative by rows."""
+"""Number of columns of an orbit: trial state, accepted state and step direction, two columns each, and the
+derivative of the map by rows, four columns; all in half-widths of the window."""
 
 
 def write_guess(states: Any, scales: Any, period: int, count: int, orbit: Any, trial: Any) -> int:

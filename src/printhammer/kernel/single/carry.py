@@ -32,7 +32,8 @@ STEP = 11
 FREE_STEP = 12
 PACK_STEP = 13
 CONTACT_STEP = 14
-"""Indices of the initial step sizes in free flight [s], in the pack [s] and in the backstop (scaled s)."""
+"""Indices of the first step sizes in free flight [s], in the pack [s] and in the backstop, where the size
+is in multiples of `contact_unit`."""
 STARTED = 15
 """Index of the mode of the latest step."""
 ENTERED = 16

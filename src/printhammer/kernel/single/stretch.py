@@ -1,8 +1,8 @@
 """Dots, strobes and samples of one segment of a run, extracted from the record of the segment.
 
-A strobe is the complete state at a requested time: displacement [m], velocity [m/s], mode, and the memory of
-the mode, i.e. the latest local maximum in the pack [m]. A sample is a displacement at a time of the output
-grid.
+A strobe is the complete state at a requested time: displacement [m], velocity [m/s], mode, and
+the memory: the latest local maximum of displacement in the pack [m]. A sample is a displacement at a time of
+the output grid.
 """
 
 from __future__ import annotations
