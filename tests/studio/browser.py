@@ -29,6 +29,8 @@ FLAGS = (
     "--mute-audio",
     "--remote-debugging-port=0",
 )
+HELPERS = (Path(__file__).parent / "helpers.js").read_text("utf-8")
+"""What the tests do inside a page."""
 START = 60.0
 WAIT = 60.0
 

@@ -118,6 +118,25 @@ def page(tabs: Callable[..., Page]) -> Page:
 
 
 @pytest.fixture
+def fresh(opened_browser: Any) -> Iterator[Callable[..., Page]]:
+    """Opens pages for one test, which complain of nothing until the test ends."""
+    pages: list[Page] = []
+
+    def fresh(address: str, width: int = 1280, height: int = 720, still: bool = True) -> Page:
+        page: Page = opened_browser()
+        pages.append(page)
+        page.size(width, height, still=still)
+        page.open(address)
+        page.wait("window.studio?.studio?.frames.motion")
+        return page
+
+    yield fresh
+    for page in pages:
+        assert page.complaints == []
+        page.call("Page.close")
+
+
+@pytest.fixture
 def whole_page(address: str, opened_browser: Any) -> Iterator[Page]:
     """The page with all views, opened for one test."""
     with visited(f"{address}{WHOLE}", opened_browser) as opened:

@@ -4,10 +4,14 @@ import json
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+import printhammer as ph
+from printhammer.drive.trains import Drive
+from printhammer.drive.waveforms.shapes import SHAPES, Sampled, Waveform
 from printhammer.studio import Shelf, live
 from printhammer.studio.bundle import merged
 from printhammer.studio.live import content_of
@@ -27,6 +31,25 @@ STATE: dict[str, Any] = {
     "views": ["motion", "map", "strobe"],
 }
 """A state of the first hammer of a page."""
+
+
+def drive_of(state: dict[str, Any], waveform: Waveform | None) -> Drive:
+    """Return the drive of a state in Python; `waveform` is the pulse of its hammer."""
+    fields = dict(state["waveform"] or {})
+    shape = fields.pop("shape", None)
+    if shape == "sine":
+        return ph.SineForce(fields["amplitude"], state["rate"], phase=fields["phase"])
+    if shape == "sampled":
+        waveform = Sampled.from_samples(fields["times"], fields["values"], quantity=fields["quantity"])
+    elif shape:
+        waveform = SHAPES[shape](**fields)
+    assert waveform is not None
+    rate, overlap = state["rate"], state["overlap"]
+    if state["pattern"]:
+        at = [slot / rate for slot, mark in enumerate(state["pattern"]) if mark == "1"]
+        return ph.PulseTrain(waveform, at=at, overlap=overlap)
+    return ph.PulseTrain(waveform, rate=rate, pulses=state["pulses"], overlap=overlap)
+
 
 _ASK = """
 const { createInterface } = require("node:readline");
@@ -61,6 +84,16 @@ class NoModule:
 def without_modules(monkeypatch: pytest.MonkeyPatch) -> None:
     """Write pages without WebAssembly modules, which take long to link."""
     monkeypatch.setattr(live, "page_module", lambda _laws: NoModule())
+
+
+def evaluated(modules: Path, script: str) -> Any:
+    """Run a script in Node that imports modules of the page; return the JSON that it writes."""
+    command = ["node", "--input-type=module", "-"]
+    done = subprocess.run(
+        command, cwd=modules, input=script, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
 
 
 @contextmanager

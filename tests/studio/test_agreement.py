@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.studio.node import Engine
-from tests.studio.reading import STATE
+from tests.studio.reading import STATE, drive_of
 
 import printhammer as ph
 from printhammer.drive.trains import Drive
-from printhammer.drive.waveforms.shapes import SHAPES, Sampled, Waveform
+from printhammer.drive.waveforms.shapes import SHAPES
 from printhammer.hammer.hammer import Hammer, shipped
 from printhammer.parts.damping import ViscousDamping
 from printhammer.parts.spring.linear import PreloadSpring
@@ -28,6 +28,8 @@ from printhammer.run.window import unsettled
 from printhammer.studio import Shelf, bounds
 from printhammer.studio.coil import open_constants
 from printhammer.studio.controls import describe
+
+pytestmark = pytest.mark.slow
 
 NUDGE, DRIFT, AGREES = 5e-16, 5e-13, 1e-9
 SINGLE, ASIDE = 1e-7, 1e-10
@@ -66,25 +68,12 @@ def random_state(name: str, rng: np.random.Generator) -> State:
 
 def posed(state: State) -> tuple[Hammer, Drive]:
     """Hammer and drive of a state, in Python."""
-    hammer, fields = ph.load(state["hammer"]), dict(state["waveform"])
-    shape = fields.pop("shape")
-    if shape == "sine":
-        return hammer.replace(state["constants"]), ph.SineForce(
-            fields["amplitude"], state["rate"], phase=fields["phase"]
-        )
-    if shape == "sampled":
-        wave: Waveform = Sampled.from_samples(fields["times"], fields["values"], quantity=fields["quantity"])
-    else:
-        wave = SHAPES[shape](**fields)
-    constants = state["constants"]
-    if wave.quantity == "voltage" and "coil.resistance" in (further := open_constants(hammer)):
+    hammer, constants = ph.load(state["hammer"]), state["constants"]
+    further = open_constants(hammer)
+    if state["waveform"]["quantity"] == "voltage" and "coil.resistance" in further:
         constants = {key: constant.si for key, (constant, _) in further.items()} | constants
     hammer = hammer.replace(constants) if constants else hammer
-    rate, pattern, overlap = state["rate"], state["pattern"], state["overlap"]
-    if pattern:
-        at = [slot / rate for slot, mark in enumerate(pattern) if mark == "1"]
-        return hammer, ph.PulseTrain(wave, at=at, overlap=overlap)
-    return hammer, ph.PulseTrain(wave, rate=rate, pulses=state["pulses"], overlap=overlap)
+    return hammer, drive_of(state, hammer.waveform)
 
 
 def run_of(state: State, nudge: float = 0.0) -> Motion:
@@ -189,18 +178,6 @@ def check_state(engine: Engine, state: State) -> str:
     return "whole"
 
 
-@pytest.mark.slow
-def test_the_page_computes_what_python_computes(tmp_path: Path) -> None:
-    rng = np.random.default_rng(3)
-    # The first has no coil, so that two modules are linked and not four.
-    few = [ph.load(name) for name in ("duffing-holmes", NAME)]
-    with Engine(Shelf(*few, only=True), tmp_path) as engine:
-        for hammer in few:
-            done = [check_state(engine, random_state(hammer.name, rng)) for _ in range(6)]
-            assert "refused" not in done
-            assert done.count("whole") >= 3
-
-
 def check_dots(engine: Engine, wave: dict[str, Any]) -> None:
     """Compare the dots that a pulse makes; the steps of the runs may differ."""
     state = {**STATE, "hammer": NAME, "waveform": wave, "rate": 900.0, "pulses": 3}
@@ -211,7 +188,6 @@ def check_dots(engine: Engine, wave: dict[str, Any]) -> None:
         assert other["peak_force"] == pytest.approx(dot.peak_force, rel=1e-4)
 
 
-@pytest.mark.slow
 def test_a_page_fires_records_and_drivers_of_the_coil(tmp_path: Path) -> None:
     hammer = ph.load(NAME)
     times, values = [0.0, 5e-5, 1.2e-4, 2e-4, 2.4e-4], [0.0, 1.4, 2.1, 1.6, 0.0]
@@ -224,7 +200,6 @@ def test_a_page_fires_records_and_drivers_of_the_coil(tmp_path: Path) -> None:
         assert "expected strictly increasing times" in refused["refusal"]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("dry", "front", "damping"), [(False, False, 0.4), (True, False, None), (False, True, None)]
 )
@@ -284,7 +259,6 @@ def oscillators(count: int) -> list[ph.Hammer]:
     return made
 
 
-@pytest.mark.slow
 def test_a_page_waits_for_an_oscillator_without_a_pack(tmp_path: Path) -> None:
     wave = {"shape": "half-sine", "amplitude": 3.0, "quantity": "force"}
     hammers, settled = oscillators(12), 0
@@ -303,7 +277,6 @@ def test_a_page_waits_for_an_oscillator_without_a_pack(tmp_path: Path) -> None:
     assert 0 < settled < 12
 
 
-@pytest.mark.slow
 def test_the_page_agrees_with_python_for_500_states(tmp_path: Path) -> None:
     rng, names = np.random.default_rng(36), shipped()
     counts: dict[str, int] = {}

@@ -4,7 +4,7 @@ import json
 import subprocess
 
 import pytest
-from tests.studio.browser import Page
+from tests.studio.browser import HELPERS, Page
 
 from printhammer.studio.bundle import merged
 from printhammer.units import to_si
@@ -245,12 +245,8 @@ def test_forces_hold_their_total(page: Page) -> None:
         "(() => { const { data } = window.studio.studio.frames.motion; const total = data['F total'];"
         " return [Math.min(...total), Math.max(...total)]; })()"
     )
-    page.run("window.drawn = window.studio.studio.views.forces")
-    rows = page.run(
-        "(() => { const pen = new Proxy({}, { get: (_t, name) => name === 'measureText' ?"
-        " (() => ({ width: 10 })) : (...all) => { if (/^(move|line)To$/.test(name)) ys.push(all[1]); },"
-        " set: () => true }); const ys = []; window.drawn.paint(pen, 600, 400); return ys; })()"
-    )
+    page.run(HELPERS)
+    rows = page.run("helpers.painted('forces', 600, 400).heights")
     assert ends[1] > 0.0
     assert min(rows) >= 8.0
     assert max(rows) <= 400.0
@@ -269,20 +265,13 @@ def test_a_hammer_without_a_pulse_goes_back_to_the_one_it_opens_with(page: Page)
 
 @pytest.mark.slow
 def test_the_drag_of_a_damped_hammer_is_among_the_forces(page: Page) -> None:
-    names = (
-        "(() => { window.words = []; const pen = new Proxy({}, { get: (_t, name) => name === 'measureText' ?"
-        " (() => ({ width: 10 })) : (...all) => { if (name === 'fillText') window.words.push(all[0]); },"
-        " set: () => true }); window.studio.studio.views.forces.paint(pen, 600, 400);"
-        " return window.words; })()"
-    )
+    page.run(HELPERS)
+    names = "helpers.painted('forces', 600, 400).texts"
     assert "drag" not in page.run(names)
     page.run("window.studio.studio.choose('duffing-holmes').then(() => 1)")
     page.wait("'F drag' in window.studio.studio.frames.motion.data")
     assert "drag" in page.run(names)
-    assert "drag" in page.run(
-        "window.studio.studio.views.forces.table && Object.keys("
-        "window.studio.studio.views.forces.table()).join(' ')"
-    )
+    assert "drag" in page.run("Object.keys(window.studio.studio.views.forces.table()).join(' ')")
     page.run("window.studio.studio.choose('hendriks-1983').then(() => 1)")
     page.wait("!('F drag' in window.studio.studio.frames.motion.data)")
     assert "drag" not in page.run(names)

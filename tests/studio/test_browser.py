@@ -7,28 +7,24 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.studio.browser import Page
+from tests.studio.browser import HELPERS, Page
 from tests.studio.conftest import WHOLE
 
 import printhammer as ph
 from printhammer.hammer.file import VIEWS
 from printhammer.studio import bounds
 
+pytestmark = pytest.mark.slow
+
 CTRL, SHIFT = 2, 8
 AXE = Path(__file__).parent / "vendor" / "axe.min.js"
 STATE = "window.studio.studio.store.state"
-HELPERS = (Path(__file__).parent / "helpers.js").read_text("utf-8")
 PAINTED = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))"
 FRAMES = {"line": "line", "strobe": "strobe", "map": "map"}
 
 
 @pytest.fixture
-def page(whole_page: Page) -> Page:
-    return whole_page
-
-
-@pytest.fixture
-def kept_page(tabs: Callable[..., Page]) -> Page:
+def page(tabs: Callable[..., Page]) -> Page:
     """The page with all views, for tests that leave only another state."""
     return tabs(WHOLE)
 
@@ -60,9 +56,9 @@ def saved(page: Page, selector: str, value: str) -> str:
     return page.wait("window.kept")
 
 
-@pytest.mark.slow
-def test_a_visit(page: Page) -> None:
+def test_a_visit(whole_page: Page) -> None:
     """Look, drag, click the map, pin, undo, reload, drop, export; no complaint."""
+    page = whole_page
     page.run(HELPERS)
     for view in VIEWS:
         page.wait(f"window.studio.studio.frames[{FRAMES.get(view, 'dots')!r}]")
@@ -144,8 +140,8 @@ def test_a_visit(page: Page) -> None:
     assert page.complaints == []
 
 
-@pytest.mark.slow
-def test_the_keyboard_reaches_everything(page: Page) -> None:
+def test_the_keyboard_reaches_everything(whole_page: Page) -> None:
+    page = whole_page
     page.run("document.querySelector('[data-key=\"rate\"]').focus()")
     page.press("ArrowRight")
     settled(page, "state.rate > 1200")
@@ -179,9 +175,7 @@ def test_the_keyboard_reaches_everything(page: Page) -> None:
     assert page.complaints == []
 
 
-@pytest.mark.slow
-def test_answered_columns_are_saved_as_the_file_beside_the_table(kept_page: Page) -> None:
-    page = kept_page
+def test_answered_columns_are_saved_as_the_file_beside_the_table(page: Page) -> None:
     page.run(
         "(() => { window.links = []; window.files = []; window.made = URL.createObjectURL;"
         " URL.createObjectURL = (file) => { window.files.push(file); return window.made(file); };"
@@ -201,9 +195,7 @@ def test_answered_columns_are_saved_as_the_file_beside_the_table(kept_page: Page
     page.run("delete HTMLAnchorElement.prototype.click; URL.createObjectURL = window.made")
 
 
-@pytest.mark.slow
-def test_the_pulse_is_dragged_at_its_handles(kept_page: Page) -> None:
-    page = kept_page
+def test_the_pulse_is_dragged_at_its_handles(page: Page) -> None:
     before = page.run("window.studio.studio.described.waveform")
     plane = page.box(".pulse canvas")
     # The axes of the editor: 1.3 times the peak above, 0.12 times below, and a quarter more than the pulse.
@@ -233,7 +225,6 @@ def test_the_pulse_is_dragged_at_its_handles(kept_page: Page) -> None:
     )
 
 
-@pytest.mark.slow
 def test_presets_patterns_shapes_and_units(page: Page) -> None:
     page.run(HELPERS)
     page.run("window.studio.studio.store.set({ views: ['motion', 'energy'] }); 1")
@@ -259,10 +250,8 @@ def test_presets_patterns_shapes_and_units(page: Page) -> None:
     assert page.complaints == []
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("dark", [False, True])
-def test_no_serious_finding_about_accessibility(kept_page: Page, dark: bool) -> None:
-    page = kept_page
+def test_no_serious_finding_about_accessibility(page: Page, dark: bool) -> None:
     page.size(1280, 720, dark=dark)
     page.run("for (const part of document.querySelectorAll('details')) part.open = true")
     page.run(AXE.read_text("utf-8") + "; 1")
@@ -275,9 +264,7 @@ def test_no_serious_finding_about_accessibility(kept_page: Page, dark: bool) -> 
     assert serious == {}
 
 
-@pytest.mark.slow
-def test_rates_that_failed_are_counted_in_the_map(kept_page: Page) -> None:
-    page = kept_page
+def test_rates_that_failed_are_counted_in_the_map(page: Page) -> None:
     page.run(HELPERS)
     # So strong a current drives the armature away from where the law of the magnet holds.
     pulse = {"shape": "half-sine", "amplitude": -90.0, "width": 4e-4, "quantity": "current"}
@@ -288,7 +275,6 @@ def test_rates_that_failed_are_counted_in_the_map(kept_page: Page) -> None:
     assert page.complaints == []
 
 
-@pytest.mark.slow
 def test_a_page_is_saved_with_what_is_set_and_a_state_comes_back_as_a_file(
     page: Page, opened_browser: Any, tmp_path: Path
 ) -> None:
@@ -318,7 +304,6 @@ def test_a_page_is_saved_with_what_is_set_and_a_state_comes_back_as_a_file(
     shown.call("Page.close")
 
 
-@pytest.mark.slow
 def test_a_rail_in_the_place_of_the_current_and_back(page: Page) -> None:
     """Drivers, decay path and temperature are controls, both curves are there, and undo leads back."""
     page.run(HELPERS)

@@ -1,13 +1,12 @@
 """What captions and controls say, in Node: modules of the page without a page."""
 
 import json
-import subprocess
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from tests.studio.reading import without_modules
+from tests.studio.reading import evaluated, without_modules
 
 from printhammer.hammer.hammer import load
 from printhammer.studio import Shelf
@@ -47,10 +46,7 @@ def dots(*rows: tuple[float, float, float]) -> dict[str, Any]:
 
 def said(modules: Path, *cases: dict[str, Any]) -> list[str]:
     filled = [{"rigid": False, "first": None, **case} for case in cases]
-    command = ["node", "--input-type=module", "--eval", SAY % json.dumps(filled)]
-    answer = subprocess.run(command, cwd=modules, capture_output=True, text=True, check=False)
-    assert answer.returncode == 0, answer.stderr
-    return list(json.loads(answer.stdout))
+    return list(evaluated(modules, SAY % json.dumps(filled)))
 
 
 def test_captions_claim_only_what_was_computed(modules: Path) -> None:
@@ -124,9 +120,7 @@ console.log(JSON.stringify([
 
 
 def test_a_device_has_its_own_word_and_an_oscillator_loses_no_dot(modules: Path) -> None:
-    command = ["node", "--input-type=module", "--eval", WORDS]
-    answer = subprocess.run(command, cwd=modules, capture_output=True, text=True, check=True)
-    closing, hit, firings, pole, table = json.loads(answer.stdout)
+    closing, hit, firings, pole, table = evaluated(modules, WORDS)
     assert closing == "Two closings, the second lost"
     assert hit == "Hit to pack"
     assert firings == "Two firings"
@@ -154,9 +148,7 @@ console.log(JSON.stringify(devices.map((each) => ({
 
 
 def test_views_and_titles_suit_the_device(modules: Path) -> None:
-    command = ["node", "--input-type=module", "--eval", NAMES]
-    answer = subprocess.run(command, cwd=modules, capture_output=True, text=True, check=True)
-    block, empty, hammer, relay, ball, oscillator = json.loads(answer.stdout)
+    block, empty, hammer, relay, ball, oscillator = evaluated(modules, NAMES)
     assert block["views"] == ["phase", "motion"]
     assert block["opening"] == ["motion", "phase"]
     # A list of which no view is possible says nothing.
@@ -190,9 +182,7 @@ console.log(JSON.stringify(studio.store.state.constants));
 def test_two_controls_that_move_a_constant_leave_it_in_its_range(modules: Path) -> None:
     steps = [[int(k % 2), float(w)] for k, w in enumerate(np.random.default_rng(1).uniform(-9.0, 9.0, 40))]
     for count in (1, 2, 3, 40):
-        command = ["node", "--input-type=module", "--eval", MOVE % json.dumps(steps[:count])]
-        answer = subprocess.run(command, cwd=modules, capture_output=True, text=True, check=True)
-        found = json.loads(answer.stdout)
+        found = evaluated(modules, MOVE % json.dumps(steps[:count]))
         assert 2.0 <= found.get("platen", 4.0) <= 5.0
         assert 1.0 <= found["pack.front"] <= 2.5
         assert 1.0 <= found.get("pack.thickness", 2.0) <= 3.0
@@ -208,9 +198,12 @@ console.log(JSON.stringify(fromText(toText({ ...START, ...state }, start))));
 def test_a_link_states_every_entry_that_the_hammer_would_set(modules: Path) -> None:
     """Entries equal to the start of a page, of a hammer that opens with others."""
     start = {"rate": 20.0, "pulses": 3, "low": 10.0, "line": ""}
-    command = ["node", "--input-type=module", "--eval", LINK % json.dumps([{"rate": 1200}, start])]
-    answer = subprocess.run(command, cwd=modules, capture_output=True, text=True, check=True)
-    assert json.loads(answer.stdout) == {"rate": 1200, "pulses": 9, "low": 500, "line": "HAMMER"}
+    assert evaluated(modules, LINK % json.dumps([{"rate": 1200}, start])) == {
+        "rate": 1200,
+        "pulses": 9,
+        "low": 500,
+        "line": "HAMMER",
+    }
 
 
 TRACE = """
@@ -244,9 +237,7 @@ def test_a_trace_travels_in_a_link(modules: Path) -> None:
         {**small, "name": 1},
         {**small, "t": list(range(2001)), "values": list(range(2001))},
     ]
-    command, script = ["node", "--input-type=module", "-"], TRACE % json.dumps([trace, wrong])
-    answer = subprocess.run(command, cwd=modules, input=script, capture_output=True, text=True, check=True)
-    found, none, length, *refused = json.loads(answer.stdout)
+    found, none, length, *refused = evaluated(modules, TRACE % json.dumps([trace, wrong]))
     assert none is None
     assert length < 100_000
     assert (found["name"], found["dt"], found["dx"]) == ("scope", -0.1, 2e-6)
@@ -277,11 +268,8 @@ def test_only_pulses_are_offered_whose_kernel_the_page_has(
     names = ("hendriks-1983", "hendriks-1983-1", "braille-embosser", "tung-shaw-1988")
     content = content_of(Shelf(*map(load, names), only=True))
     given = [list(content["hammers"].values()), content["vocabulary"]]
-    path = modules / "shapes.js"
-    path.write_text(SHAPES % json.dumps(given), "utf-8")
-    answer = subprocess.run(["node", path], capture_output=True, text=True, check=True)
     drivers, every = set(content["vocabulary"]["drivers"]), set(content["vocabulary"]["shapes"])
-    first, second, braille, oscillator = map(set, json.loads(answer.stdout))
+    first, second, braille, oscillator = map(set, evaluated(modules, SHAPES % json.dumps(given)))
     assert first == second == every
     assert braille == drivers | {"sampled"}
     assert oscillator == every - drivers

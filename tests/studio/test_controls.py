@@ -4,9 +4,9 @@ from contextlib import nullcontext
 
 import pytest
 from tests.hammers import CRUDE, interpreted
+from tests.studio.reading import STATE, drive_of
 
-from printhammer.drive.trains import Drive, PulseTrain, SineForce
-from printhammer.drive.waveforms.shapes import SHAPES
+from printhammer.drive.trains import SineForce
 from printhammer.hammer.hammer import Hammer, load, shipped
 from printhammer.hammer.names import range_of
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
@@ -87,20 +87,9 @@ def test_a_shipped_hammer_opens_with_something_that_strikes_its_backstop(name: s
     hammer = load(name)
     opening = controls.describe(hammer)["start"]
     assert ("waveform" in opening) == (hammer.waveform is None)
-    wave, rate, pulses = hammer.waveform, opening.get("rate", 1200.0), opening.get("pulses", 9)
-    fields = dict(opening.get("waveform", {}))
-    if fields.pop("shape", "") == "sine":
-        drive: Drive = SineForce(fields["amplitude"], rate, phase=fields["phase"])
-        duration: float | None = pulses / rate
-    else:
-        wave = SHAPES[opening["waveform"]["shape"]](**fields) if fields else wave
-        drive, duration = (
-            PulseTrain(
-                wave,
-                at=[k / rate for k, mark in enumerate(opening.get("pattern", "1" * pulses)) if mark == "1"],
-            ),
-            None,
-        )
+    state = {**STATE, **opening}
+    drive = drive_of(state, hammer.waveform)
+    duration = state["pulses"] / state["rate"] if isinstance(drive, SineForce) else None
     with interpreted() if name in RARE else nullcontext():
         motion = simulate(hammer, drive, duration=duration, tolerance=DISPLAY_TOLERANCE)
     assert motion.status == "ok"

@@ -1,9 +1,9 @@
 """Order in which the page shows maps and sections, with orders to workers that the test answers itself."""
 
-import json
-import subprocess
 from pathlib import Path
 from typing import Any
+
+from tests.studio.reading import evaluated
 
 ENGINE = """
 const { engineOf } = await import("./engine/engine.js");
@@ -59,11 +59,7 @@ const draw = async (low) => {
 
 def shown(modules: Path, script: str) -> Any:
     """Numbers of states with what is shown of them, in the order in which the page shows them."""
-    whole = f"{ENGINE}{script}console.log(JSON.stringify(shown));"
-    command = ["node", "--input-type=module", "--eval", whole]
-    done = subprocess.run(command, cwd=modules, capture_output=True, text=True, timeout=20, check=False)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    return evaluated(modules, f"{ENGINE}{script}console.log(JSON.stringify(shown));")
 
 
 def test_a_map_that_comes_late_does_not_replace_that_of_a_newer_state(modules: Path) -> None:

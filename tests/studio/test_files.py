@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from tests.studio.reading import STATE, node
+from tests.studio.reading import STATE, drive_of, node
 from tests.support.tables import exports
 
 import printhammer as ph
 from printhammer.drive.file import read_drive
-from printhammer.drive.waveforms.shapes import SHAPES, Sampled
+from printhammer.drive.waveforms.shapes import SHAPES
 from printhammer.studio import Shelf, live
 from printhammer.studio.controls import fields_of
 from printhammer.studio.launch import FORMAT, KIND
@@ -58,20 +58,7 @@ WAVES: list[Any] = [
     ),
 ]
 TIMES = np.array([0.0, 1e-5, 2e-5])
-PLACES = np.array([50e-6, 51.5e-6, 52e-6])
 CURRENTS = np.array([0.0, 0.5, 1.25])
-# The same three samples, as programs write them.
-WRITTEN = {
-    "ours": "# by hand\ntime [us],displacement [um],current [A]\n0,50,0\n10,51.5,0.5\n20,52,1.25\n",
-    "semicolons": "time (us);displacement (um);current (A)\n0;50;0\n10;51,5;0,5\n20;52;1,25\n",
-    "tabs": "Time [us]\tPosition [um]\tCurrent [mA]\n0\t50\t0\n10\t51.5\t500\n20\t52\t1250\n",
-    "units below": "x-axis,Position,Current\nsecond,mm,A\n0,0.05,0\n1e-5,0.0515,0.5\n2E-5,0.052,1.25\n",
-    "lines above": (
-        "Model,XYZ\nSample Interval,1e-5\n\n"
-        "time [s],displacement [m],current [A]\n0,50e-6,0\n1e-5,51.5e-6,.5\n2e-5,52e-6,1.25\n"
-    ),
-    "quotes": '"time [us]","x [um]","current [A]"\r\n"0","50","0"\r\n10,51.5,0.5\r\n20,52,1.25\r\n',
-}
 
 
 @pytest.fixture(scope="module")
@@ -91,18 +78,7 @@ def test_a_drive_is_written_as_python_writes_it_and_read_again(
     ask: Any, wave: Any, train: dict[str, Any]
 ) -> None:
     state = state_of(waveform=wave, **train)
-    fields = dict(wave or {})
-    shape = fields.pop("shape", None)
-    pulse = ph.load(NAME).waveform
-    if shape == "sampled":
-        pulse = Sampled.from_samples(fields["times"], fields["values"], quantity=fields["quantity"])
-    elif shape:
-        pulse = SHAPES[shape](**fields)
-    if state["pattern"]:
-        at = [slot / state["rate"] for slot, mark in enumerate(state["pattern"]) if mark == "1"]
-        drive = ph.PulseTrain(pulse, at=at, overlap=state["overlap"])
-    else:
-        drive = ph.PulseTrain(pulse, rate=state["rate"], pulses=9, overlap=state["overlap"])
+    drive = drive_of(state, ph.load(NAME).waveform)
     text = ask("write", state)["found"]
     assert read_drive(text).fingerprint == drive.fingerprint
     patch = ask("drive", drive.to_toml())["found"]
@@ -205,14 +181,6 @@ def test_a_quantity_that_is_read_is_read_as_python_reads_it(ask: Any, parts: lis
 )
 def test_units_are_written_as_in_python(ask: Any, text: str) -> None:
     assert ask("quantity", text, "N s/m")["found"] == pytest.approx(parse(text, "N s/m"))
-
-
-@pytest.mark.parametrize("written", WRITTEN.values(), ids=list(WRITTEN))
-def test_what_oscilloscopes_write_is_read(ask: Any, written: str) -> None:
-    data = ask("table", written, None)["found"]["data"]
-    np.testing.assert_allclose(data["t"], TIMES, rtol=1e-12, atol=1e-20)
-    np.testing.assert_allclose(data["displacement"], PLACES, rtol=1e-12)
-    np.testing.assert_allclose(data["current"], CURRENTS, rtol=1e-12)
 
 
 def test_columns_are_asked_for_where_the_heading_does_not_say_what_they_hold(ask: Any) -> None:

@@ -2,14 +2,15 @@
 
 import json
 from collections.abc import Callable, Iterator
-from typing import Any
 from urllib.parse import quote
 
 import pytest
-from tests.studio.browser import Page
+from tests.studio.browser import HELPERS, Page
 
 import printhammer as ph
 from printhammer.hammer.file import VIEWS
+
+pytestmark = pytest.mark.slow
 
 STATE = "window.studio.studio.store.state"
 
@@ -26,7 +27,6 @@ def readout(page: Page, view: str) -> str:
     return page.run(f"document.querySelector('.view-{view} .readout').textContent")
 
 
-@pytest.mark.slow
 def test_every_plot_reads_at_the_same_time(opened: Page) -> None:
     assert readout(opened, "motion") == ""
     box = opened.box(".view-motion canvas")
@@ -43,7 +43,6 @@ def test_every_plot_reads_at_the_same_time(opened: Page) -> None:
     assert float(place) == pytest.approx(1e6 * float(run.at([time])[0][0]), abs=0.2)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("view", ["phase", "loops", "map", "energy", "line", "forces"])
 def test_the_pointer_in_any_plot_sets_the_time(opened: Page, view: str) -> None:
     selector = f".view-{view} .u-over" if view == "forces" else f".view-{view} canvas"
@@ -56,7 +55,6 @@ def test_the_pointer_in_any_plot_sets_the_time(opened: Page, view: str) -> None:
     opened.wait("document.querySelector('.view-motion .readout').textContent")
 
 
-@pytest.mark.slow
 def test_the_rate_where_a_dot_is_lost_is_found(opened: Page) -> None:
     """One click for the second dot; the run at that rate has lost it, just below it has not."""
     opened.run("document.querySelector('.find-lost').click()")
@@ -72,7 +70,6 @@ def test_the_rate_where_a_dot_is_lost_is_found(opened: Page) -> None:
     assert struck(rate - 0.1)
 
 
-@pytest.mark.slow
 def test_a_dot_is_looked_for_where_runs_end_early(opened: Page) -> None:
     """A pulse of 90 A drives the armature out of the range of the magnet before the second dot."""
     wave = {"shape": "half-sine", "amplitude": 90.0, "width": 3e-4, "quantity": "current"}
@@ -82,7 +79,6 @@ def test_a_dot_is_looked_for_where_runs_end_early(opened: Page) -> None:
     opened.wait("document.querySelector('.status').textContent.includes('comes to the second dot')")
 
 
-@pytest.mark.slow
 def test_the_next_strange_rate_is_found(opened: Page) -> None:
     opened.run("window.studio.studio.store.set({ rate: 1000, low: 900, high: 1200 })")
     opened.run("document.querySelector('.find-strange').click()")
@@ -93,7 +89,6 @@ def test_the_next_strange_rate_is_found(opened: Page) -> None:
     assert opened.run("window.studio.studio.frames.strobe.verdict.verdict") == "strange"
 
 
-@pytest.mark.slow
 def test_pins_have_names_and_stay_in_the_address(opened: Page) -> None:
     opened.run("window.studio.studio.pin()")
     opened.run("window.studio.studio.store.set({ rate: 1500 })")
@@ -124,62 +119,49 @@ def test_pins_have_names_and_stay_in_the_address(opened: Page) -> None:
     opened.wait(f"{STATE}.rate === 1400")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "pins",
-    [
-        "[1]", "{", "[[]]", json.dumps([{"name": "x", "state": {"rate": 1e99}}]),
-        json.dumps([{"name": "x" * 1000, "state": {"__proto__": 1, "views": ["zzz"]}}] * 9),
-        json.dumps([{"name": "<img src=x onerror=alert(1)>", "state": {"waveform": [1]}}]),
-    ],
-)  # fmt: skip
-def test_pins_of_a_hostile_link_harm_nothing(address: str, opened_browser: Any, pins: str) -> None:
-    page = opened_browser()
-    page.open("about:blank")
-    page.size(1280, 720)
-    page.run(f"window.name = {json.dumps(pins)}; 1")
-    page.open(address + "#pins=" + page.run("encodeURIComponent(window.name)"))
-    page.wait("window.studio?.studio?.frames.motion")
-    page.wait("!window.studio.studio.busy")
-    page.run("window.studio.studio.store.set({ rate: 1300 })")
-    page.wait("!window.studio.studio.busy && window.studio.studio.frames.motion.fired[1] < 1 / 1290")
-    assert page.run("document.querySelectorAll('.chips .chip').length") <= 4
-    assert page.run("window.studio.studio.ghosts.length") == 0
-    assert page.complaints == []
-    page.call("Page.close")
+HOSTILE = [
+    "[1]",
+    "{",
+    "[[]]",
+    json.dumps([{"name": "x", "state": {"rate": 1e99}}]),
+    json.dumps([{"name": "x" * 1000, "state": {"__proto__": 1, "views": ["zzz"]}}] * 9),
+    json.dumps([{"name": "<img src=x onerror=alert(1)>", "state": {"waveform": [1]}}]),
+]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("state", "reason"),
-    [
+def test_pins_of_hostile_links_harm_nothing(address: str, fresh: Callable[..., Page]) -> None:
+    page = fresh(f"{address}#rate=1100&pins={quote(HOSTILE[0])}")
+    for k, pins in enumerate(HOSTILE):
+        if k:
+            page.run(f"location.hash = 'rate=1100&pins=' + encodeURIComponent({json.dumps(pins)}); 1")
+        page.wait(f"{STATE}.rate === 1100 && !window.studio.studio.busy")
+        page.run("window.studio.studio.store.set({ rate: 1300 })")
+        page.wait("!window.studio.studio.busy && window.studio.studio.frames.motion.fired[1] < 1 / 1290")
+        assert page.run("document.querySelectorAll('.chips .chip').length") <= 4
+        assert page.run("window.studio.studio.ghosts.length") == 0
+
+
+def test_a_pin_of_a_link_is_opened_as_far_as_it_is_a_state(address: str, fresh: Callable[..., Page]) -> None:
+    """A pin without a hammer, of a hammer that the page lacks, and with entries that are none."""
+    page = fresh(address)
+    for state, reason in (
         ({}, ""),
         ({"hammer": "mine"}, "expected one of"),
         ({"constants": None, "pattern": 3}, "constants is expected"),
-    ],
-)
-def test_a_pin_of_a_link_is_opened_as_far_as_it_is_a_state(
-    address: str, opened_browser: Any, state: dict[str, Any], reason: str
-) -> None:
-    """A pin without a hammer, of a hammer that the page lacks, and with entries that are none."""
-    page = opened_browser()
-    page.open(
-        f"{address}#rate=900&pins={quote(json.dumps([{'name': 'a', 'state': {'rate': 700, **state}}]))}"
-    )
-    page.wait("!!document.querySelector('.chip button')")
-    page.wait("window.studio.studio.frames.motion && !window.studio.studio.busy")
-    page.run("setTimeout(() => document.querySelector('.chip button').click(), 0); 1")
-    page.wait("window.studio.studio.frames.motion.fired[1] === 1 / 700")
-    assert reason in page.run("document.querySelector('.status').textContent")
-    assert page.run(f"{STATE}.hammer") == page.run("window.studio.studio.offered[0]")
-    assert page.run(f"{STATE}.pins.length") == 1
-    page.run("window.studio.studio.store.set({ rate: 1300 })")
-    page.wait("window.studio.studio.frames.motion.fired[1] === 1 / 1300")
-    assert page.complaints == []
-    page.call("Page.close")
+    ):
+        pins = json.dumps([{"name": "a", "state": {"rate": 700, **state}}])
+        page.run(f"location.hash = 'rate=900&pins=' + encodeURIComponent({json.dumps(pins)}); 1")
+        page.wait(f"{STATE}.rate === 900 && !!document.querySelector('.chip button')")
+        page.wait("window.studio.studio.frames.motion.fired[1] === 1 / 900 && !window.studio.studio.busy")
+        page.run("setTimeout(() => document.querySelector('.chip button').click(), 0); 1")
+        page.wait("window.studio.studio.frames.motion.fired[1] === 1 / 700")
+        assert reason in page.run("document.querySelector('.status').textContent")
+        assert page.run(f"{STATE}.hammer") == page.run("window.studio.studio.offered[0]")
+        assert page.run(f"{STATE}.pins.length") == 1
+        page.run("window.studio.studio.store.set({ rate: 1300 })")
+        page.wait("window.studio.studio.frames.motion.fired[1] === 1 / 1300")
 
 
-@pytest.mark.slow
 def test_curves_are_marked_while_a_hammer_is_set_that_the_page_lacks(opened: Page) -> None:
     marked = "document.querySelector('.view-motion').classList.contains('outdated')"
     opened.run("window.studio.studio.store.set({ hammer: 'mine' })")
@@ -188,7 +170,6 @@ def test_curves_are_marked_while_a_hammer_is_set_that_the_page_lacks(opened: Pag
     opened.wait(f"!{marked}")
 
 
-@pytest.mark.slow
 def test_the_actuator_reads_the_current_of_its_time(opened: Page) -> None:
     """Points of a curve are not evenly spaced in time."""
     hammer = ph.load("hendriks-1983")
@@ -199,7 +180,6 @@ def test_the_actuator_reads_the_current_of_its_time(opened: Page) -> None:
         assert float(drawn.split()[-2]) == pytest.approx(current, rel=0.02, abs=2e-3)
 
 
-@pytest.mark.slow
 def test_contacts_of_a_relay_open_and_close_at_their_positions(opened: Page) -> None:
     relay = ph.load("relay-5v")
     opened.run("window.studio.studio.store.set({ hammer: 'relay-5v', rate: 20, pulses: 3 })")
@@ -223,9 +203,5 @@ def test_contacts_of_a_relay_open_and_close_at_their_positions(opened: Page) -> 
 
 def sketched(page: Page, time: float) -> list[str]:
     """Return the texts of the drawing of the actuator at a time, s."""
-    return page.run(
-        "(() => { const texts = []; const pen = new Proxy({}, { get: (_t, name) => name === 'fillText' ?"
-        " (text) => texts.push(text) : () => ({ width: 10 }), set: () => true });"
-        f" window.studio.studio.cursor = {time}; window.studio.studio.views.sketch.paint(pen, 500, 200);"
-        " return texts; })()"
-    )
+    page.run(f"{HELPERS}; window.studio.studio.cursor = {time}")
+    return page.run("helpers.painted('sketch', 500, 200).texts")

@@ -1,8 +1,8 @@
 """Marks of views that do not belong to what is set: after a quarter of a second, counted from the change."""
 
-import json
-import subprocess
 from pathlib import Path
+
+from tests.studio.reading import evaluated
 
 MARKS = """
 const { marksFor } = await import("./marks.js");
@@ -39,6 +39,4 @@ console.log(JSON.stringify(seen));
 
 
 def test_a_state_that_has_waited_is_marked_at_once(modules: Path) -> None:
-    command = ["node", "--input-type=module", "--eval", MARKS]
-    answer = subprocess.run(command, cwd=modules, capture_output=True, text=True, check=True)
-    assert json.loads(answer.stdout) == [False, True, True, False, False, True]
+    assert evaluated(modules, MARKS) == [False, True, True, False, False, True]

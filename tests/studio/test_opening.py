@@ -1,11 +1,13 @@
 """The opening: what moves above its curve above what it prints, stories one click away, a tour."""
 
-from typing import Any
+from collections.abc import Callable
 
 import pytest
 from tests.studio.browser import Page
 
 from printhammer.hammer.file import VIEWS
+
+pytestmark = pytest.mark.slow
 
 STATE = "window.studio.studio.store.state"
 SEEN = "!window.studio.studio.busy && !window.studio.studio.stale"
@@ -13,7 +15,6 @@ LATEST = "window.studio.studio.frames.dots.serial === Math.max(...window.studio.
 """The dots are those of the state that was sent last; questions have numbers of their own."""
 
 
-@pytest.mark.slow
 def test_the_map_takes_half_beside_the_column_of_the_opening(page: Page) -> None:
     for size in ((1280, 720), (1440, 900), (1920, 1080)):
         page.size(*size)
@@ -29,7 +30,6 @@ def test_the_map_takes_half_beside_the_column_of_the_opening(page: Page) -> None
         assert motion["height"] >= sketch["height"]
 
 
-@pytest.mark.slow
 def test_every_view_is_enlarged_and_made_small_again(page: Page) -> None:
     for view in ("motion", "map", "sketch"):
         small = page.box(f".view-{view}")
@@ -41,36 +41,24 @@ def test_every_view_is_enlarged_and_made_small_again(page: Page) -> None:
         assert page.box(f".view-{view}") == small
 
 
-@pytest.mark.slow
-def test_it_moves_at_first_unless_motion_is_not_wanted(opened_browser: Any, address: str) -> None:
-    for still in (True, False):
-        page = opened_browser()
-        page.size(1280, 720, still=still)
-        page.open(address)
-        page.wait("window.studio?.studio?.frames.dots")
-        if still:
-            page.run("new Promise((done) => setTimeout(done, 400))")
-            assert page.run("window.studio.studio.cursor") == 0
-        else:
-            page.wait("window.studio.studio.cursor > 2e-4")
-            page.run(
-                "document.querySelector('.undo')"
-                ".dispatchEvent(new PointerEvent('pointerdown', { bubbles: true }))"
-            )
-            held = page.run("window.studio.studio.cursor")
-            page.run("new Promise((done) => setTimeout(done, 200))")
-            assert page.run("window.studio.studio.cursor") == pytest.approx(held, abs=1e-4)
-        assert page.complaints == []
-        page.call("Page.close")
+def test_it_moves_at_first_unless_motion_is_not_wanted(address: str, fresh: Callable[..., Page]) -> None:
+    page = fresh(address)
+    page.run("new Promise((done) => setTimeout(done, 400))")
+    assert page.run("window.studio.studio.cursor") == 0
+    page = fresh(address, still=False)
+    page.wait("window.studio.studio.cursor > 2e-4")
+    page.run(
+        "document.querySelector('.undo').dispatchEvent(new PointerEvent('pointerdown', { bubbles: true }))"
+    )
+    held = page.run("window.studio.studio.cursor")
+    page.run("new Promise((done) => setTimeout(done, 200))")
+    assert page.run("window.studio.studio.cursor") == pytest.approx(held, abs=1e-4)
 
 
-@pytest.mark.slow
-def test_the_stories_show_what_they_tell(opened_browser: Any, address: str) -> None:
+def test_the_stories_show_what_they_tell(address: str, fresh: Callable[..., Page]) -> None:
     """With the hammer of the paper; each is one click away, and what its text says is so."""
-    page = opened_browser()
-    page.size(1440, 900)
-    page.open(address)
-    page.wait("window.studio?.studio?.frames.dots")
+    page = fresh(address, 1440, 900)
+    page.wait("window.studio.studio.frames.dots")
     struck = "window.studio.studio.frames.dots.dots.map((dot) => dot.struck)"
     force = "window.studio.studio.frames.dots.dots.map((dot) => dot.peak_force ?? 0)"
 
@@ -119,11 +107,8 @@ def test_the_stories_show_what_they_tell(opened_browser: Any, address: str) -> N
     assert not page.run("document.querySelector('.notice').checkVisibility()")
     page.run("document.querySelector('.undo').click()")
     assert page.run(f"{STATE}.rate") == 2200
-    assert page.complaints == []
-    page.call("Page.close")
 
 
-@pytest.mark.slow
 def test_a_tour_marks_what_it_tells(page: Page) -> None:
     page.run("document.querySelector('.tour').click()")
     for step in range(1, 10):
@@ -136,7 +121,6 @@ def test_a_tour_marks_what_it_tells(page: Page) -> None:
     assert page.complaints == []
 
 
-@pytest.mark.slow
 def test_pictures_tell_their_result_to_those_who_do_not_see_them(page: Page) -> None:
     page.run(f"window.studio.studio.store.set({{ views: {list(VIEWS)} }}); 1")
     page.wait("[...document.querySelectorAll('.caption')].every((each) => each.textContent)")
@@ -148,30 +132,3 @@ def test_pictures_tell_their_result_to_those_who_do_not_see_them(page: Page) -> 
     assert "N at the backstop" in said["view-forces"]
     assert "lost" in said["view-map"]
     assert all(len(text) > 30 for text in said.values()), said
-
-
-def click(page: Page, selector: str) -> None:
-    """Click in the middle of an element with the mouse."""
-    box = page.box(selector)
-    page.drag((box["x"] + box["width"] / 2, box["y"] + box["height"] / 2))
-
-
-@pytest.mark.slow
-def test_figure_6_takes_two_clicks_and_the_lost_dot_two(opened_browser: Any, address: str) -> None:
-    """By the mouse alone, from an empty page."""
-    page = opened_browser()
-    page.size(1440, 900)
-    page.open(address)
-    page.wait("window.studio?.studio?.frames.map?.detail === 'full'")
-    struck = "window.studio.studio.frames.dots?.dots.map((dot) => Number(dot.struck)).join('')"
-    click(page, ".story:nth-of-type(2)")
-    page.wait(f"{struck} === '10'")
-    click(page, ".notice .switch:nth-of-type(2)")
-    page.wait(f"{struck} === '11'")
-    click(page, ".notice .shut")
-    click(page, ".more > summary")
-    click(page, ".find-lost")
-    page.wait(f"{struck}?.slice(0, 3) === '101'")
-    assert page.run(f"{STATE}.rate") == pytest.approx(1473, rel=3e-3)
-    assert page.complaints == []
-    page.call("Page.close")

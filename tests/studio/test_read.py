@@ -11,11 +11,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tests.hammers import CRUDE
-from tests.studio.reading import STATE, node
+from tests.studio.reading import STATE, drive_of, node
 
 import printhammer as ph
 from printhammer.drive.waveforms.drivers import Rail
-from printhammer.drive.waveforms.shapes import SHAPES
 from printhammer.studio import Shelf
 from printhammer.studio.coil import open_constants, rail_of
 from printhammer.studio.controls import fields_of
@@ -140,28 +139,15 @@ CHANGES: list[dict[str, Any]] = [
 ]
 
 
-def built(changed: dict[str, Any]) -> tuple[ph.Hammer, ph.PulseTrain]:
-    """Return hammer and drive that Python builds from a changed state."""
-    state = {**STATE, **changed}
-    hammer = ph.load(CRUDE).replace("name", NAME)
-    hammer = hammer.replace(state["constants"]) if state["constants"] else hammer
-    wave: Any = hammer.waveform
-    if fields := dict(state["waveform"] or {}):
-        shape = SHAPES[fields.pop("shape")]
-        wave = shape.from_samples(**fields) if "times" in fields else shape(**fields)
-    if state["pattern"]:
-        at = [slot / state["rate"] for slot, mark in enumerate(state["pattern"]) if mark == "1"]
-        return hammer, ph.PulseTrain(wave, at=at, overlap=state["overlap"])
-    return hammer, ph.PulseTrain(wave, rate=state["rate"], pulses=state["pulses"], overlap=state["overlap"])
-
-
 @pytest.mark.parametrize("changed", CHANGES)
 def test_texts_describe_the_state(
     ask: Any, changed: dict[str, Any], capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The hammer file and the script build what Python builds, and the state file is read again."""
-    hammer, drive = built(changed)
     state = {**STATE, "hammer": NAME, **changed}
+    hammer = ph.load(CRUDE).replace("name", NAME)
+    hammer = hammer.replace(state["constants"]) if state["constants"] else hammer
+    drive = drive_of(state, hammer.waveform)
     texts = ask("texts", state)["found"]
     assert ph.Hammer.from_toml(texts["hammer"]).fingerprint == hammer.fingerprint
     names: dict[str, Any] = {}

@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.studio.browser import Page
+from tests.studio.browser import HELPERS, Page
 from tests.studio.conftest import COMPLETE, WHOLE
 
 from printhammer.hammer.file import VIEWS
 
-HELPERS = (Path(__file__).parent / "helpers.js").read_text("utf-8")
+pytestmark = pytest.mark.slow
+
 RATIOS = (1.0, 1.25, 1.5, 2.0)
 SIZES = ((1440, 900), (1280, 720), (1024, 768), (670, 900), (390, 844))
 DRAWN = "new Promise((done) => setTimeout(() => requestAnimationFrame(done), 280))"
@@ -40,11 +41,9 @@ def pixels(page: Page, path: Path, selector: str) -> Any:
         return np.asarray(picture.convert("L").resize((48, 36), Image.Resampling.BOX), dtype=float)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("ratio", RATIOS)
-def test_nothing_is_cut_or_overlaps(whole_page: Page, tmp_path: Path, ratio: float) -> None:
+def test_nothing_is_cut_or_overlaps(page: Page, tmp_path: Path, ratio: float) -> None:
     """At every size, with all controls and a story open; a window of 1440 px zoomed to 200 % has 720."""
-    page = whole_page
     page.run(HELPERS)
     for width, height in (*SIZES, (720, 450)):
         resized(page, width, height, ratio)
@@ -61,10 +60,11 @@ def test_nothing_is_cut_or_overlaps(whole_page: Page, tmp_path: Path, ratio: flo
         resized(page, width, height, ratio)
         page.run("document.querySelector('.side').classList.add('open')")
         assert page.run("helpers.misfits()") == [], (width, ratio)
+    page.run("document.querySelector('.side').classList.remove('open')")
+    page.run("document.querySelector('.notice .shut').click()")
     assert page.complaints == []
 
 
-@pytest.mark.slow
 def test_a_picture_is_the_same_at_every_pixel_ratio(page: Page, tmp_path: Path) -> None:
     import numpy as np
 
@@ -78,7 +78,6 @@ def test_a_picture_is_the_same_at_every_pixel_ratio(page: Page, tmp_path: Path) 
             assert np.abs(other - seen[0]).mean() < 4.0, view
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("width", [1024, 670, 390])
 def test_views_stack_on_small_screens(page: Page, width: int) -> None:
     resized(page, width, 800, 1.0)
@@ -94,7 +93,6 @@ def test_views_stack_on_small_screens(page: Page, width: int) -> None:
     assert page.run("document.documentElement.scrollHeight > 2000")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("width", "height"), [(1280, 720), (1920, 1080), (2560, 1080)])
 def test_everything_fits_on_the_screen(page: Page, width: int, height: int) -> None:
     page.size(width, height)
@@ -109,9 +107,7 @@ def test_everything_fits_on_the_screen(page: Page, width: int, height: int) -> N
         assert box["y"] + box["height"] <= height
 
 
-@pytest.mark.slow
-def test_controls_are_a_sheet_on_a_phone(whole_page: Page) -> None:
-    page = whole_page
+def test_controls_are_a_sheet_on_a_phone(page: Page) -> None:
     resized(page, 390, 844, 2.0)
     assert not page.run("document.querySelector('[data-key=rate]').checkVisibility()")
     page.run("document.querySelector('.sheet').click()")
@@ -119,12 +115,11 @@ def test_controls_are_a_sheet_on_a_phone(whole_page: Page) -> None:
     assert box["width"] >= 150
     assert 400 < box["y"] < 844
     assert page.run("document.querySelector('.sheet').getAttribute('aria-expanded')") == "true"
+    page.run("document.querySelector('.sheet').click()")
 
 
-@pytest.mark.slow
-def test_forced_colours_leave_everything_to_be_seen(whole_page: Page, tmp_path: Path) -> None:
+def test_forced_colours_leave_everything_to_be_seen(page: Page, tmp_path: Path) -> None:
     """With colours that a user forces, curves and pressed buttons are still apart from their ground."""
-    page = whole_page
     page.prefer(
         {"forced-colors": "active", "prefers-color-scheme": "dark", "prefers-reduced-motion": "reduce"}
     )

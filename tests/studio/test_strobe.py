@@ -16,6 +16,8 @@ from printhammer.derivatives.states import strobe_exponent
 from printhammer.studio import Shelf
 from printhammer.studio.controls import describe
 
+pytestmark = pytest.mark.slow
+
 COUNTS, JUDGED = [25, 50, 100, 150, 200], [1001, 2000]
 
 
@@ -30,7 +32,6 @@ def judged(engine: Engine, rate: float, **changed: Any) -> list[dict[str, Any]]:
     return engine.work("section", state, counts=COUNTS, judged=JUDGED)
 
 
-@pytest.mark.slow
 def test_points_and_exponent_before_the_class_are_those_of_the_library(engine: Engine) -> None:
     state = {**STATE, "hammer": NAME, "rate": 1000.0}
     frames = engine.work("section", state, counts=[25, 60, 150], judged=None)
@@ -49,7 +50,6 @@ def test_points_and_exponent_before_the_class_are_those_of_the_library(engine: E
     assert exponent["firings"] == [76, 150]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("rate", [900.0, 1000.0, 1350.0])
 def test_the_class_of_a_motion_is_that_of_the_library(engine: Engine, rate: float) -> None:
     frames = judged(engine, rate)
@@ -68,7 +68,6 @@ def test_the_class_of_a_motion_is_that_of_the_library(engine: Engine, rate: floa
     assert [frame["exponent"] is None for frame in frames] == [True, True, True, False, False, True]
 
 
-@pytest.mark.slow
 def test_near_a_doubling_the_class_rests_on_newtons_method(engine: Engine) -> None:
     # States two firings apart agree, those one firing apart nearly.
     verdict = judged(engine, 1.0 / 1.0482e-3)[-1]["verdict"]
@@ -77,14 +76,12 @@ def test_near_a_doubling_the_class_rests_on_newtons_method(engine: Engine) -> No
     assert "Newton's method" in verdict["phrases"][1]
 
 
-@pytest.mark.slow
 def test_a_train_that_leaves_the_range_is_refused(engine: Engine) -> None:
     pulse = {"shape": "half-sine", "amplitude": -90.0, "width": 4e-4, "quantity": "current"}
     (refused,) = judged(engine, 1000.0, waveform=pulse)
     assert "the first 25 strobe points" in refused["refusal"]
 
 
-@pytest.mark.slow
 def test_a_continuous_force_is_classified_as_by_the_library(tmp_path: Path) -> None:
     oscillator = ph.load("duffing-holmes")
     opening = describe(oscillator)["start"]

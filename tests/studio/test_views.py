@@ -1,7 +1,6 @@
 """The page in a browser: its header, its stories, the map under the finger, views that suit the device."""
 
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import pytest
 from tests.studio.browser import Page
@@ -25,15 +24,11 @@ def page(tabs: Callable[..., Page]) -> Iterator[Page]:
 
 
 @pytest.fixture
-def own_page(address: str, opened_browser: Any) -> Iterator[Page]:
+def own_page(address: str, fresh: Callable[..., Page]) -> Page:
     """The page opened for one test, which leaves it with another tab chosen, or with frames held back."""
-    opened = opened_browser()
-    opened.size(1440, 900)
-    opened.open(f"{address}{LINK}")
-    opened.wait(f"window.studio && {SETTLED}")
-    yield opened
-    assert opened.complaints == []
-    opened.call("Page.close")
+    opened = fresh(f"{address}{LINK}", 1440, 900)
+    opened.wait(SETTLED)
+    return opened
 
 
 def choose(page: Page, name: str) -> None:
@@ -151,10 +146,17 @@ def test_a_page_that_becomes_wide_or_narrow_shows_what_is_chosen(own_page: Page)
     shown = f"{SHOWN}.map((each) => each.classList[1])"
     page.size(390, 844)
     page.wait(f"{shown}.join() === 'view-map'")
+    half = page.box(".view-map")
+    assert half["width"] * half["height"] > 0.3 * 390 * 844
+    assert page.run("document.querySelector('.pinned').checkVisibility()")
     page.run("document.querySelectorAll('.story')[4].click()")
     page.wait(f"{shown}.join() === 'view-strobe'")
     page.size(1440, 900)
     page.wait(f"{shown}.length === 4 && {shown}.includes('view-strobe')")
+    assert not page.run("document.querySelector('.pinned').checkVisibility()")
+    page.run("document.querySelector('[data-tab=forces]').click(); 1")
+    assert "view-forces" in page.run(shown)
+    assert "view-strobe" not in page.run(shown)
 
 
 def test_a_state_that_follows_another_is_marked_while_it_takes_long(own_page: Page) -> None:
