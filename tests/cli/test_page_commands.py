@@ -3,6 +3,7 @@
 import re
 import shlex
 import shutil
+import subprocess
 from collections.abc import Callable, Iterator
 from importlib.resources import files
 from pathlib import Path
@@ -24,6 +25,8 @@ ELSEWHERE = {
     "NUMBA_CACHE_DIR=": "compiles anew what test_warm.py compiles",
     "printhammer sweep spec.toml --out results.zarr --dask": "needs a cluster, in tests/sweep",
     "dask ": "the same",
+    "printhammer figure 11 --out": "the same on the page on strobes",
+    "printhammer figure 11 --scheme runge-kutta-4 --out": "the same for another reading of the paper",
     "pip ": "installs",
     "make ": "installs, and runs this test",
     "mkdir ": "the tests have a folder of their own",
@@ -36,6 +39,8 @@ ELSEWHERE = {
 # What takes minutes as printed runs with fewer values.
 FEWER = {
     "--values 2000": "--values 8",
+    "--values 30": "--values 8",
+    "--longest 2 --starts 100": "--longest 1 --starts 20",
     "'2e10 N s/m^2.5' --to '6e10 N s/m^2.5'": "'2e10 N s/m^2.5' --to '6e10 N s/m^2.5' --values 4",
     "--from '1.39 ms' --to '1.41 ms'": "--from '1.39 ms' --to '1.41 ms' --values 20",
     "--steps 111": "--steps 4 --firings 200",
@@ -62,6 +67,10 @@ FEWER = {
 QUICK = {"README.md", "docs/howto/hammer_files.md", "docs/howto/laboratory.md", "docs/howto/command_line.md"}
 
 
+# Tutorials whose commands run in this process; that of the developer registers a law, in a shell of its own.
+TUTORIALS = ["engineer", "oscilloscope", "data_sheet", "chaos"]
+
+
 def commands_of(page: Path) -> list[str]:
     text = page.read_text("utf-8")
     blocks = "".join(SHELL.findall(text)).replace("\\\n", " ")
@@ -74,7 +83,7 @@ def commands_of(page: Path) -> list[str]:
 def pages() -> Iterator[Any]:
     for page in (ROOT / "README.md", *PAGES):
         name = page.relative_to(ROOT).as_posix()
-        # Those of the tutorials run as scripts.
+        # Those of the tutorials begin in an empty folder, and run below.
         if "tutorials" not in page.parts and commands_of(page):
             yield pytest.param(page, id=name, marks=[] if name in QUICK else [pytest.mark.slow])
 
@@ -114,6 +123,21 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def run_shortened(cli: Callable[..., Any], command: str) -> None:
+    """Run a command of a page, with fewer values where it takes minutes."""
+    printed = f"{command}\n"
+    for long, short in FEWER.items():
+        printed = printed.replace(long, short)
+    program, *words = shlex.split(printed, comments=True)
+    assert program == "printhammer", command
+    to = words[words.index(">") + 1] if ">" in words else None
+    done = cli(*words[: words.index(">")] if to else words)
+    assert done.status == 0, f"{command}\n{done.out}\n{done.err}"
+    assert done.err == ""
+    if to:
+        Path(to).write_text(done.out)
+
+
 @pytest.mark.parametrize("page", list(pages()))
 def test_the_commands_on_a_page_run(
     cli: Callable[..., Any], page: Path, desk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -125,15 +149,36 @@ def test_the_commands_on_a_page_run(
         if file.name in page.read_text("utf-8") and file.name not in written:
             shutil.copy(file, tmp_path)
     for command in commands:
-        printed = f"{command}\n"
-        for long, short in FEWER.items():
-            printed = printed.replace(long, short)
-        program, *words = shlex.split(printed, comments=True)
-        assert program == "printhammer", command
-        to = words[words.index(">") + 1] if ">" in words else None
-        done = cli(*words[: words.index(">")] if to else words)
-        assert done.status == 0, f"{command}\n{done.out}\n{done.err}"
-        assert done.err == ""
-        if to:
-            Path(to).write_text(done.out)
+        run_shortened(cli, command)
     assert [name for name in written if not Path(name).exists()] == []
+
+
+def steps_of(script: str) -> Iterator[tuple[bool, str]]:
+    """Split a script of a shell into commands of the program, and what the shell itself does between them."""
+    command = re.compile(r"^printhammer .*$", re.MULTILINE)
+    script = script.replace(" \\\n", " ")
+    place = 0
+    for found in command.finditer(script):
+        if between := script[place : found.start()].strip():
+            yield False, between
+        yield True, found[0]
+        place = found.end()
+    if rest := script[place:].strip():
+        yield False, rest
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TUTORIALS)
+def test_the_commands_of_a_tutorial_run(
+    cli: Callable[..., Any], name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "docs" / "tutorials" / f"{name}.md").read_text("utf-8")
+    steps = list(steps_of("".join(SHELL.findall(text))))
+    assert sum(own for own, _ in steps) >= 8
+    for own, step in steps:
+        if own:
+            run_shortened(cli, step)
+        else:
+            done = subprocess.run(["sh", "-ec", step], capture_output=True, text=True, check=False)
+            assert done.returncode == 0, f"{step}\n{done.stderr}"
