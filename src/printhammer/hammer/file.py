@@ -94,7 +94,7 @@ class Body(BaseModel):
 
 @dataclass(frozen=True)
 class Contents:
-    """Parsed contents of a hammer file in SI; `parts` by role, `terms` by key, such as "contact.pole"."""
+    """Parsed contents of a hammer file in SI; `parts` by role, forces and contacts (`terms`) by key."""
 
     name: str
     title: str

@@ -40,13 +40,14 @@ MOST_LEVELS = 12
 # Indices of the coil constants.
 RESISTANCE, INDUCTANCE, TURN_RESISTANCE, LEAKAGE, COUPLED = range(COIL, COIL + 5)
 """Indices of the coil constants: coil resistance [ohm], constant inductance [H], resistance [ohm] and leakage
-inductance [H] of the shorted turn (0 without one), and 1 if the coil links the flux of the magnet, else 0."""
+inductance [H] of the shorted turn (0 if there is none), and 1 if the coil links the flux of the magnet, else
+0."""
 # Indices of the supply constants.
 DIODE, SERIES, CAPACITANCE, CHARGING, CHARGED, COILS, CURRENT_SCALE, LINKAGE_SCALE = range(SUPPLY, SUPPLY + 8)
 """Indices of the supply constants: voltage of the freewheeling diode [V], series resistance of an ideal
-source [ohm], capacitance of the reservoir [F] (0 without one), resistance [ohm] and voltage [V] that charge
-it, number of coils that share it; typical current [A] and flux linkage [Wb], the scales of the error
-estimates."""
+source [ohm], capacitance of the reservoir [F] (0 if there is none), resistance [ohm] and voltage [V] that
+charge the reservoir, number of coils that share it; typical current [A] and flux linkage [Wb], the scales of
+the error estimates."""
 
 CUBIC_PIECE, EXPONENTIAL_PIECE, SINE_PIECE, END = 0.0, 1.0, 2.0, 3.0
 """Kinds of waveform pieces; see `printhammer.kernel.model.pulses`; END marks the end of a waveform."""

@@ -89,8 +89,9 @@ def length_in_contact(
 ) -> float:
     """Return the length in the regularised variable s from a backstop state at time `t0` to time `t` [s].
 
-    Like :func:`printhammer.kernel.methods.contact.s_at`, with the lower accuracy that the columns need. If
-    the armature `leaves` at `t`, solves w = 0 instead, since dt/ds = 0 there.
+    The accuracy is lower than that of :func:`printhammer.kernel.methods.contact.s_at`, but sufficient for the
+    tangent columns. If the armature `leaves` the backstop at `t`, the equation solved is w = 0, since there
+    dt/ds = 0.
     """
     kv0 = contact_rate(w0, v0, t0, hammer, drive)
     s, change = 0.0, math.inf
@@ -282,7 +283,10 @@ def carry(t_to: float, node: Any, after: Any, columns: Any, work: Any, setting: 
 
 @compiled
 def carry_state(t_to: float, node: Any, after: Any, columns: Any, work: Any, setting: Setting) -> float:
-    """Propagate state and columns like `carry`, but without `hold_linkage`."""
+    """Propagate state and tangent columns to `t_to` [s]; without current, their flux linkage is not set yet.
+
+    Returns the logarithm of a factor that has been divided out of the columns.
+    """
     hammer, drive, forcing = setting.hammer, driven(setting.drive, electric_in(work[START])), setting.forcing
     t = work[START, TIME]
     if t_to <= t:

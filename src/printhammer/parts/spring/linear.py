@@ -3,7 +3,7 @@
     Fs = Bs - (Bs / As)(x - b)  =  preload - stiffness (x - b)
 
 Source: F. Hendriks, IBM J. Res. Develop. 27 (1983), equation (4), and Hooke's law; b is the position of the
-backstop (0 without one). Bs, the preload, is the force at the backstop, and As the travel over which the
+backstop (0 if there is none). Bs, the preload, is the force at the backstop, and As the travel over which the
 force falls to zero. Preload and stiffness may have any sign: a negative stiffness describes the pull of a
 magnet linearised about a point, or a buckled spring; a preload of zero with b = 0 is the spring of the
 textbook impact oscillator.
