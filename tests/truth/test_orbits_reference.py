@@ -97,8 +97,9 @@ def test_unstable_orbits_of_a_strange_train(strange: Orbits) -> None:
     assert {orbit.firings for orbit in strange} == {1, 2}
     for orbit in strange:
         assert orbit.kind == "saddle"
-        if abs(orbit.multipliers[0]) < 100.0:
-            check(orbit)
+    # The reference takes seconds for each orbit.
+    for orbit in [orbit for orbit in strange if abs(orbit.multipliers[0]) < 100.0][:3]:
+        check(orbit)
     check_multipliers(min(strange, key=lambda orbit: abs(orbit.multipliers[0])))
 
 
@@ -106,6 +107,6 @@ def test_unstable_orbits_of_a_strange_train(strange: Orbits) -> None:
 def test_orbits_of_a_fast_train(cut: Orbits) -> None:
     checked = [orbit for orbit in cut if orbit.phase == 0.0 and abs(orbit.multipliers[0]) < 100.0]
     assert len(checked) >= 2
-    for orbit in checked:
+    for orbit in checked[:3]:
         check(orbit)
     check_multipliers(checked[0])

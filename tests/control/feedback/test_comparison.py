@@ -252,7 +252,7 @@ def test_dots_that_follow_a_landing_are_within_limits() -> None:
     hammer = ph.load("hendriks-1983")
     controller = Controller(hammer, driver_of(hammer))
     single, way = controller.single, FeedbackStrategy(controller)
-    for gap in (0.88e-3, 0.97e-3, 1.05e-3, 1.15e-3, 1.3e-3):
+    for gap in (0.88e-3, 1.05e-3, 1.3e-3):
         dots = ph.simulate(hammer, way(hammer, [(0, 1, 2, 3)], 1.0 / gap)[0]).dots
         force = np.array([dot.peak_force for dot in dots], dtype=float) / single.force - 1.0
         touched = np.array([dot.fired_at + (dot.flight_time or np.nan) for dot in dots])

@@ -208,7 +208,7 @@ print(loaded)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["hendriks-1983", "relay-5v", "tung-shaw-1988"])
+@pytest.mark.parametrize("name", ["hendriks-1983", "relay-5v"])
 def test_what_is_linked_gives_the_bits_of_what_is_compiled_with_its_laws(name: str) -> None:
     found = linked.of_shipped(name)
     assert found.linked.steps == found.whole.steps > 50
@@ -216,7 +216,7 @@ def test_what_is_linked_gives_the_bits_of_what_is_compiled_with_its_laws(name: s
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("names", linked.sample(3), ids=str)
+@pytest.mark.parametrize("names", linked.sample(2), ids=str)
 def test_random_combinations_give_what_is_compiled_with_their_laws(
     names: tuple[str, str, str, str, bool],
 ) -> None:

@@ -1,6 +1,7 @@
 """Candidates judged by the claims, and the log of judged candidates."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from tests.hammers import CRUDE
 
 from printhammer.chaos import strobe
 from printhammer.claims import Context, claims, judge
+from printhammer.claims.verdicts import poincare, printed_verdicts
 from printhammer.errors import InputError
 
 QUICK = ("geometry", "single_pulse_stroke", "release_margin", "two_pulses_660us", "print_force")
@@ -207,14 +209,16 @@ def test_files_that_cannot_be_read_or_written_are_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_panels_of_the_shipped_hammer_are_those_of_the_claim() -> None:
+def test_panels_of_the_shipped_hammer_are_those_of_the_claim(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three of the twelve panels: all are judged in the same way."""
+    claim, some = claims()[FIGURE_11], dict(list(printed_verdicts().items())[::4])
+    claim = replace(claim, settings={"strobe_times_s": list(some)}, band={"verdicts": list(some.values())})
+    monkeypatch.setattr(module, "printed_verdicts", lambda: some)
     hammer = hammer_of(constants_in(CRUDE))
     found = plain_panels(hammer)
-    value = judge(Context(hammer), claims()[FIGURE_11]).value
+    value = poincare(Context(hammer), claim).value
     assert value is not None
-    for name, printed, whole in zip(
-        found, claims()[FIGURE_11].band["verdicts"], value["verdicts"], strict=True
-    ):
+    for name, printed, whole in zip(found, some.values(), value["verdicts"], strict=True):
         assert found[name][1] == printed
         # With all changes of constants and tolerance, the plain verdict is one of those found.
         assert found[name][0] in whole.split(" or ")
