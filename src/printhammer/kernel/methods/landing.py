@@ -219,24 +219,6 @@ def lets_go_or_takes_hold(x: float, v: float, mode: int, hammer: Hammer) -> bool
     return number > 0.0 if mode in (M.PACK_RELEASED, M.BACKSTOP_RELEASED) else number < 0.0
 
 
-@called
-def land_on_push(start: State, h: float, upper: float, law: ForceLaw, control: Control) -> State:
-    """Locate by bisection where a contact starts or ceases to push in a step `h`, up to fraction `upper`."""
-    t, x, v, a = start
-    low, high = 0.0, upper
-    while (high - low) * h > 1e-15 * control[0] / control[1]:
-        middle = 0.5 * (low + high)
-        if not (low < middle < high):
-            break
-        x1, v1, _a1, _ex, _ev = plain_step(t, x, v, a, middle * h, law)
-        if lets_go_or_takes_hold(x1, v1, law.mode, law.hammer):
-            high = middle
-        else:
-            low = middle
-    x1, v1, a1, _ex, _ev = plain_step(t, x, v, a, high * h, law)
-    return t + high * h, x1, v1, a1
-
-
 @inlined
 def is_cut(v0: float, v1: float, hammer: Hammer) -> bool:
     """Whether the dissipative force of the spring has a kink between two velocities [m/s]."""
@@ -244,15 +226,23 @@ def is_cut(v0: float, v1: float, hammer: Hammer) -> bool:
 
 
 @called
-def land_on_cut(start: State, h: float, upper: float, law: ForceLaw, control: Control) -> State:
-    """Locate by bisection a kink of the dissipative force in a step `h`, up to fraction `upper`."""
+def land_on_push(start: State, h: float, upper: float, cut: bool, law: ForceLaw, control: Control) -> State:
+    """Locate by bisection where a contact starts or ceases to push in a step `h`, up to fraction `upper`.
+
+    With `cut`, a contact of the spring law; otherwise the pack or the backstop.
+    """
     t, x, v, a = start
     low, high = 0.0, upper
     while (high - low) * h > 1e-15 * control[0] / control[1]:
         middle = 0.5 * (low + high)
         if not (low < middle < high):
             break
-        if is_cut(v, plain_step(t, x, v, a, middle * h, law)[1], law.hammer):
+        x1, v1, _a1, _ex, _ev = plain_step(t, x, v, a, middle * h, law)
+        if VISCOUS and cut:
+            passed = is_cut(v, v1, law.hammer)
+        else:
+            passed = lets_go_or_takes_hold(x1, v1, law.mode, law.hammer)
+        if passed:
             high = middle
         else:
             low = middle
@@ -412,7 +402,7 @@ def advance(
         else:
             end = land_on_level(start, h, fraction, upper, level, sign, law, control)
         if VISCOUS and end[0] > t and is_cut(v, end[2], law.hammer):
-            end = land_on_cut(start, h, min(1.0, (end[0] - t) / h), law, control)
+            end = land_on_push(start, h, min(1.0, (end[0] - t) / h), True, law, control)
             switch = M.REACHED_LEVEL
         if LEVELS and h > shortest and end[0] > t and is_near_level(x, end[1], law.hammer):
             # Near a kink, a law may be a fractional power of the distance: the error of the step is then as
@@ -425,7 +415,7 @@ def advance(
         may_let_go = HAS_PACK and not PACK_PULLS and mode in (M.LOADING, M.PACK_RELEASED)
         may_let_go = may_let_go or (not BACKSTOP_PULLS and mode == M.BACKSTOP_RELEASED)
         if may_let_go and end[0] > t and lets_go_or_takes_hold(end[1], end[2], mode, law.hammer):
-            end = land_on_push(start, h, min(1.0, (end[0] - t) / h), law, control)
+            end = land_on_push(start, h, min(1.0, (end[0] - t) / h), False, law, control)
             switch = M.PUSH_BEGAN if mode in (M.PACK_RELEASED, M.BACKSTOP_RELEASED) else M.PUSH_ENDED
         if HAS_CIRCUIT:
             if switch not in (M.NO_SWITCH, M.EDGE):
