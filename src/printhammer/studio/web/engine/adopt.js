@@ -6,6 +6,7 @@ const PLACES = ["backstop.position", "pack.front", "platen"];
 const SPAN = 10; // of a control about its value, as in printhammer/hammer/names.py
 const WORDS = ["name", "title", "note", "strike", "struck", "mover"];
 const SECTIONS = ["magnet", "coil", "spring", "pack", "backstop", "damping"];
+const LISTS = ["force", "contact"];
 const UNREAD = ["uncertainty", "waveform", "format", "length_unit", "time_unit", "views", ...WORDS];
 const STATUSES = ["stated", "datasheet", "derived", "reconstructed", "assumed"];
 
@@ -15,6 +16,9 @@ function entriesOf(document) {
   for (const [key, content] of Object.entries(document)) {
     if (UNREAD.includes(key)) continue;
     if (SECTIONS.includes(key) && isTable(content)) for (const [name, entry] of Object.entries(content)) found[`${key}.${name}`] = entry;
+    else if (LISTS.includes(key) && Array.isArray(content)) {
+      for (const { name: own, ...rest } of content.filter(isTable)) for (const [name, entry] of Object.entries(rest)) found[`${key}.${own}.${name}`] = entry;
+    }
     else found[key] = content;
   }
   return found;
@@ -22,14 +26,18 @@ function entriesOf(document) {
 const isQuantity = (entry) => isTable(entry) && "value" in entry;
 const bare = (entry) => (isQuantity(entry) ? { value: entry.value, unit: entry.unit } : entry);
 
-/** Why the entries of a file are not those of a hammer of the page; empty where they are, but for their values. */
-function differenceOf(own, known) {
+/** Why the entries of a file are not those of a hammer of the page; empty where only the values of its controls differ. */
+function differenceOf(own, known, controls) {
   const missing = Object.keys(known).find((key) => !(key in own));
   const further = Object.keys(own).find((key) => !(key in known));
   if (missing) return `${missing} is missing`;
   if (further) return `${further.slice(0, 60)} is not known`;
-  const other = Object.keys(known).find((key) => !isQuantity(known[key]) && own[key] !== known[key]);
-  return other ? `${other} = ${String(own[other]).slice(0, 40)}` : "";
+  const isSame = (key) => {
+    if (!isQuantity(known[key])) return own[key] === known[key];
+    return controls.includes(key) || (isQuantity(own[key]) && own[key].value === known[key].value && own[key].unit === known[key].unit);
+  };
+  const other = Object.keys(known).find((key) => !isSame(key));
+  return other ? `${other} = ${(isQuantity(own[other]) ? `${own[other].value} ${own[other].unit}` : String(own[other])).slice(0, 40)}` : "";
 }
 
 /** The range of a control about its value. */
@@ -63,7 +71,7 @@ function entryOf(text, shelf, templates) {
   const own = entriesOf(document);
   let [template, why] = [null, ""];
   for (const { entry, known } of templates) {
-    const difference = differenceOf(own, known);
+    const difference = differenceOf(own, known, entry.described.constants.map((control) => control.key));
     if (!difference) { template = entry; break; }
     // The difference from the hammer with the same law of the magnet and the pack says most.
     if (!why || (known["magnet.law"] === own["magnet.law"] && known["pack.law"] === own["pack.law"])) why = difference;
