@@ -119,11 +119,8 @@ def test_a_hidden_offset_of_the_sensor_costs_nothing(
 
 
 @pytest.mark.slow
-def test_nothing_is_lost_where_the_own_pulse_prints_every_dot(
-    at_safe_rate: LearningLaw, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_nothing_is_lost_where_the_own_pulse_prints_every_dot(at_safe_rate: LearningLaw) -> None:
     """Near the safe rate the fast switch loses a third of a row that the own pulse of the hammer prints."""
-    monkeypatch.setattr("printhammer.control.learning.learn.RUNS", RUNS[:1])
     (unit,) = Variability().times(0.5).draw(nominal(), 1, 1)
     _learners, stages = calibrate(at_safe_rate, [unit], ImpactSensor(seed=7))
     assert (worse(at_safe_rate, unit, stages) <= 0.0).all()
@@ -143,7 +140,7 @@ def test_no_unit_is_below_the_better_open_loop_where_the_readings_decide(
 ) -> None:
     """After one run of random units at the safe rate; otherwise the result says that they do not decide."""
     monkeypatch.setattr("printhammer.control.learning.learn.RUNS", RUNS[:1])
-    units = Variability().draw(nominal(), 2, 4403)
+    units = Variability().draw(nominal(), 6, 4403)
     stages = calibrate(at_safe_rate, units, Hidden(seed=3))[1]
     below = np.array([worse(at_safe_rate, unit, stages, k)[0] for k, unit in enumerate(units)])
     decided = stages[1].learned | (stages[1].loop_certainty >= SURE)
