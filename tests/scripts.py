@@ -11,6 +11,7 @@ import matplotlib as mpl
 import pytest
 from matplotlib import pyplot as plt
 
+from printhammer.kernel.compile import cache, specialise
 from printhammer.parts import PARTS
 
 ROOT = Path(__file__).parents[1]
@@ -28,6 +29,9 @@ def run_here(script: Path, folder: Path, patch: pytest.MonkeyPatch) -> None:
     patch.setattr(tempfile, "tempdir", str(folder))
     patch.setattr(sys, "argv", [str(script)])
     patch.setattr(sys, "path", [str(script.parent), str(EXAMPLES), *sys.path])
+    # Verbs that ran before in this process announce compilations on the standard error.
+    patch.setattr(cache, "listeners", set())
+    patch.setattr(specialise, "begin_ahead", None)
     try:
         runpy.run_path(str(script), run_name="__main__")
     finally:
