@@ -81,15 +81,10 @@ def test_intervals_cover_the_truth_in_a_few_laboratories(tmp_path: Path) -> None
 
 
 @pytest.mark.slow
-def test_intervals_cover_the_truth_as_often_as_they_say(tmp_path: Path) -> None:
-    """The static constants are known here; those of a laboratory, with errors, are in test_recovery.py.
-
-    Of 50 honest intervals, fewer than 42 hold in 8 of 10,000 tries; all 100 of both constants in 6 of 1000.
-    """
-    counts = covered(tmp_path, range(50))
-    assert set(counts) == {"mass", "backstop.damping"}
-    assert min(counts.values()) >= 42
-    assert sum(counts.values()) < 100
+def test_intervals_cover_the_truth_in_89_to_99_of_100(tmp_path: Path) -> None:
+    """The static constants are known here; those of a laboratory, with errors, are in test_recovery.py."""
+    for key, count in covered(tmp_path, range(100)).items():
+        assert 89 <= count <= 99, key
 
 
 def test_low_pass_of_a_motion() -> None:
