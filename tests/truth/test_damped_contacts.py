@@ -72,7 +72,7 @@ def test_a_contact_that_opens_faster_than_its_force_grows_back_never_pulls() -> 
 
 @pytest.mark.parametrize(("law", "within"), [("linear", 1e-6), ("hertz", 2e-5)])
 def test_tangent_maps_through_damped_contacts(law: str, within: float) -> None:
-    """An armature between a damped contact and a rigid backstop, which it also strikes in another contact.
+    """An armature between a damped contact and a rigid backstop, before which another damped contact closes.
 
     The columns take the steps of the run, which at the touch of a Hertz contact are less accurate, whether or
     not the contact is damped.

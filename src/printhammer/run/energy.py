@@ -148,7 +148,9 @@ class Ledger(Declared):
     backstop_loss: float = scalar(
         "J", "minus the integral of Fe v dt, plus the energy lost in impacts on a rigid backstop"
     )
-    damping_loss: float = scalar("J", "minus the integral of the damping force of the armature times v dt")
+    damping_loss: float = scalar(
+        "J", "minus the integral of v dt times damping of the armature and of contacts"
+    )
     supply_work: float = scalar("J", "energy delivered by a voltage supply")
     copper_loss: float = scalar("J", "heat of the coil under a voltage drive")
     driver_loss: float = scalar("J", "heat in the supply's resistance and the diodes")

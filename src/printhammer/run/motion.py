@@ -56,8 +56,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 FORCES: Final = ("magnet", "spring", "pack", "backstop", "damping", "drag", "drive", "total")
-"""Names of the forces: equations (3) to (7), damping of the armature (if the hammer has any), a drive that is
-a force, and the total."""
+"""Names of the forces: equations (3) to (7), "drag" (damping of the armature, and of contacts in the list
+``[[contact]]``, if the hammer has any), a drive that is a force, and the total."""
 
 PATHS: Final = ("supply", "chopped", "blocked", "backward")
 """Paths of the coil current: through the supply, through the diode of a chopper, no path (no current), and

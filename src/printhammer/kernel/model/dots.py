@@ -1,7 +1,7 @@
 """Assignment of pack contacts to firings: which contact makes a dot, and the columns of a row of dot data.
 
 A pack contact belongs to the latest firing at or before its touch. The first contact of a firing makes its
-dot, later ones are extra contacts. A contact that is open at the start of a run belongs to no firing.
+dot, later contacts are extra contacts. A contact that is open at the start of a run belongs to no firing.
 
 The dot array of one run has a row for each firing, in order, followed by a row for each extra contact, sorted
 by touch time. In a row of an extra contact, the first column holds the index of its firing; the other columns

@@ -40,12 +40,12 @@ MOST_LEVELS = 12
 # Indices of the coil constants.
 RESISTANCE, INDUCTANCE, TURN_RESISTANCE, LEAKAGE, COUPLED = range(COIL, COIL + 5)
 """Indices of the coil constants: coil resistance [ohm], constant inductance [H], resistance [ohm] and leakage
-inductance [H] of the shorted turn (0 if there is none), and 1 if the coil links the flux of the magnet, else
+inductance [H] of the shorted turn (0 if absent), and 1 if the coil links the flux of the magnet, else
 0."""
 # Indices of the supply constants.
 DIODE, SERIES, CAPACITANCE, CHARGING, CHARGED, COILS, CURRENT_SCALE, LINKAGE_SCALE = range(SUPPLY, SUPPLY + 8)
 """Indices of the supply constants: voltage of the freewheeling diode [V], series resistance of an ideal
-source [ohm], capacitance of the reservoir [F] (0 if there is none), resistance [ohm] and voltage [V] that
+source [ohm], capacitance of the reservoir [F] (0 if absent), resistance [ohm] and voltage [V] that
 charge the reservoir, number of coils that share it; typical current [A] and flux linkage [Wb], the scales of
 the error estimates."""
 

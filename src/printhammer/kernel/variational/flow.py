@@ -98,8 +98,8 @@ def orthonormalise_with_circuit(columns: Any, scales: Any, hammer: Hammer, grown
 def orthonormalise(columns: Any, scales: Any, grown: Any) -> None:
     """Orthonormalise the columns, scaled by `scales`; add the logarithms of their lengths to `grown`.
 
-    The method is Gram-Schmidt. A column that depends linearly on the earlier ones is replaced, and its growth
-    is set to minus infinity.
+    The method is Gram-Schmidt. A column that depends linearly on the earlier columns is replaced, and its
+    growth is set to minus infinity.
     """
     for k in range(columns.shape[1]):
         columns[0, k] /= scales[0]

@@ -3,8 +3,8 @@
     Fs = Bs - (Bs / As)(x - b)  =  preload - stiffness (x - b)
 
 Source: F. Hendriks, IBM J. Res. Develop. 27 (1983), equation (4), and Hooke's law; b is the position of the
-backstop (0 if there is none). Bs, the preload, is the force at the backstop, and As the travel over which the
-force falls to zero. Preload and stiffness may have any sign: a negative stiffness describes the pull of a
+backstop (0 without a backstop). Bs, the preload, is the force at the backstop, and As the travel over which
+the force falls to zero. Preload and stiffness may have any sign: a negative stiffness describes the pull of a
 magnet linearised about a point, or a buckled spring; a preload of zero with b = 0 is the spring of the
 textbook impact oscillator.
 Validity: the linear range of the spring. Weakness: neither mass nor damping of its own.
@@ -34,7 +34,7 @@ def spring_energy(c: Any, x: float) -> float:
 def spring_packed(q: Any, origin: float, c: Any) -> int:
     """Write the packed constants (preload, stiffness, b) from the values of the part; return their count.
 
-    The numbers are Bs and As, or preload and stiffness; then 0 or 1 for the former or the latter.
+    The numbers are Bs, As and 0, or preload, stiffness and 1.
     """
     c[0], c[1], c[2] = q[0], q[1] if q[2] == 1.0 else q[0] / q[1], origin
     return 3
