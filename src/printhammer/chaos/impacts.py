@@ -66,17 +66,17 @@ class Section(Result):
     )
     since: FloatArray = column("s", "time since the last firing", "touch")
     t_out: FloatArray = column(
-        "s", "time of leaving", "touch", more="nan if the contact is open at the end of the run"
+        "s", "time of departure", "touch", more="nan if the contact is open at the end of the run"
     )
     v_out: FloatArray = column(
-        "m/s", "velocity at leaving", "touch", more="nan if the contact is open at the end of the run"
+        "m/s", "velocity at departure", "touch", more="nan if the contact is open at the end of the run"
     )
     wanted: int = scalar(
         "1",
         "number of touches requested",
         more="fewer are recorded if the surface is not touched often enough",
     )
-    status: str = part("how the run ended")
+    status: str = part("status of the run")
     tolerance: float = part("tolerance of the integration")
 
     @property

@@ -28,7 +28,7 @@ DOT_QUANTITIES: Final = {
     "impact_speed": ("m/s", "speed at touch"),
     "peak_force": ("N", "largest pack force"),
     "indentation": ("m", "largest indentation"),
-    "contact_time": ("s", "time from touch to leaving"),
+    "contact_time": ("s", "time from touch to departure"),
     "loading_work": ("J", "work done on the pack up to its largest indentation"),
     "net_loss": ("J", "energy absorbed by the pack"),
     "return_time": ("s", "time from firing to the first touch of the backstop after the dot"),

@@ -97,7 +97,7 @@ class Sensitivities(Result):
         "False if the motion passes a touch without velocity",
         more="derivatives after such a touch are invalid",
     )
-    status: str = part("how the run ended", more='the derivatives are nan unless it is "ok"')
+    status: str = part("status of the run", more='the derivatives are nan unless it is "ok"')
     tolerance: float = part("tolerance of the integration")
 
     @property

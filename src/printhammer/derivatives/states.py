@@ -62,7 +62,7 @@ class TangentMap(Declared):
     smooth: bool = part(
         "whether the state has a derivative; False if the motion passes a touch without velocity"
     )
-    status: str = part("how the run ended")
+    status: str = part("status of the run")
 
     @property
     def ok(self) -> bool:
@@ -105,7 +105,7 @@ class Exponent(Declared):
     period: float = scalar("s", "time between firings")
     factors: FloatArray = part("logarithm of the growth from each firing to the next")
     smooth: bool = part("whether the motion has a derivative; False if it passes a touch without velocity")
-    status: str = part("how the run ended")
+    status: str = part("status of the run")
     second_factors: FloatArray = part(
         "as `factors`, for the second exponent", repr=False, default_factory=lambda: np.zeros(0)
     )

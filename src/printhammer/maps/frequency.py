@@ -48,7 +48,7 @@ LAYOUT: Final = {
     "struck": Column("1", "whether the firing made a dot", _FIRED),
     "flight_time": Column("s", "time from firing to touch of the pack", _FIRED),
     "peak_force": Column("N", "largest pack force of the dot", _FIRED),
-    "status": Column("1", "how the run ended", ("rate",), dtype=np.int32),
+    "status": Column("1", "status of the run", ("rate",), dtype=np.int32),
 }
 """Unit, meaning and dimensions of each variable of a map, by name."""
 

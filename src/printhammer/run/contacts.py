@@ -32,9 +32,9 @@ class Contact(Declared):
 
     surface: Literal["pack", "backstop"] = part("touched surface")
     t_in: float = scalar("s", "time of touch", more="start of the run if the contact was open then")
-    v_in: float = scalar("m/s", "velocity at touch", more="likewise")
-    t_out: float | None = scalar("s", "time of leaving", more="None while the contact is open")
-    v_out: float | None = scalar("m/s", "velocity at leaving", more="None while the contact is open")
+    v_in: float = scalar("m/s", "velocity at touch", more="at the start of the run if the contact was open then")
+    t_out: float | None = scalar("s", "time of departure", more="None while the contact is open")
+    v_out: float | None = scalar("m/s", "velocity at departure", more="None while the contact is open")
     t_peak: float = scalar("s", "time of the largest indentation or compression")
     depth: float = scalar("m", "largest indentation or compression")
     peak_force: float | None = scalar(
@@ -68,7 +68,7 @@ class Dot(Declared):
     peak_force: float | None = scalar("N", "largest pack force", default=None)
     indentation: float | None = scalar("m", "largest indentation", default=None)
     contact_time: float | None = scalar(
-        "s", "time from touch to leaving", more="None also while the contact is open", default=None
+        "s", "time from touch to departure", more="None also while the contact is open", default=None
     )
     loading_work: float | None = scalar(
         "J", "work done on the pack up to its largest indentation", default=None
@@ -183,7 +183,7 @@ class DotTable(Result):
     peak_force: FloatArray = column("N", "largest pack force", _FIRINGS)
     indentation: FloatArray = column("m", "largest indentation", _FIRINGS)
     contact_time: FloatArray = column(
-        "s", "time from touch to leaving", _FIRINGS, more="NaN also while the contact is open"
+        "s", "time from touch to departure", _FIRINGS, more="NaN also while the contact is open"
     )
     extra_contacts: IntArray = column("1", "further pack contacts before the next firing", _FIRINGS)
 
@@ -249,7 +249,7 @@ class Closing(Declared):
 
     contact: str = part("name of the contact")
     t_in: float = scalar("s", "time of closing", more="start of the run if the contact was closed then")
-    v_in: float = scalar("m/s", "velocity at closing", more="likewise")
+    v_in: float = scalar("m/s", "velocity at closing", more="at the start of the run if the contact was closed then")
     t_out: float | None = scalar("s", "time of opening", more="None while the contact is closed")
     v_out: float | None = scalar("m/s", "velocity at opening", more="None while the contact is closed")
     depth: float = scalar("m", "largest indentation")

@@ -71,10 +71,10 @@ class Strobes(Result):
         default=None,
     )
     turn: FloatArray | None = column(
-        "A", "current in the shorted turn", _TIMES, more="likewise", default=None
+        "A", "current in the shorted turn", _TIMES, more="None and NaN as for `current`", default=None
     )
     reservoir: FloatArray | None = column(
-        "V", "voltage of the supply's capacitor", _TIMES, more="likewise", default=None
+        "V", "voltage of the supply's capacitor", _TIMES, more="None and NaN as for `current`", default=None
     )
 
     def entries(self) -> Entries:
@@ -91,7 +91,7 @@ class Strobes(Result):
 class EnsembleResult(Result):
     """Results of an ensemble: status of each run, and the requested dots, states and displacements."""
 
-    status: IntArray = column("1", "how the run ended", "member", more="0 is ok", codes=STATUS_NAMES)
+    status: IntArray = column("1", "status of the run", "member", more="0 is ok", codes=STATUS_NAMES)
     reached: FloatArray = column("s", "time at which the run ended", "member")
     steps: IntArray = column("1", "steps of the integrator", "member")
     dots: DotTable | None = part("dots of the firings", more="if requested", default=None)

@@ -184,7 +184,7 @@ class Touches(Declared):
         "time, s, and velocity, m/s, at touch and at leaving, shape (n, 4)",
         more="NaN for a contact that is open at the end",
     )
-    status: str = part("how the run ended", more='"ok" also if the run ended after the requested touches')
+    status: str = part("status of the run", more='"ok" also if the run ended after the requested touches')
     reached: float = scalar("s", "time that the run has reached")
 
 

@@ -65,7 +65,7 @@ class Output:
 _CODES: Final = ("status", "strobe_branch")
 
 ALWAYS: Final = (
-    Output("status", "", "int8", "", "how the run ended"),
+    Output("status", "", "int8", "", "status of the run"),
     Output("reached", "", "float64", "s", "time at which the run ended"),
     Output("steps", "", "int64", "", "steps of the integrator"),
 )
@@ -79,7 +79,7 @@ DOTS: Final = (
     Output("impact_speed", FIRING, "float64", "m/s", "velocity at touch"),
     Output("peak_force", FIRING, "float64", "N", "largest pack force"),
     Output("indentation", FIRING, "float64", "m", "largest indentation of the pack"),
-    Output("contact_time", FIRING, "float64", "s", "time from touch to leaving"),
+    Output("contact_time", FIRING, "float64", "s", "time from touch to departure"),
     Output("extra_contacts", FIRING, "int64", "", "further pack contacts before the next firing"),
 )
 STROBES: Final = (

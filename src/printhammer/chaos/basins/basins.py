@@ -211,7 +211,7 @@ class Basins(Result, rows="v x"):
         more="or after which it stayed undecided",
         dtype=np.int32,
     )
-    status: TextArray = column("", "how the run ended", "v x", more='or "no state"')
+    status: TextArray = column("", "status of the run", "v x", more='or "no state"')
     compared: int = scalar("1", "number of sampled cells that were recomputed at a tenth of the tolerance")
     changed: int = scalar("1", "number of recomputed cells whose label differs, since rounding decides it")
     tolerance: float = part("tolerance of the integration")

@@ -81,7 +81,7 @@ class QuenchMap(Result):
         "gap width",
         more="from firing to touch; nan for a lost dot",
     )
-    status: TextArray = column("", "how the run ended", "gap width")
+    status: TextArray = column("", "status of the run", "gap width")
     single_force: float = scalar(
         "N", "largest pack force of the first pulse alone", more="nan if it makes no dot"
     )

@@ -43,7 +43,7 @@ class Columns(Declared):
     """States of many trains at successive sections, with the final state of each train."""
 
     x: FloatArray = column("m", "displacement", "train point", more="NaN after the end of a run")
-    v: FloatArray = column("m/s", "velocity", "train point", more="likewise")
+    v: FloatArray = column("m/s", "velocity", "train point", more="NaN after the end of a run")
     branch: npt.NDArray[np.int8] = column(
         "1",
         "mode of motion, as an index of `printhammer.run.ensemble.MODE_NAMES`",

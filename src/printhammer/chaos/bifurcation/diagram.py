@@ -178,7 +178,7 @@ class Bifurcation(Result, rows="direction column"):
         more="computed for motions of period 5 or more that may come to rest on a rigid backstop",
         dtype=np.int8,
     )
-    status: TextArray = column("", "how the run ended", "direction column")
+    status: TextArray = column("", "status of the run", "direction column")
     levels: IntArray = column(
         "1",
         "refinement level, 0 for a given value",

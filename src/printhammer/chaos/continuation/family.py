@@ -53,7 +53,7 @@ class Touch(Declared):
     surface: Surface = part('"pack" or "backstop"')
     t_in: float = scalar("s", "time of touch")
     t_out: float = scalar(
-        "s", "time of leaving", more="may be in the next period; infinite if the contact does not end"
+        "s", "time of departure", more="may be in the next period; infinite if the contact does not end"
     )
     v_in: float = scalar("m/s", "velocity at touch")
 

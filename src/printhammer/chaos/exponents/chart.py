@@ -71,7 +71,7 @@ class LyapunovChart(Result, rows="period"):
     verdict: tuple[str, ...] = column("", "classification by the strobe points", "period")
     growth: tuple[str, ...] = column("", "classification by the largest exponent alone", "period")
     zero_one: tuple[str, ...] = column("", "classification by the 0-1 test", "period")
-    status: tuple[str, ...] = column("", "how the run ended", "period")
+    status: tuple[str, ...] = column("", "status of the run", "period")
     smooth: BoolArray = column("1", "whether the motion has a derivative", "period", dtype=np.int8)
 
     @property

@@ -85,7 +85,7 @@ class Strobe(Result):
         "firing",
         more="0 except on the unloading branch",
     )
-    status: str = part("how the run ended")
+    status: str = part("status of the run")
     tolerance: float = part("tolerance of the integration")
     verdict: Verdict | None = part(
         "classification of the motion, with the evidence", more="None if not requested"
