@@ -190,7 +190,7 @@ def sections(
 def _counts(
     touches: SupportsIndex, transient: SupportsIndex, firings: SupportsIndex | None
 ) -> tuple[int, int, int]:
-    """Validate the counts of touches, transient firings and maximum firings; return them as integers."""
+    """Validate the numbers of touches, transient firings and maximum firings; return three integers."""
     wanted, skipped = read_count(touches, "touches"), read_count(transient, "transient", least=0)
     room = MOST_PULSES - skipped - 1
     limit = min(_FIRINGS_A_TOUCH * wanted, room) if firings is None else read_count(firings, "firings")
@@ -425,7 +425,7 @@ def _range(intervals: FloatArray) -> tuple[float, float]:
 
 
 def _fano(times: FloatArray, length: float) -> tuple[int, float]:
-    """Count windows of a given length, s; return their number and the Fano factor of the impacts in them."""
+    """Divide a train into windows of a given length, s; return their number, and the Fano factor."""
     # Windows start half an interval before the first impact, so that impacts of a clock avoid the edges.
     begin = times[0] - 0.5 * (times[-1] - times[0]) / (len(times) - 1)
     windows = int((times[-1] - begin) // length)

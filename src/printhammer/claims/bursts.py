@@ -218,7 +218,7 @@ def weak_prints_when_hung_up(context: Context, _claim: Claim) -> Measured:
 
 
 def later_impacts(motion: Motion) -> list[tuple[float, bool]]:
-    """Return the peak force, N, of each pack contact after the first, and whether it is a distinct impact.
+    """Return the peak force, N, of each pack contact after the first, and whether the contact is distinct.
 
     An impact is distinct if at most one pulse was fired since the preceding contact: several pulses that
     together lift the armature cause a single impact.

@@ -251,7 +251,7 @@ def falling(values: Sequence[float]) -> bool:
 
 
 def rank_correlation(first: Sequence[float], second: Sequence[float]) -> float | None:
-    """Return Spearman's rank correlation, with mean ranks for ties; None if it is undefined."""
+    """Return Spearman's rank correlation, with mean ranks for ties; None if undefined."""
     if len(first) < 2 or len(set(first)) < 2 or len(set(second)) < 2:
         return None
     a, b = _ranks(first), _ranks(second)

@@ -12,7 +12,7 @@ from printhammer.claims.verdicts import panel_name, printed_verdicts
 from printhammer.support.arrays import FloatArray
 
 _ORBIT_TIME: Final = 4e-3
-"""Duration of the single-pulse orbit, s: from the first return until it has settled; arbitrary."""
+"""Duration of the single-pulse orbit, s: from the first return until the armature has settled; arbitrary."""
 _ORBIT_POINTS: Final = 200_001  # Points of the orbit, dense compared with the distances measured; arbitrary
 _LATTICE: Final = 101  # Points along each axis of the window; arbitrary
 

@@ -91,7 +91,7 @@ class Files(Option):
     """Option for output files, which the runner checks before the computation and writes afterwards."""
 
     endings: tuple[str, ...] = ()
-    """Accepted file endings besides those of pictures; if empty, every ending is accepted."""
+    """Accepted file endings, in addition to the endings of pictures; if empty, every ending is accepted."""
     pictures: bool = True
     """Whether pictures are accepted."""
     continued: bool = False

@@ -32,7 +32,7 @@ def _plain(error: UnicodeError) -> tuple[str, int]:
 
 
 def allow_any_text() -> None:
-    """Make the standard streams replace characters they cannot encode, such as "µ" in ASCII."""
+    """Make the standard streams replace characters that the encoding lacks, such as "µ" in ASCII."""
     codecs.register_error(__name__, _plain)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -40,7 +40,7 @@ def allow_any_text() -> None:
 
 
 def console() -> Console:
-    """Return the console of the standard output, wide enough for tables if it is not a terminal."""
+    """Return the console of the standard output; without a terminal, wide enough for tables."""
     return Console(highlight=False, emoji=False, width=None if sys.stdout.isatty() else _WIDTH)
 
 

@@ -28,7 +28,7 @@ from printhammer.support.arrays import FloatArray
 from printhammer.support.roots import bisect
 
 COLUMNS: Final = {"voltage": "V", "ambient": "degC", "rate": "Hz"}
-"""Columns of a file of rates, and their SI units."""
+"""Columns of a file of permitted dot rates, with their SI units."""
 
 _HIGHEST: Final = 1e4  # Upper end of the search, K above the hottest ambient temperature; arbitrary
 

@@ -45,7 +45,7 @@ _STYLED: Final = re.compile("⟪([a-z]+) ([^⟪⟫]*)⟫")
 
 
 def quantity(value: float | None, unit: str, *, bare: bool = False) -> str:
-    """Return the mark of an SI quantity with a unit from `SHOWN`, or a dash; `bare` hides the unit."""
+    """Mark an SI quantity for conversion to the reader's units; a dash for None; `bare` hides the unit."""
     return NONE if value is None else f"⟦{float(value)!r} {unit}{'!' * bare}⟧"
 
 

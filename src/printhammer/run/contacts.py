@@ -32,7 +32,9 @@ class Contact(Declared):
 
     surface: Literal["pack", "backstop"] = part("touched surface")
     t_in: float = scalar("s", "time of touch", more="start of the run if the contact was open then")
-    v_in: float = scalar("m/s", "velocity at touch", more="at the start of the run if the contact was open then")
+    v_in: float = scalar(
+        "m/s", "velocity at touch", more="at the start of the run if the contact was open then"
+    )
     t_out: float | None = scalar("s", "time of departure", more="None while the contact is open")
     v_out: float | None = scalar("m/s", "velocity at departure", more="None while the contact is open")
     t_peak: float = scalar("s", "time of the largest indentation or compression")
@@ -249,7 +251,9 @@ class Closing(Declared):
 
     contact: str = part("name of the contact")
     t_in: float = scalar("s", "time of closing", more="start of the run if the contact was closed then")
-    v_in: float = scalar("m/s", "velocity at closing", more="at the start of the run if the contact was closed then")
+    v_in: float = scalar(
+        "m/s", "velocity at closing", more="at the start of the run if the contact was closed then"
+    )
     t_out: float | None = scalar("s", "time of opening", more="None while the contact is closed")
     v_out: float | None = scalar("m/s", "velocity at opening", more="None while the contact is closed")
     depth: float = scalar("m", "largest indentation")

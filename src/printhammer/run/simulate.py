@@ -1,6 +1,6 @@
 """Entry point of simulations: from hammer and drive to a motion.
 
-`touches_of` stores only the touches of a surface in a long run, so that memory does not grow with its length.
+`touches_of` stores only the touches of a surface, so that memory does not grow with the length of the run.
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ MOST_STEPS: Final = 500_000  # Largest number of steps of a single pulse; arbitr
 # Smallest reach, as a fraction of the typical displacement; arbitrary, above the error of the single pulse
 _LEAST_REACH: Final = 1e-4
 THRESHOLDS: Final = {"least_reach": _LEAST_REACH, "flights": FLIGHTS, "held": (HELD + 1, HELD_FREE)}
-"""For a page: smallest reach, smallest window in flights, first and last mode of an armature that is held."""
+"""Thresholds for a web page: smallest reach, smallest window in flight times, range of the held modes."""
 _MOST_KEPT: Final = 512  # Number of cached windows at which the cache is emptied; arbitrary
 
 _FLIGHT: Final = 0.28e-3  # Flight time of the paper's hammer, for which default rates and times are stated, s

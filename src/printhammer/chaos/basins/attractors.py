@@ -77,7 +77,7 @@ class Cloud(NamedTuple):
         return np.asarray(np.isfinite(apart).mean(axis=-1) >= INSIDE)
 
     def equals(self, other: Cloud) -> bool:
-        """Whether two clouds represent the same attractor: each lies within reach of the other."""
+        """Whether two clouds, each within reach of the other cloud, represent the same attractor."""
         return bool(self.holds(other.tree.data) and other.holds(self.tree.data))
 
 
@@ -124,7 +124,7 @@ class Attractors:
         return np.stack([x, v], axis=-1) / self.scales[:2]
 
     def _match_settling(self, points: FloatArray, q: int) -> IntArray:
-        """Match unsettled trains to the orbits that they approach; return indices in `found`, -1 if unknown.
+        """Match unsettled trains to known orbits nearby; return indices in `found`, -1 for no match.
 
         The scaled states, shape (n, points, 2), repeat after q firings.
         """
@@ -149,7 +149,7 @@ class Attractors:
         return places
 
     def _periodic(self, orbits: FloatArray) -> IntArray:
-        """Match orbits of one period, shape (n, q, 2), to `found` or append them; return indices."""
+        """Match orbits of one period, shape (n, q, 2), to `found`; append new orbits; return indices."""
         q = orbits.shape[1]
         places = self._known(orbits)
         while (left := np.flatnonzero(places < 0)).size:

@@ -52,7 +52,7 @@ BOX: Final = 4
 
 
 class BasinEntropy(Declared):
-    """Basin entropy of a plane of cells, in natural logarithms."""
+    """Basin entropy of a plane of cells, in nats."""
 
     box: int = part("number of cells along the side of a box")
     boxes: int = part("number N of whole boxes with at least one decided cell")
@@ -172,7 +172,7 @@ MOST_CELLS: Final = 10_000_000
 UNDECIDED: Final = 0
 FAILED: Final = -1
 NO_STATE: Final = -2
-"""Labels of cells without a known attractor: `UNDECIDED`, `FAILED` (run ended early) and `NO_STATE`."""
+"""Labels of cells without a known attractor: undecided, run ended early, and no valid initial state."""
 
 NO_STATE_STATUS: Final = "no state"
 
@@ -449,7 +449,7 @@ def _key(attractor: Attractor) -> tuple[int, float, float]:
 
 
 def read_axis(entry: Any, name: str, unit: str) -> FloatArray:
-    """Parse the bounds of an axis and its number of values; InputError if they are invalid."""
+    """Parse the bounds of an axis and its number of values; InputError for invalid bounds or numbers."""
     if not isinstance(entry, tuple | list) or len(entry) != 3:
         raise InputError.of(name, entry, "least value, largest value and number of values")
     low, high = (read_number(end, unit, name) for end in entry[:2])

@@ -142,7 +142,7 @@ class QuenchMap(Result):
 
 
 class TwoPulses(Waveform):
-    """Waveform that contains two different pulses, far apart in time, so that one drive can fire both."""
+    """Waveform that contains two different pulses, far apart in time, for a drive of a single waveform."""
 
     shape: ClassVar[str] = "two pulses"
     first: Waveform

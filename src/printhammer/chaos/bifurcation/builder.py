@@ -54,7 +54,7 @@ STRAND: Final = 16
 """Number of successive parameter values in a strand; strands are computed in parallel. Arbitrary."""
 
 SAME: Final = 1e-3  # Arbitrary
-"""Largest distance between two periodic orbits on the same attractor, in half-widths of the window."""
+"""Largest distance of two periodic orbits on the same attractor, in half-widths of the strobe window."""
 
 _SHIFTED: Final = 0.5
 """Largest difference of the means of two point sets on one attractor, in standard deviations; arbitrary."""

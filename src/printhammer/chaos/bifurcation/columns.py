@@ -226,7 +226,7 @@ def _train(regime: Regime, firings: int, rest: bool) -> tuple[Drive, FloatArray]
 
 
 def state_or_rest(regime: Regime, state: State) -> State:
-    """Return the final state of the preceding train if it is valid for this regime, else `FROM_REST`."""
+    """Return the final state of the preceding train, or `FROM_REST` if the regime excludes that state."""
     if math.isnan(state[0]):
         return FROM_REST
     try:

@@ -253,7 +253,7 @@ class Bifurcation(Result, rows="direction column"):
         return Grid(columns, direction, most=12)
 
     def _undecided_reasons(self) -> list[str]:
-        """List why completed trains are undecided, one sentence per reason."""
+        """List the reasons why completed trains are undecided, one sentence per reason."""
         undecided = (self.verdicts == "undecided") & (self.status == "ok")
         known = undecided & ~np.isnan(self.exponents)
         settling = known & (self.exponents < -SIGNIFICANT * self.standard_errors)
@@ -274,7 +274,7 @@ class Bifurcation(Result, rows="direction column"):
         ]
 
     def _sensitive(self) -> list[str]:
-        """Report how many periods change at finer tolerances; an empty list if none changes."""
+        """State the number of periods that change at finer tolerances; an empty list if no period changes."""
         count = int(self.sensitive.sum())
         whose = "1 period changes" if count == 1 else f"{count} periods change"
         return [f"{whose} at a finer tolerance: rounding decides the length of long cycles."] if count else []
@@ -305,7 +305,7 @@ class Bifurcation(Result, rows="direction column"):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Provenance of the diagram; it omits the period if period or rate is the parameter."""
+        """Provenance of the diagram; without the period if the parameter is the period or the rate."""
         known = super().provenance
         return {key: known[key] for key in known if key != "period" or self.parameter not in (PERIOD, RATE)}
 

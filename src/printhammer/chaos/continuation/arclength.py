@@ -32,11 +32,11 @@ from printhammer.support.arrays import FloatArray
 
 _GROWTH: Final = 1.5  # Factor by which the step grows after an accepted step; arbitrary
 _LEAST_COSINE: Final = 0.97  # Arbitrary
-"""Smallest cosine of the angle between successive tangents; below, the step is halved and repeated."""
+"""Smallest cosine of the angle between successive tangents, below which the step is halved and repeated."""
 _FARTHEST: Final = 0.4  # Arbitrary
-"""Largest distance between corrected and predicted point, in steps; a larger one rejects the step."""
+"""Distance between predicted and corrected point, in steps, above which the step is rejected."""
 _LEAP: Final = 1.0  # Arbitrary
-"""Largest change of a multiplier in one step, relative to 1 + |multiplier|; a larger one halves the step."""
+"""Change of a multiplier in one step, relative to 1 + |multiplier|, above which the step is halved."""
 _SAME: Final = 1e-6
 """Scaled distance below which two points of a curve are identical; arbitrary."""
 

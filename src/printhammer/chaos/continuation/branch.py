@@ -99,7 +99,7 @@ def event_of(point: BranchPoint, phase: float = 0.0) -> BranchEvent:
 
 
 def _grazing_of(point: BranchPoint) -> tuple[str, str]:
-    """Return the surface of a grazing, and whether its contact appears, vanishes, splits or merges."""
+    """Return the grazed surface, and whether the contact appears, vanishes, splits or merges."""
     assert point.sides is not None
     ordered = sorted(point.sides, key=lambda node: node.parameter)
     before, after = (node.value.extra for node in ordered)
@@ -120,7 +120,7 @@ def _grazing_of(point: BranchPoint) -> tuple[str, str]:
 
 
 def _is_parted(touches: list[Touch], length: float) -> bool:
-    """Whether two successive touches stem from one split contact: a gap shorter than any contact."""
+    """Whether two successive contacts are parts of one contact: the gap is shorter than every contact."""
     durations = [touch.t_out - touch.t_in for touch in touches]
     if len(touches) < 2 or min(durations) == 0.0:
         return False
@@ -171,10 +171,10 @@ class Branch(Result):
     """Branch: a curve of periodic orbits in one parameter, with its bifurcations and grazings.
 
     Every array has one row for each orbit, in order along the curve; the values of the parameter need not
-    ascend. Reasons for stopping are "bound", of the parameter; "closed", back at the start; "period
-    doubling", where the orbit is born; "grazing" of a rigid backstop; "merged" with an orbit of fewer
-    firings; "no value", where a run ended early; "lost", where Newton's method does not converge; "jump",
-    where Newton's method converges to another curve; and "length", at the maximum number of steps.
+    ascend. Reasons for stopping are "bound", where the parameter reaches a bound; "closed", back at the
+    start; "period doubling", where the orbit is born; "grazing" of a rigid backstop; "merged" with an orbit
+    of fewer firings; "no value", where a run ended early; "lost", where Newton's method does not converge;
+    "jump", where Newton's method converges to another curve; and "length", at the maximum number of steps.
     """
 
     regime: Regime = part("hammer and periodic drive at the start, and phase of the section")

@@ -30,7 +30,7 @@ CROSSINGS: Final[tuple[Crossing, ...]] = get_args(Crossing)
 
 _ROUNDS: Final = 60  # Iteration limit of the bracketing of a crossing; arbitrary
 _BRACKET: Final = 1e-5  # Arbitrary
-"""Smallest bracket of a crossing, as a fraction of a step; Newton's method fails at the crossing itself."""
+"""Smallest bracket of a crossing, as a fraction of a step, since Newton's method fails at the crossing."""
 _DIFFERENCE: Final = 1e-3
 """Scaled step of the second differences; tuned: 1e-4 to 1e-2 give the same kinds in the tests."""
 _FLAT: Final = 1e-6  # Arbitrary

@@ -36,7 +36,7 @@ _CURRENT: Final = "with a voltage drive, the current at a touch belongs to the s
 _CLOSE: Final = 0.01  # Arbitrary
 """Time before and after an impact during which the surface is removed, as a fraction of the period."""
 _STILL: Final = 1e-9
-"""Speed at the section, relative to the speed scale, below which an orbit turns there; arbitrary."""
+"""Speed at the section, relative to the speed scale, below which the orbit turns there; arbitrary."""
 _SPACING: Final = 1e-6  # Finite-difference step of Newton's method, in scaled variables; arbitrary
 _ROUNDS: Final = 20  # Iteration limit of Newton's method; arbitrary
 _PRECISION: Final = 1e-12  # Scaled correction below which Newton's method has converged; arbitrary
@@ -46,7 +46,7 @@ _SLOWER: Final = (0.98, 0.9, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.02, 0.005)
 
 
 class Flight(Declared):
-    """Motion between two impacts on a surface; close to both impacts the model omits the surface."""
+    """Motion between two impacts on a surface; the model omits the surface close to either impact."""
 
     end: FloatArray = part("displacement, m, and velocity, m/s, at the end, shape (2,)")
     jacobian: FloatArray = part("derivative with respect to the state at the start, shape (2, 2)")
@@ -252,7 +252,7 @@ _GENTLE: Final = 1e-2  # Arbitrary
 _NEAR: Final = 1e-2  # Arbitrary
 """Largest distance from the last orbit to the grazing that ends its branch, in parameter scales."""
 _STEEP: Final = 10.0  # Arbitrary
-"""Multiplier above which an orbit is close enough to its grazing to exclude a bifurcation before it."""
+"""Multiplier above which an orbit is so close to its grazing that no bifurcation lies in between."""
 _CLOSER: Final = 0.7
 """Ratio of the impact speed to that of the last attempt, below which a grazing is sought again; arbitrary."""
 _ON_CURVE: Final = 1e-5

@@ -100,7 +100,7 @@ class Branches(Result):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Provenance of the first branch; all branches share it."""
+        """Provenance of the first branch, which is the provenance of all branches."""
         return self.found[0].provenance if self.found else super().provenance
 
     def notes(self) -> dict[str, Any]:

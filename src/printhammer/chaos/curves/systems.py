@@ -66,7 +66,7 @@ KINDS: Final = (*TESTS, GRAZING)
 SPACING: Final = 1e-6  # Arbitrary
 """Scaled step size of finite differences, whose errors affect only the convergence of Newton's method."""
 _PARTS: Final = 5.0  # Arbitrary
-"""Ratio of a parameter's range to the unit of its scaled value; that of a state is a window's half-width."""
+"""Ratio of the range of a parameter to its scale; states are scaled by the half-widths of the window."""
 
 
 @dataclass(frozen=True)

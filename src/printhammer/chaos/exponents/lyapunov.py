@@ -114,7 +114,7 @@ class Lyapunov(Result, rows="firing exponent"):
         return f"Lyapunov exponents of {self.hammer.name}, fired every {self.period:.9g} s"
 
     def summary(self) -> Summary:
-        """Summarise the exponents, the dimension, and both classifications."""
+        """Summarise exponents, dimension, and the classifications by strobe points and 0-1 test."""
         rows: list[FactRow] = [("period", f"{self.period:.9g} s")]
         for k in (0, 1):
             each, error, second = (

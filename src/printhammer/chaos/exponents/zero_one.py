@@ -98,8 +98,12 @@ class ZeroOne(Result):
         "step",
         more="after 1, 2, ... steps, at the angle of the median",
     )
-    p: FloatArray = column("unit of the series", "path, first coordinate", "number", more="at the angle of the median")
-    q: FloatArray = column("unit of the series", "path, second coordinate", "number", more="at the angle of the median")
+    p: FloatArray = column(
+        "unit of the series", "path, first coordinate", "number", more="at the angle of the median"
+    )
+    q: FloatArray = column(
+        "unit of the series", "path, second coordinate", "number", more="at the angle of the median"
+    )
 
     @property
     def title(self) -> str:

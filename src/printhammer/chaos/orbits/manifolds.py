@@ -55,7 +55,7 @@ _FEW: Final = 4  # Number of points from which the prediction is a cubic, since 
 
 
 class Manifolds(Result, rows="point"):
-    """Stable and unstable manifolds of a saddle: curves from each state of the saddle orbit to both sides.
+    """Stable and unstable manifolds of a saddle: curves to either side of each state of the saddle orbit.
 
     A jump of the strobe map, where a contact happens at the section, is represented by a row of NaN.
     """

@@ -113,8 +113,8 @@ def close_orbits(
 
     Guesses are states at the starts of the segments, shape (n, m, 2), with numbers of firings, shape (n, m);
     the scales are the half-widths of the window, m and m/s. In units of the scales, the iteration stops at
-    the residual `goal`; a residual of `enough` is accepted if it stops decreasing. `iterations` is the
-    maximum number of steps tried per orbit.
+    the residual `goal`; a residual of `enough` is accepted if the residual stops decreasing. `iterations` is
+    the maximum number of steps tried per orbit.
     """
     search = _Search(maps, guesses, firings, scales)
     for _ in range(iterations):

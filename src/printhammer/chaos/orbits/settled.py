@@ -1,4 +1,4 @@
-"""Period to which a motion has settled, from its states or, if these are ambiguous, by Newton's method.
+"""Period to which a motion has settled, from its states or, if the states are ambiguous, by Newton's method.
 
 States that agree q firings apart do not prove a period q. Near a period doubling the states alternate about
 an orbit that they approach with a multiplier close to -1: states two firings apart agree long before states
@@ -46,7 +46,7 @@ _NOISE: Final = 1e-9  # Arbitrary
 _GOAL: Final = 1e-13
 """Residual at which Newton's method stops, in half-widths of the strobe window; arbitrary."""
 _ENOUGH: Final = 1e-9  # Arbitrary
-"""Residual that Newton's method accepts if it stops decreasing, in half-widths of the strobe window."""
+"""Residual accepted when Newton's method stagnates, in half-widths of the strobe window."""
 _ITERATIONS: Final = 20  # Iteration limit of Newton's method; arbitrary
 
 NO_ORBIT: Final = "Newton's method finds no stable orbit of {} there that the states approach"

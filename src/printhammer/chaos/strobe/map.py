@@ -102,7 +102,7 @@ class Image(Declared):
 
 
 def read_state(state: npt.ArrayLike) -> FloatArray:
-    """Parse displacement, m, and velocity, m/s; InputError unless they are two finite numbers."""
+    """Parse a state, (displacement, m, velocity, m/s); InputError unless there are two finite numbers."""
     pair = np.asarray(state, dtype=np.float64)
     if pair.shape != (2,) or not np.isfinite(pair).all():
         raise InputError.of("state", state, "two finite numbers, displacement in m and velocity in m/s")
@@ -326,7 +326,7 @@ def mirror_image(regime: Regime, state: FloatArray, tolerance: float) -> FloatAr
 
 
 def _center(hammer: Hammer) -> float | None:
-    """Return the position, m, about which the contacts of a hammer are symmetric; None if they are not."""
+    """Return the position, m, about which the contacts of a hammer are symmetric; None without symmetry."""
     front, backstop = hammer.pack, hammer.backstop
     if front is None and backstop is None:
         return hammer.origin

@@ -129,7 +129,7 @@ class Strobe(Result):
         return window_of(self.hammer, self.drive)
 
     def entries(self) -> Entries:
-        """Return the Dataset variables by name, including the current if it is a state variable."""
+        """Return the Dataset variables by name, including the current if a voltage drives the coil."""
         return {name: entry for name, entry in super().entries().items() if entry[1] is not None}
 
     def notes(self) -> dict[str, Any]:

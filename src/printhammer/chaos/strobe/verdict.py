@@ -186,7 +186,7 @@ def repeats(
 
 
 def period_of(distances: FloatArray) -> int | None:
-    """Return the smallest q for which states q firings apart agree; None if they agree for no q tested."""
+    """Return the smallest q for which states q firings apart agree; None if no q gives agreement."""
     agree = np.flatnonzero(distances <= AGREEMENT)
     return int(agree[0]) + 1 if agree.size else None
 
@@ -250,7 +250,7 @@ def verdict(
 
 
 def is_positive(exponent: Exponent) -> bool:
-    """Whether an exponent exceeds zero by `SIGNIFICANT` standard errors; False if it is unknown."""
+    """Whether an exponent exceeds zero by `SIGNIFICANT` standard errors; False for an unknown exponent."""
     return bool(exponent.ok and exponent.smooth and exponent.value > SIGNIFICANT * exponent.standard_error)
 
 

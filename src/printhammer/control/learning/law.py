@@ -208,8 +208,8 @@ def _compared_slots() -> tuple[int, ...]:
 
 
 COMPARED: Final = _compared_slots()
-"""Slots of the line that is printed once in each open loop, so that the readings decide between them: the
-cycle of the test line, and rows of 24 slots, each from rest."""
+"""Slots of the line that a unit prints once in each open loop, for the choice of the open loop: the cycle of
+the test line, and rows of 24 slots, each from rest."""
 
 JUDGED: Final = np.asarray(PRINTED) >= LEAD_IN
 """Mask of the dots of `PRINTED` that are evaluated, shape (dots,): all except the lead-in."""

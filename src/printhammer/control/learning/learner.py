@@ -38,7 +38,7 @@ _LATE: Final = (
 
 
 class Mean(NamedTuple):
-    """Mean normalised readings of dots, and the numbers of readings, shape (measured, dots)."""
+    """Mean normalised readings of dots, and numbers of readings: a row of times, a row of forces if any."""
 
     value: FloatArray  # Mean readings; NaN where no dot was detected
     seen: FloatArray  # Number of readings in each mean

@@ -346,7 +346,7 @@ class LeastWork(Result, rows="node"):
 
 
 def _current_of(hammer: Hammer) -> Waveform:
-    """Return the current pulse of a hammer; raise InputError that names every missing part and current."""
+    """Return the current pulse of a hammer; InputError for missing parts or another kind of waveform."""
     waveform = hammer.waveform
     absent = [role for role in ("magnet", "spring", "backstop", "pack") if getattr(hammer, role) is None]
     faults = [f"the hammer has no {' and no '.join(absent)}"] if absent else []

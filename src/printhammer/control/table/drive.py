@@ -200,7 +200,7 @@ def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
 
 
 def fading(hammer: Hammer, pulse: Waveform, share: float) -> float:
-    """Return the decay time of a pulse, s: from its end until it stays below `share` times its peak.
+    """Return the decay time of a pulse, s: from its end until the current stays below `share` times its peak.
 
     For a driver this is the first time at which the current has decayed; later induced currents are ignored.
     """

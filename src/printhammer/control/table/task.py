@@ -1,4 +1,4 @@
-"""The tuning task of a compensation table: settings, single-pulse reference, and deviations from it."""
+"""Tuning task of a compensation table: settings, single-pulse dot, and deviations from that dot."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ class Task:
 
     @cached_property
     def faded(self) -> float:
-        """Time from the end of the pulse until it has decayed to a negligible value, s."""
+        """Time from the end of a pulse until its current has decayed to a negligible value, s."""
         return fading(self.hammers[0], self.pulse, 0.5 * TAIL)
 
     @property
@@ -140,7 +140,7 @@ class Task:
 
     @property
     def tail(self) -> float:
-        """Simulation time after the last firing in the search, s; it covers the last contact."""
+        """Simulation time after the last firing in the search, s, long enough for the last contact."""
         return max(_TAIL, FLIGHTS * self.single.nominal.flight_time, _CONTACT * self.single.left)
 
     def earliest(self, delay: FloatArray, brake: FloatArray) -> FloatArray:

@@ -92,7 +92,7 @@ def _close(strobe: Strobe) -> Window:
 
 
 def scales_of(window: Window) -> tuple[Scale, Scale]:
-    """Return the scales of displacement and velocity for a window."""
+    """Return the axis scales of displacement and velocity for a plot of a strobe window."""
     return scale("displacement", max(abs(end) for end in window.x)), scale("velocity")
 
 

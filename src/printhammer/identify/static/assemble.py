@@ -145,7 +145,7 @@ def stretch_p_value(signs: FloatArray) -> float:
 
 
 def inseparable(solution: Solution, names: Sequence[str]) -> list[str]:
-    """Describe the parameters that the data hardly distinguish; empty if the condition number is small.
+    """Describe, in one sentence, the parameters that the data hardly separate; an empty list if none.
 
     The sentence names the parameters with large components in the weakest direction; parameters with an empty
     name are skipped.
