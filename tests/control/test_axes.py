@@ -68,7 +68,16 @@ def test_files_and_the_header(tables: AxisTables, tmp_path: Path) -> None:
     entries = tables.tables[0].advance.shape[1]
     columns = [
         f"{prefix}_{name}"
-        for name in ("gap", "rate", "advance", "width", "brake_delay", "brake_width", "look_ahead")
+        for name in (
+            "gap",
+            "rate",
+            "advance",
+            "width",
+            "brake_delay",
+            "brake_width",
+            "look_ahead",
+            "multiplier",
+        )
     ]
     main = f"""
 #include "t.h"
@@ -95,6 +104,15 @@ int main(void) {{
         for j in range(entries)
     ]
     assert rows == wanted
+
+
+def test_each_table_states_the_multipliers_of_its_hammer(tables: AxisTables) -> None:
+    """The same by the drives of the strategy at the value as by the hammer of the tuning."""
+    again = tables.with_multipliers(ph.load("hendriks-1983-1"))
+    for table, other in zip(tables.tables, again.tables, strict=True):
+        assert np.isfinite(table.multiplier).all()
+        assert other.multiplier == pytest.approx(table.multiplier, abs=1e-3)
+    assert np.ptp([table.multiplier[0, 1] for table in tables.tables]) > 1e-3
 
 
 def ticks_between(tables: AxisTables, tick: float, value: int) -> list[list[int]]:

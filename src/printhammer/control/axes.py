@@ -22,6 +22,7 @@ from printhammer.control.table.drive import (
 )
 from printhammer.control.table.formats import HEAD, OPTIONAL
 from printhammer.control.table.header import NANOSECOND, bits_of, header_text, size_of
+from printhammer.control.table.multipliers import history_multipliers
 from printhammer.control.table.tuning import tune
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError, located
@@ -34,6 +35,7 @@ from printhammer.results.summary import (
     Grid,
     Summary,
 )
+from printhammer.run.effort import DISPLAY, Effort
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.support.files import write_file
 
@@ -111,7 +113,8 @@ class AxisTables:
         share = (asked - self.values[after - 1]) / (self.values[after] - self.values[after - 1])
         low, high = (Settings(*(getattr(table, name) for name in COLUMNS)) for table in (first, second))
         times: dict[str, Any] = mixed(low, high, share)._asdict()
-        return replace(first, **times, deviation=np.full_like(first.deviation, np.nan))
+        unknown = np.full_like(first.deviation, np.nan)
+        return replace(first, **times, deviation=unknown, multiplier=unknown)
 
     def strategy(self, hammer: Hammer, value: float | str) -> TableStrategy:
         """Return a drive strategy: the table at an axis value, and the hammer's pulses at that value."""
@@ -144,11 +147,26 @@ class AxisTables:
         scale = NANOSECOND if AXES[self.axis].unit == "m" else _MILLIONTH
         head = {name: getattr(first, name) for name in (*HEAD, *OPTIONAL)}
         along = self.axis, np.rint(np.array(self.values) / scale)
-        return header_text(head, first.rates, times, unit, along)
+        growth = np.stack([table.multiplier for table in rounded])
+        return header_text(head, first.rates, times, growth, unit, along)
 
     def quantised(self, tick: float | str) -> AxisTables:
         """Return a copy with all times rounded to multiples of a timer tick (s, or text with a unit)."""
         return replace(self, tables=tuple(table.quantised(tick) for table in self.tables))
+
+    def with_multipliers(self, hammer: Hammer, effort: Effort = DISPLAY) -> AxisTables:
+        """Return a copy with the multipliers of every table, on the hammer at the axis value of the table."""
+        change = AXES[self.axis].change
+        tables = [
+            replace(
+                table,
+                multiplier=history_multipliers(
+                    table, self.strategy(hammer, value), change(hammer, value), effort.quiet
+                ),
+            )
+            for value, table in zip(self.values, self.tables, strict=True)
+        ]
+        return replace(self, tables=tuple(tables))
 
     def size(self, tick: float | str = NANOSECOND) -> int:
         """Return the size of the C header's arrays, bytes, for a timer tick (s, or text with a unit)."""

@@ -1,9 +1,10 @@
-"""Rows of dots: the periodic orbit of a row, and its Floquet multipliers over one dot interval.
+"""Rows of dots: the periodic orbit of a row, and its Floquet multipliers over one repetition of its pulses.
 
 A drive that fires the same pulses for every dot of a row has a strobe map, from the state at one firing to
-the state at the next. A row of equal dots is a fixed point of this map. The eigenvalues of the derivative at
-the fixed point are its Floquet multipliers, the factors by which a small error grows from dot to dot: with a
-multiplier outside the unit circle a long row leaves the fixed point, however good its first dots are.
+the state at the next; for a row that repeats after n dots, the map leads from a firing to the n-th next one.
+A row of equal dots is a fixed point of this map. The eigenvalues of the derivative at the fixed point are its
+Floquet multipliers, the factors by which a small error grows from dot to dot: with a multiplier outside the
+unit circle a long row leaves the fixed point, however good its first dots are.
 
 The fixed points of many rows are computed at once by Newton's method, with derivatives from central
 differences of neighbouring runs in one ensemble.
@@ -55,14 +56,15 @@ def row_multipliers(
     *,
     closed: bool = True,
     firing: int = FIRING,
+    repeats: Sequence[int] | None = None,
 ) -> FloatArray:
     """Compute the leading Floquet multiplier of each of several rows of dots, shape (rows,).
 
     Parameters
     ----------
     hammers, drives : sequences
-        One hammer and one drive per row. A drive starts from rest and has at least four firings more than
-        `firing`; from the firing before `firing` onward, all firings are identical and equally spaced.
+        One hammer and one drive per row. A drive starts from rest and has at least four repetitions more than
+        `firing`; from one repetition before `firing` onward, the firings and their intervals repeat.
     effort : Effort
         Tolerance, at most `_TOLERANCE`, and threads.
     closed : bool, optional
@@ -71,17 +73,20 @@ def row_multipliers(
     firing : int, optional
         Index of the firing at which the map starts. If the first dots are compensated, they start in the
         fixed point, so that the state is closer to the fixed point at an early firing than at a late firing.
+    repeats : sequence of int, optional
+        Number of dots after which each row repeats, at most `firing`; by default 1, equal dots.
 
     Returns
     -------
     array
-        The multiplier of largest absolute value: with its sign if it is real (negative: an error alternates),
-        else its absolute value. NaN if the row is not a periodic orbit: a run ends early, Newton's method
-        does not converge, or a pulse is fired while the armature moves out of the pack.
+        The multiplier of largest absolute value over one repetition: with its sign if it is real (negative:
+        an error alternates), else its absolute value. NaN if the row is not a periodic orbit: a run ends
+        early, Newton's method does not converge, or a pulse is fired while the armature moves out of the
+        pack.
     """
     if not hammers:
         return np.zeros(0)
-    maps = _Maps(hammers, drives, effort, firing)
+    maps = _Maps(hammers, drives, effort, firing, [1] * len(drives) if repeats is None else repeats)
     z, jacobian = maps.start, np.full((len(hammers), 2, 2), np.nan)
     open_ = np.flatnonzero(np.isfinite(z).all(axis=1))
     for _ in range(_ITERATIONS if closed else 1):
@@ -120,15 +125,22 @@ class _Maps:
     """Strobe maps of many rows of dots, as functions of scaled states, shape (rows, 2)."""
 
     def __init__(
-        self, hammers: Sequence[Hammer], drives: Sequence[Drive], effort: Effort, firing: int
+        self,
+        hammers: Sequence[Hammer],
+        drives: Sequence[Drive],
+        effort: Effort,
+        firing: int,
+        repeats: Sequence[int],
     ) -> None:
         self.hammers, self.drives, self.effort = hammers, drives, effort
-        least = firing + MORE
-        for drive in drives:
+        moments = []
+        for drive, dots in zip(drives, repeats, strict=True):
+            least = firing + MORE * dots
             if len(drive.times) < least:
                 raise InputError.of("drive", len(drive.times), f"a row of {least} dots or more")
-        self.times = np.array([drive.times[firing - 1 : firing + 2] for drive in drives])
-        period = self.times[:, 2] - self.times[:, 1]
+            moments.append(drive.times[firing - dots : firing + dots + 1 : dots])
+        self.times = np.array(moments)
+        period = (self.times[:, 2] - self.times[:, 1]) / np.asarray(repeats)
         way = np.array([_travel(hammer) for hammer in hammers])
         self.scales = np.stack([way, way / period], axis=1)
         self.lowest = np.array([StaticForce(hammer).limits[0] for hammer in hammers])

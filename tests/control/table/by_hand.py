@@ -29,11 +29,13 @@ def by_hand(
     values = {
         name: np.zeros(shape) for name in ("advance", "width", "brake_delay", "brake_width", "deviation")
     }
+    values["multiplier"] = np.zeros(shape)
     for row in range(2):
         for place, history in enumerate(histories(gaps, reach)):
             column = number_of(history, reach)
             values["width"][row, column] = width * (1.0 - 0.001 * place - 0.01 * row)
             values["advance"][row, column] = 1e-7 * place if history[0] != REST else 0.0
+            values["multiplier"][row, column] = np.nan if place == 2 else 0.1 * place - 0.3
             values["deviation"][row, column] = np.nan if place == 1 else 0.1 * row
     shared = shared_numbers(gaps, reach)
     settings = {

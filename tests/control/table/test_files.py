@@ -23,7 +23,7 @@ def same(one: CompensationTable, other: CompensationTable) -> bool:
     heads = ("hammer", "fingerprint", "gaps", "reach", "largest_current")
     return all(getattr(one, name) == getattr(other, name) for name in heads) and all(
         np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True)
-        for name in ("rates", *COLUMNS, "deviation")
+        for name in ("rates", *COLUMNS, "deviation", "multiplier")
     )
 
 

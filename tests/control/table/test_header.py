@@ -54,7 +54,7 @@ def test_a_driver_in_c_agrees_to_the_tick(tmp_path: Path, tick: str) -> None:
     lines.append(f"  for (int i = 0; i < {rates}; i++) for (int j = 0; j < {entries}; j++)")
     every = ", ".join(f"(long){name}_{column}[i][j]" for column in COLUMNS)
     lines.append(f'    printf("%ld %ld %ld %ld\\n", {every});')
-    lines += [f"  size += sizeof {name}_{column};" for column in (*COLUMNS, "look_ahead")]
+    lines += [f"  size += sizeof {name}_{column};" for column in (*COLUMNS, "look_ahead", "multiplier")]
     lines += [
         f"  unsigned gaps[{table.gaps}] = {{0}};",
         f'  printf("%lu %u %u\\n", (unsigned long)size, {name.upper()}_BYTES, {name}_history(gaps));',
@@ -76,12 +76,13 @@ def test_a_driver_in_c_agrees_to_the_tick(tmp_path: Path, tick: str) -> None:
 
 def test_short_times_take_half_the_bytes() -> None:
     table = by_hand()
-    # Rates of four bytes, and a byte of look-ahead for each entry, are as long with every tick.
-    others = 4 * table.rates.size + table.advance.size
+    # Rates of four bytes, and for each entry a byte of look-ahead and a multiplier of two bytes, are as long
+    # with every tick.
+    others = 4 * table.rates.size + 3 * table.advance.size
     assert table.size("1 us") - others == (table.size() - others) // 2
-    assert "int16_t" in table.to_header("1 us")
+    assert f"int16_t {PREFIX}_advance" in table.to_header("1 us")
     assert "TICK_NS 5000" in table.to_header("5 us")
-    assert "int16_t" not in table.to_header()
+    assert f"int16_t {PREFIX}_advance" not in table.to_header()
 
 
 def test_a_budget_and_a_tick_are_kept_to() -> None:

@@ -39,17 +39,17 @@ def tuned_along(
     check_endings(job.wanted["out"], (*opt.DATA, ".h"), "--out")
     with job.progress_bar("tuning") as tell:
         made = tune_along(hammer, axis, values, progress=tell, **options)
-    made = _show_table(job, made, header, budget, units)
+    if header:
+        made = made.quantised(header["tick"]).with_multipliers(hammer)
+    _show_table(job, made, header, budget, units)
     return Answer(files={"out": Content(lambda path: made.save(path, **header))})
 
 
-def _show_table(job: Job, made: Any, header: dict[str, Any], budget: int | None, units: Units) -> Any:
-    """Round a table to the tick in `header`, if any; check its size, show its summary; return the table."""
-    made = made.quantised(header["tick"]) if header else made
+def _show_table(job: Job, made: Any, header: dict[str, Any], budget: int | None, units: Units) -> None:
+    """Check the size of a table's C header, and show the summary of the table."""
     made.to_header(budget=budget, **header)
     size = f", {made.size(**header)} bytes in a C header"
     job.show(*render(job.worded(made.summary()), units), note=f"tuned in {job.seconds:.2g} s{size}")
-    return made
 
 
 def _read(written: str) -> tuple[str, list[float]]:
@@ -123,6 +123,7 @@ def tune(
 
     The exit status is 1 if the table exceeds the limits on the hammer for which it was tuned.
     """
+    from printhammer.control.table.multipliers import with_multipliers
     from printhammer.control.table.report import judge_table
     from printhammer.control.table.tuning import tune as tuned
 
@@ -150,7 +151,9 @@ def tune(
     with job.progress_bar("tuning") as tell:
         made = tuned(hammer, progress=tell, **passed, **options)
     header = opt.given(tick=tick)
-    made = _show_table(job, made, header, budget, units)
+    if tick is not None:
+        made = with_multipliers(made.quantised(tick), hammer, **options)
+    _show_table(job, made, header, budget, units)
     files = {"out": Content(partial(save_table, made, header), made.plot)}
     if not judge:
         return Answer(files=files)

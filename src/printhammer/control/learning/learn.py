@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Final, NamedTuple, SupportsIndex, Unpack
 
@@ -16,6 +17,7 @@ from printhammer.control.learning.sensor import ImpactSensor
 from printhammer.control.pulses import LARGEST_CURRENT
 from printhammer.control.table.compensation import CompensationTable
 from printhammer.control.table.drive import COLUMNS, with_pulse
+from printhammer.control.table.multipliers import with_multipliers
 from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
@@ -131,7 +133,8 @@ def table_of(learner: Learner, base: CompensationTable, driver: str, hammer: Ham
     `base` is the starting table, tuned for the hammer as switched by `driver`.
     """
     entries = {key: row[np.newaxis] for key, row in zip(COLUMNS, learner.printed, strict=True)}
-    table = replace(base, **entries, deviation=np.full_like(base.deviation, np.nan))
+    unknown = np.full_like(base.deviation, np.nan)
+    table = replace(base, **entries, deviation=unknown, multiplier=unknown)
     own = learner.law.entries.own
     if own is not None and learner.pulse is own.pulse:
         # The hammer's own pulse is fired at the slot, without advance.
@@ -411,7 +414,7 @@ def learn(
     assert belief is not None
     off, apart = belief.moments()
     sizes = spread.constants(hammer)
-    return Learning(
+    result = Learning(
         hammer=hammer,
         unit=driven,
         table=replace(table, serial=serial),
@@ -437,3 +440,7 @@ def learn(
         offset_uncertainty=float(law.production.offset * apart[-1]),
         seed=seed,
     )
+    with suppress(InputError):  # No hammer has the estimated constants: the multipliers stay unknown.
+        made = with_multipliers(result.table, hammer, unit=result.believed_hammer, effort=effort.quiet)
+        return replace(result, table=made)
+    return result

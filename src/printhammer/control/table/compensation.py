@@ -25,13 +25,7 @@ from printhammer.control.table.drive import (
     pulses_of,
     sequence,
 )
-from printhammer.control.table.formats import (
-    HEAD,
-    OPTIONAL,
-    columns,
-    csv_head,
-    read_table,
-)
+from printhammer.control.table.formats import HEAD, OPTIONAL, columns, csv_head, read_table
 from printhammer.control.table.header import (
     NANOSECOND,
     bits_of,
@@ -51,11 +45,7 @@ from printhammer.results.declare import Column
 from printhammer.results.files import csv_text, frame, plain
 from printhammer.results.provenance import versions
 from printhammer.results.result import Entries
-from printhammer.results.summary import (
-    Cells,
-    Grid,
-    Summary,
-)
+from printhammer.results.summary import Cells, Grid, Summary
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.support.arguments import checked
 from printhammer.support.arrays import FloatArray, IntArray
@@ -111,6 +101,13 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         _CELLS,
         more="NaN if unknown; 1 is exactly on the limit",
     )
+    multiplier: FloatArray = column(
+        "1",
+        "multiplier of a small error from dot to dot where the history repeats",
+        _CELLS,
+        more="the geometric mean over a repetition; negative: the error alternates; NaN if unknown; see"
+        " `printhammer.control.table.multipliers`",
+    )
     largest_current: float = scalar("A", "current limit of the tuning")
     driver: str = scalar("", "driver of the coil, see `printhammer.control.table.drive`", default="own")
     serial: str = scalar(
@@ -125,7 +122,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         if (np.diff(rates) <= 0.0).any():
             raise InputError("rates: expected ascending numbers", key="rates")
         shape = rates.size, entries_of(self.gaps, self.reach)
-        for name in (*COLUMNS, "deviation"):
+        for name in (*COLUMNS, "deviation", "multiplier"):
             if np.shape(getattr(self, name)) != shape:
                 raise InputError(
                     f"{name}: an array of shape {np.shape(getattr(self, name))}", key=name, expected=shape
@@ -284,9 +281,8 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         """Tabulate the entries at the highest rate, one row per history."""
         every = histories(self.gaps, self.reach)
         places = [number_of(history, self.reach) for history in every]
-        advance, width, delay, brake, worst = (
-            getattr(self, name)[-1, places]
-            for name in ("advance", "width", "brake_delay", "brake_width", "deviation")
+        advance, width, delay, brake, worst, growth = (
+            getattr(self, name)[-1, places] for name in (*COLUMNS, "deviation", "multiplier")
         )
         columns = [
             Cells("gaps before", [history_text(history) for history in every], left=True),
@@ -295,6 +291,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
             Cells("brake after", np.where(brake > 0.0, delay, np.nan), "s"),
             Cells("brake", np.where(brake > 0.0, brake, np.nan), "s"),
             Cells("known ahead\n[slots]", self.look_ahead[-1, places]),
+            Cells("multiplier\nif repeated", growth, "", ".3f"),
             Cells("worst,\nof the limits", 100.0 * worst, "%", ".1f"),
         ]
         low, high, count = self.rates[0], self.rates[-1], self.rates.size
@@ -364,7 +361,8 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
                 value=budget,
                 expected="a larger budget, a longer tick, a shorter history, a shorter reach, or fewer rates",
             )
-        return header_text(self._head, self.rates, self.quantised(unit)._times, unit)
+        rounded = self.quantised(unit)
+        return header_text(self._head, self.rates, rounded._times, rounded.multiplier, unit)
 
     def size(self, tick: float | str = NANOSECOND) -> int:
         """Return the size of the C header's arrays, bytes, for a timer tick (s, or text with a unit)."""
@@ -372,11 +370,18 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return size_of(self.rates.size, entries_of(self.gaps, self.reach), bits)
 
     def quantised(self, tick: float | str) -> CompensationTable:
-        """Return a copy with times rounded to whole timer ticks (s, or text) and unknown deviations (NaN)."""
+        """Return a copy with times rounded to whole timer ticks (s, or text) and unknown deviations (NaN).
+
+        The multipliers are unknown too, unless no time changes by more than 1 ns; see
+        `printhammer.control.table.multipliers.with_multipliers`.
+        """
         times: dict[str, Any] = whole_ticks(
             self._times, self.rates, self.gaps, self.reach, checked_tick(tick)
         )
-        return replace(self, **times, deviation=np.full_like(self.deviation, np.nan))
+        unknown = np.full_like(self.deviation, np.nan)
+        moved = max(float(np.abs(times[name] - values).max()) for name, values in self._times.items())
+        growth = self.multiplier if moved < NANOSECOND else unknown
+        return replace(self, **times, deviation=unknown, multiplier=growth)
 
     @property
     def _times(self) -> dict[str, FloatArray]:

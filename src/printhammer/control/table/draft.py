@@ -87,6 +87,7 @@ class Draft:
             reach=task.reach,
             largest_current=task.largest,
             **dict(zip(VALUES, self.values[:, :, shared], strict=True)),
+            multiplier=np.full((self.rates.size, shared.size), np.nan),
         )
 
     def places(self, cells: Cells) -> tuple[IntArray, IntArray]:

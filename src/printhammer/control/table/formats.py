@@ -35,7 +35,9 @@ if TYPE_CHECKING:
 
 FORMAT: Final = 1  # Version of the CSV format
 KIND: Final = "printhammer compensation table"  # First words of a CSV file
-DEVIATION: Final = "deviation"  # Name of the array that is not a time
+FIGURES: Final = ("deviation", "multiplier")
+"""Names of the arrays that are not times; an empty cell is unknown."""
+DEVIATION, MULTIPLIER = FIGURES
 # Required metadata of a table file
 HEAD: Final = {"hammer": str, "fingerprint": str, "gaps": int, "reach": int, "largest_current": float}
 OPTIONAL: Final = {"driver": "own", "serial": ""}
@@ -47,7 +49,7 @@ _ATTRIBUTE: Final = re.compile(r"# \w+: ")  # Provenance line of a CSV file
 def columns(gaps: int) -> list[str]:
     """Return the column headings of a CSV file."""
     times = [f"{name} [s]" for name in COLUMNS]
-    return ["rate [Hz]", *[f"gap {number}" for number in range(1, gaps + 1)], *times, DEVIATION]
+    return ["rate [Hz]", *[f"gap {number}" for number in range(1, gaps + 1)], *times, *FIGURES]
 
 
 def csv_head(head: Mapping[str, Any]) -> str:
@@ -96,6 +98,12 @@ def _of_csv(text: str) -> tuple[Head, Rows]:
     _check_head(head)
     gaps, wanted = head["gaps"], columns(head["gaps"])
     table = [cells for _line, cells in split_cells(text, "table", gaps=True).rows]
+    if table and table[0] == wanted[:-1]:
+        # A file of an earlier version, without multipliers.
+        table = [
+            table[0] + wanted[-1:],
+            *(cells + [""] * (len(cells) == len(wanted) - 1) for cells in table[1:]),
+        ]
     if not table or table[0] != wanted:
         raise InputError.of(
             "columns",
@@ -108,9 +116,9 @@ def _of_csv(text: str) -> tuple[Head, Rows]:
         if len(cells) != len(wanted):
             raise InputError(f"row {number}: {len(cells)} cells", key="row", expected=f"{len(wanted)}")
         row: dict[str, Any] = {"gaps": cells[1 : 1 + gaps]}
-        for name, cell in zip(("rate", *COLUMNS, DEVIATION), (cells[0], *cells[1 + gaps :]), strict=True):
+        for name, cell in zip(("rate", *COLUMNS, *FIGURES), (cells[0], *cells[1 + gaps :]), strict=True):
             try:
-                row[name] = float(cell) if cell or name != DEVIATION else None
+                row[name] = float(cell) if cell or name not in FIGURES else None
             except ValueError:
                 raise InputError.of(
                     name, cell, "a number", file=f"row {number}", written=shown(cell)
@@ -133,8 +141,8 @@ def _of_json(text: str) -> tuple[Head, Rows]:
     _check_head(head)
     entries = _entries(data["columns"])
     for number, entry in enumerate(entries, 1):
-        for name in ("rate", *COLUMNS, DEVIATION):
-            if entry[name] is None and name == DEVIATION:
+        for name in ("rate", *COLUMNS, *FIGURES):
+            if entry[name] is None and name in FIGURES:
                 continue
             if isinstance(entry[name], bool) or not isinstance(entry[name], int | float):
                 raise InputError.of(
@@ -145,7 +153,11 @@ def _of_json(text: str) -> tuple[Head, Rows]:
 
 def _entries(arrays: Mapping[str, Any]) -> Rows:
     """Return the table entries of a JSON file, whose arrays have the dimensions rate and history."""
-    wanted = ("rate", "history", *COLUMNS, DEVIATION)
+    wanted = ("rate", "history", *COLUMNS, *FIGURES)
+    if MULTIPLIER not in arrays and isinstance(arrays.get(DEVIATION), dict):
+        # A file of an earlier version, without multipliers.
+        unknown = [[None] * len(row) for row in arrays[DEVIATION].get("values", [])]
+        arrays = {**arrays, MULTIPLIER: {"values": unknown}}
     _check_keys(arrays, wanted, "columns: ")
     for name in wanted:
         if not isinstance(arrays[name], dict) or not isinstance(arrays[name].get("values"), list):
@@ -153,7 +165,7 @@ def _entries(arrays: Mapping[str, Any]) -> Rows:
                 name, arrays[name], "an array with its values", file="columns", written=shown(arrays[name])
             )
     rates, texts = arrays["rate"]["values"], arrays["history"]["values"]
-    values = {name: arrays[name]["values"] for name in (*COLUMNS, DEVIATION)}
+    values = {name: arrays[name]["values"] for name in (*COLUMNS, *FIGURES)}
     for name, table in values.items():
         if [len(row) if isinstance(row, list) else None for row in table] != [len(texts)] * len(rates):
             raise InputError(
@@ -202,7 +214,7 @@ def _built(head: Head, rows: Rows) -> dict[str, Any]:
     if not rates.size:
         raise InputError("the table has no rows", key="rows", expected="one for each history")
     shape = rates.size, entries_of(gaps, reach)
-    arrays = {name: np.full(shape, np.nan) for name in (*COLUMNS, DEVIATION)}
+    arrays = {name: np.full(shape, np.nan) for name in (*COLUMNS, *FIGURES)}
     filled = np.zeros(shape, np.bool_)
     for number, row in enumerate(rows, 1):
         history = _history(row["gaps"], gaps, reach, f"row {number}: ")

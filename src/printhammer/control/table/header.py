@@ -32,6 +32,10 @@ NANOSECOND: Final = 1e-9
 _PLACE_BYTES: Final = 4
 """Size of a rate, or of an axis value, in a C header, bytes: integers of 32 bits."""
 
+_ROUNDING: Final = 1e-9  # Rounding tolerance of a whole number; arbitrary
+_MULTIPLIER_BYTES: Final = 2
+"""Size of a multiplier in a C header, bytes, by definition: thousandths as integers of 16 bits."""
+
 _ADVANCE, _, _DELAY, _BRAKE = range(len(COLUMNS))
 
 
@@ -43,7 +47,7 @@ def bits_of(times: Mapping[str, FloatArray], tick: float) -> int:
 
 def size_of(rates: int, entries: int, bits: int, values: int = 0) -> int:
     """Return the size of a C header's arrays, bytes, for numbers of rates, entries and axis values."""
-    each = len(COLUMNS) * bits // 8 + 1
+    each = len(COLUMNS) * bits // 8 + 1 + _MULTIPLIER_BYTES
     return max(values, 1) * rates * entries * each + _PLACE_BYTES * (rates + values)
 
 
@@ -106,7 +110,7 @@ def look_ahead(times: Mapping[str, FloatArray], rates: FloatArray, gaps: int, re
     gap = np.arange(entries_of(gaps, reach)) // (reach + 1) ** (gaps - 1)
     gap[gap == REST] = reach
     ahead = np.where(brake > 0.0, np.maximum(advance, gap - delay), advance)
-    return np.ceil(np.maximum(ahead, 0.0) - 1e-9).astype(np.int64)
+    return np.ceil(np.maximum(ahead, 0.0) - _ROUNDING).astype(np.int64)
 
 
 def prefix_of(head: Mapping[str, Any], rates: FloatArray, axis: str = "") -> str:
@@ -124,6 +128,7 @@ def header_text(
     head: Mapping[str, Any],
     rates: FloatArray,
     times: Mapping[str, FloatArray],
+    multipliers: FloatArray,
     tick: float = NANOSECOND,
     axis: tuple[str, FloatArray] | None = None,
 ) -> str:
@@ -138,6 +143,8 @@ def header_text(
     times : mapping
         Arrays (rates, entries) by name, s; with an axis (values, rates, entries). All history numbers,
         aliases included, have entries, so that the firmware can index directly.
+    multipliers : array
+        Dot-to-dot multipliers, of the shape of a time; NaN for unknown multipliers.
     tick : float
         Tick of the timer, s.
     axis : tuple, optional
@@ -163,6 +170,12 @@ def header_text(
     ahead = nested(look_ahead(times, rates, gaps, reach))
     arrays += "\n/* Look-ahead: number of slots in advance at which a dot must be known. */\n"
     arrays += f"static const uint8_t {prefix}_look_ahead{shape} = {ahead};\n"
+    arrays += f"""
+/* Multiplier of a small error from dot to dot in a long row that repeats the gaps of the history, a rest
+   as {reach + 1} slots: in thousandths, rounded away from 0. Beyond -1000 to 1000 the error grows along
+   the row. Negative: the error alternates. INT16_MAX: larger, or unknown. */
+static const int16_t {prefix}_multiplier{shape} = {nested(thousandths(multipliers))};
+"""
     body = f"""\
 /* Compensation table for the hammer {comment(head["hammer"])},
    fingerprint {fingerprint},
@@ -214,7 +227,15 @@ static inline unsigned {prefix}_rate_at(uint32_t millihertz)
 static inline unsigned {prefix}_slots_ahead(unsigned rate)
 {{
   unsigned most = 0;
-{_most(prefix, values, entries)}
+{_most(prefix, values, entries, "look_ahead")}
+  return most;
+}}
+
+/* Largest absolute value of `multiplier` at a rate, in thousandths: above 1000, errors grow in some rows. */
+static inline int {prefix}_largest_multiplier(unsigned rate)
+{{
+  int most = 0;
+{_most(prefix, values, entries, "multiplier", signed=True)}
   return most;
 }}
 {_between(prefix, tick, between)}"""
@@ -226,13 +247,21 @@ def _quote(text: str) -> str:
     return comment(text).replace('"', "'")
 
 
-def _most(prefix: str, values: int, entries: int) -> str:
-    """Return the C code of the loops that compute the largest look-ahead at one rate."""
-    place = f"{prefix}_look_ahead{'[value]' if values else ''}[rate][history]"
+def thousandths(multipliers: FloatArray) -> IntArray:
+    """Convert multipliers to thousandths, rounded away from 0 and clipped; INT16_MAX if unknown."""
+    most = np.iinfo(np.int16).max
+    sizes = np.clip(np.ceil(1e3 * np.abs(multipliers) - _ROUNDING), 0, most)
+    return np.where(np.isnan(sizes), most, np.copysign(sizes, multipliers)).astype(np.int64)
+
+
+def _most(prefix: str, values: int, entries: int, array: str, *, signed: bool = False) -> str:
+    """Return the C code of the loops that compute the largest (absolute) value of an array at one rate."""
+    place = f"{prefix}_{array}{'[value]' if values else ''}[rate][history]"
     loops = f"  for (unsigned history = 0; history < {entries}u; history++)\n"
     if values:
         loops = f"  for (unsigned value = 0; value < {values}u; value++)\n  {loops}"
-    return f"{loops}      if ({place} > most) most = {place};"
+    body = f"{loops}      if ({place} > most) most = {place};"
+    return f"{body}\n{loops}      if (-{place} > most) most = -{place};" if signed else body
 
 
 class _Between(NamedTuple):

@@ -24,6 +24,7 @@ from printhammer.control.table.drive import (
     number_of,
     print_pulse,
 )
+from printhammer.control.table.multipliers import with_multipliers
 from printhammer.control.table.search import SPACING, chosen, searched, spaced
 from printhammer.control.table.task import Single, Task, search_scale, single_of
 from printhammer.control.table.ways import BAD, ROUNDS, costs, solved, ways_of
@@ -243,7 +244,8 @@ def tune(
     draft = _tune_rows(task, grid, open_ended=asked is None)
     if asked is None:
         _bridge(draft)
-        return refined(draft.rows(np.arange(_usable(draft)))).table().fired_by(driver, hammer)
+        table = refined(draft.rows(np.arange(_usable(draft)))).table()
+        return with_multipliers(table, driven, effort=effort.quiet).fired_by(driver, hammer)
     _tune_again(draft, np.flatnonzero(~(draft.worst <= _POOR)))
     lost = np.flatnonzero(~np.isfinite(draft.worst))
     if lost.size:
@@ -254,7 +256,7 @@ def tune(
             value=speed,
             expected="a lower rate",
         )
-    return draft.table().fired_by(driver, hammer)
+    return with_multipliers(draft.table(), driven, effort=effort.quiet).fired_by(driver, hammer)
 
 
 def _spread(hammer: Hammer) -> list[Hammer]:
