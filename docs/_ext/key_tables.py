@@ -9,7 +9,7 @@ from docutils.statemachine import StringList
 from sphinx.util.docutils import SphinxDirective
 
 from printhammer.hammer.file import SELECTORS, Body, file_options, kinds_of, model_of
-from printhammer.parts.spring.forces import TERMS
+from printhammer.parts.spring.terms import TERMS
 from printhammer.support.constants import Quantity, quantities
 
 if TYPE_CHECKING:

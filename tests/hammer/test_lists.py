@@ -9,7 +9,8 @@ from tests.errors import refused
 
 import printhammer as ph
 from printhammer.hammer.schema import schema
-from printhammer.parts.spring.forces import GRAVITY, ForceSum, Gravity, HertzContact, LinearContact
+from printhammer.parts.spring.forces import ForceSum
+from printhammer.parts.spring.terms import GRAVITY, Gravity, HertzContact, LinearContact
 
 
 def written(value: float, unit: str) -> str:

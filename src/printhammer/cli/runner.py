@@ -309,7 +309,7 @@ def _values(job: Job, options: Mapping[str, Option], texts: dict[str, Any]) -> d
     for name, option in options.items():
         if option.hammer in ("loaded", "fired"):
             values[name] = job.hammer = load_hammer(texts[name], fired=option.hammer == "fired")
-            job.check(*tables_beside(Path(texts[name]), job.hammer.magnet, job.hammer.waveform))
+            job.check(*tables_beside(Path(texts[name]), *job.hammer.files.values()))
             announce_compiling()
     return values
 
@@ -334,9 +334,8 @@ def load_hammer(name: str, *, fired: bool) -> Hammer:
     return hammer
 
 
-def tables_beside(path: Path, *parts: object) -> list[Path]:
-    """Return the paths of the table files that parts of a hammer refer to; names are relative to its file."""
-    names = [getattr(part, "file", None) for part in parts]
+def tables_beside(path: Path, *names: str | None) -> list[Path]:
+    """Return the paths of the tables that a file refers to; their names are relative to its folder."""
     return [path.parent / name for name in names if name]
 
 
@@ -417,7 +416,7 @@ def firing_of(
 
     opt.check_unset(train, f"no such option with --drive {file}")
     drive = load_drive(file, hammer.waveform)
-    job.check(*tables_beside(file, drive.waveform))
+    job.check(*tables_beside(file, getattr(drive.waveform, "file", None)))
     if math.isinf(drive.waveform.support) and drive.period is not None:
         return {"drive": drive}
     if not isinstance(drive, PulseTrain) or drive.period is None:

@@ -39,7 +39,7 @@ from printhammer.kernel.model.modes import PAUSED, STATUS_NAMES
 from printhammer.kernel.variational import layout as V
 from printhammer.kernel.variational.layout import SPACING
 from printhammer.parts.friction import DryFriction
-from printhammer.parts.spring.forces import Friction
+from printhammer.parts.spring.terms import Friction
 from printhammer.results import Declared, part
 from printhammer.run.problem import Problem, Record, Stretch
 from printhammer.support.arrays import FloatArray

@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
+from printhammer.parts.samples import secant_at, slope_at, width_at
+
 POLYNOMIAL: Final = 0.0
 EXPONENTIAL: Final = 1.0
 SINE: Final = 2.0
@@ -103,24 +105,6 @@ def trapezoid(fields: Any, table: Any) -> int:
     return close(table, rows, end)
 
 
-def end_slope(h0: float, h1: float, m0: float, m1: float) -> float:
-    """Return the slope of a shape-preserving cubic at the end of a record, from the two outer intervals."""
-    slope = ((2.0 * h0 + h1) * m0 - h0 * m1) / (h0 + h1)
-    if slope * m0 <= 0.0:
-        return 0.0
-    if m0 * m1 <= 0.0 and abs(slope) > 3.0 * abs(m0):
-        return 3.0 * m0
-    return slope
-
-
-def inner_slope(h0: float, h1: float, m0: float, m1: float) -> float:
-    """Return the slope of a shape-preserving cubic between two intervals, 0 at an extremum of the record."""
-    if m0 == 0.0 or m1 == 0.0 or (m0 < 0.0) != (m1 < 0.0):
-        return 0.0
-    w0, w1 = 2.0 * h1 + h0, h1 + 2.0 * h0
-    return 1.0 / ((w0 / m0 + w1 / m1) / (w0 + w1))
-
-
 def sampled(fields: Any, table: Any) -> int:
     """Write the table of a sampled record, interpolated by shape-preserving cubics; return the row count.
 
@@ -129,24 +113,13 @@ def sampled(fields: Any, table: Any) -> int:
     """
     n = len(fields) // 2
     rows = put(table, 0, 0.0, POLYNOMIAL, 0.0, 0.0, 0.0, 0.0) if fields[0] > 0.0 else 0
-    left = 0.0
+    right = slope_at(fields, 0, n, 0)
     for k in range(n - 1):
-        h = fields[k + 1] - fields[k]
-        m = (fields[n + k + 1] - fields[n + k]) / h
-        right = m
-        ahead = fields[k + 2] - fields[k + 1] if k + 2 < n else h
-        beyond = (fields[n + k + 2] - fields[n + k + 1]) / ahead if k + 2 < n else m
-        behind = fields[k] - fields[k - 1] if k > 0 else h
-        before = (fields[n + k] - fields[n + k - 1]) / behind if k > 0 else m
-        if n == 2:
-            left = m
-        else:
-            left = end_slope(h, ahead, m, beyond) if k == 0 else left
-            right = inner_slope(h, ahead, m, beyond) if k + 2 < n else end_slope(h, behind, m, before)
+        h, m = width_at(fields, 0, k), secant_at(fields, 0, n, k)
+        left, right = right, slope_at(fields, 0, n, k + 1)
         turn = (left + right - 2.0 * m) / h
         cubic = turn / h
         rows = put(table, rows, fields[k], POLYNOMIAL, fields[n + k], left, (m - left) / h - turn, cubic)
-        left = right
     return close(table, rows, fields[n - 1])
 
 

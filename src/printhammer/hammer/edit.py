@@ -24,7 +24,7 @@ from printhammer.hammer.file import (
     si_unit_of,
 )
 from printhammer.hammer.uncertainty import UNCERTAINTY
-from printhammer.parts.spring.forces import TERMS
+from printhammer.parts.spring.terms import TERMS
 from printhammer.support.constants import Constant, quantities, shown
 
 Edit = tuple[str, Any]

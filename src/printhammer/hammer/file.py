@@ -3,7 +3,7 @@
 A file has ``format = 1``, ``name``, optionally ``title``, ``note``, ``strike`` and ``views``, the constants
 ``mass`` and ``platen``, and a table for each part: ``[magnet]``, ``[coil]``, ``[spring]``, ``[pack]``,
 ``[backstop]`` and ``[damping]`` with their ``law``, ``[waveform]`` with its ``shape``, any number of
-``[[force]]`` and ``[[contact]]`` with ``name`` and ``law`` (`printhammer.parts.spring.forces`), and
+``[[force]]`` and ``[[contact]]`` with ``name`` and ``law`` (`printhammer.parts.spring.terms`), and
 ``[uncertainty]`` with standard errors of constants (`printhammer.hammer.uncertainty`). All but name and mass
 are optional. A constant is ``{ value = 0.008, unit = "in", status = "stated", source = "Fig. 3" }``, with the
 unit "1" for a pure number.
@@ -27,12 +27,13 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError, located, nearest
 from printhammer.hammer.uncertainty import UNCERTAINTY, Uncertainty, read_uncertainty
-from printhammer.parts import PARTS, ROLES, BackstopPart, MagnetPart, PackPart, Part, laws
+from printhammer.parts import PARTS, ROLES, BackstopPart, MagnetPart, PackPart, Part, SpringPart, laws
 from printhammer.parts.friction import DryFriction, with_friction
 from printhammer.parts.functions import check_functions
 from printhammer.parts.outside import load_installed
-from printhammer.parts.spring.forces import TERMS, ForceSum, Friction, Term
+from printhammer.parts.spring.forces import ForceSum
 from printhammer.parts.spring.sums import sum_of
+from printhammer.parts.spring.terms import TERMS, Friction, Term
 from printhammer.support.constants import (
     STATUSES,
     Constant,
@@ -170,6 +171,27 @@ def kinds_of(section: str) -> tuple[str, ...]:
 def file_options(model: type[BaseModel]) -> dict[str, Any]:
     """List the options of a model that a file may set: all but `quantity`, which follows from the unit."""
     return {name: kind for name, kind in options(model).items() if name != "quantity"}
+
+
+def physics_of(model: Any) -> dict[str, Any]:
+    """Return the fields of a part or waveform that enter the fingerprint of a hammer; empty for None."""
+    if model is None:
+        return {}
+    kind: type[BaseModel] = type(model)
+    content: dict[str, Any] = {}
+    for name in (*quantities(kind), *(set(file_options(kind)) - {"file"}), "quantity"):
+        value = getattr(model, name, None)
+        entry = kind.model_fields.get(name)
+        if value is not None and (entry is None or value != entry.default):
+            content[name] = value.hex() if isinstance(value, float) else value
+    for name, numbers in model.content().items():
+        content[name] = _hex(numbers)
+    return content
+
+
+def _hex(numbers: Any) -> Any:
+    nested = getattr(numbers, "tolist", lambda: numbers)()
+    return [_hex(entry) for entry in nested] if isinstance(nested, (list, tuple)) else float(nested).hex()
 
 
 def _build(
@@ -443,14 +465,22 @@ def _check_order(contents: Contents) -> None:
         if key.startswith("contact.") and key.endswith(".position") and constant.si < before:
             expected = f"a position not before {written('backstop.position')}"
             raise InputError.of(key, constant.value, expected, unit=constant.unit)
-    magnet = contents.parts.get("magnet")
-    if isinstance(magnet, MagnetPart):
-        low, high = magnet.domain
+    for role in ("magnet", "spring"):
+        part = contents.parts.get(role)
+        if not isinstance(part, (MagnetPart, SpringPart)):
+            continue
+        low, high = part.domain
         for key, place in places.items():
-            force = import_module(magnet.module).magnet_force(magnet.packed(0.0), place, 0.0)
-            if not (low <= place <= high and math.isfinite(force)):
+            if not (low <= place <= high and _has_force(part, place)):
                 span = f"{low:g} to {high:g} m"
                 raise InputError(
-                    f"{written(key)}: expected a position where the magnet's law holds, {span}",
+                    f"{written(key)}: expected a position where the {role}'s law holds, {span}",
                     key=written(key),
                 )
+
+
+def _has_force(part: MagnetPart | SpringPart, place: float) -> bool:
+    """Whether the law of a magnet has a finite force at a displacement, m; True for a spring."""
+    if isinstance(part, SpringPart):
+        return True
+    return math.isfinite(import_module(part.module).magnet_force(part.packed(0.0), place, 0.0))

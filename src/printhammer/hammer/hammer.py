@@ -17,18 +17,18 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
-from pydantic import BaseModel
-
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError, located, nearest
 from printhammer.hammer.edit import Edit, changed, changed_text, edit_of
-from printhammer.hammer.file import FORMAT, Contents, build, file_options, read_document
+from printhammer.hammer.file import FORMAT, Contents, build, physics_of, read_document
 from printhammer.hammer.uncertainty import UNCERTAINTY, Uncertainty
 from printhammer.parts import BackstopPart, CoilPart, DampingPart, MagnetPart, PackPart, Part, SpringPart
+from printhammer.parts.base import domain_of
 from printhammer.parts.friction import DryFriction
-from printhammer.parts.spring.forces import ForceSum, Term
+from printhammer.parts.spring.forces import ForceSum
+from printhammer.parts.spring.terms import Term
 from printhammer.support.arguments import checked
-from printhammer.support.constants import Constant, quantities
+from printhammer.support.constants import Constant
 from printhammer.support.html import html_table, titled
 
 _CHANGED: Final = ", changed"
@@ -215,6 +215,11 @@ class Hammer:
         return part if isinstance(part, SpringPart) else None
 
     @cached_property
+    def domain(self) -> tuple[float, float]:
+        """Range of displacements in which the laws of magnet and spring are valid, m."""
+        return domain_of(self.magnet, self.spring)
+
+    @cached_property
     def pack(self) -> PackPart | None:
         """Ribbon and paper pack; None if absent."""
         part = self._contents.parts.get("pack")
@@ -302,13 +307,13 @@ class Hammer:
         if self.coil_resistance is not None:
             content["coil.resistance"] = self.coil_resistance.hex()
         models: dict[str, tuple[str, Any]] = {role: (part.law, part) for role, part in self.parts.items()}
-        if not _physics(self.coil).keys() - {"resistance"}:
+        if not physics_of(self.coil).keys() - {"resistance"}:
             # A resistance alone does not make a circuit: it only affects the heat.
             models.pop("coil", None)
         if self.waveform is not None:
             models["waveform"] = (self.waveform.shape, self.waveform)
         for section, (kind, model) in models.items():
-            content[section] = {"": kind, **_physics(model)}
+            content[section] = {"": kind, **physics_of(model)}
         text = json.dumps(content, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()
 
@@ -383,12 +388,18 @@ class Hammer:
                 f"{target}: the hammer file cannot be written ({error.strerror})", file=target
             ) from None
 
+    @property
+    def files(self) -> dict[str, str]:
+        """Names of the tables to which the hammer file refers, relative to its folder, by part or entry."""
+        models = {"magnet": self.magnet, "waveform": self.waveform, **self.terms}
+        names = {key: getattr(model, "file", None) for key, model in models.items()}
+        return {key: name for key, name in names.items() if name}
+
     def _tables(self, target: Path) -> dict[str, bytes]:
         """Return the contents, by name, of the tables that are missing in the folder of the file `target`."""
         missing: dict[str, bytes] = {}
-        for model in (self.magnet, self.waveform):
-            name = getattr(model, "file", None)
-            if not name or Path(name).is_absolute():
+        for name in self.files.values():
+            if Path(name).is_absolute():
                 continue
             data, there = (self._folder / name).read_bytes(), target.parent / name
             if not there.exists():
@@ -475,24 +486,3 @@ class Hammer:
             html_table(laws, ("part", "law")),
             html_table(rows, heads),
         )
-
-
-def _physics(model: Any) -> dict[str, Any]:
-    """Return the fields of a part or waveform that enter the fingerprint; empty for None."""
-    if model is None:
-        return {}
-    kind: type[BaseModel] = type(model)
-    content: dict[str, Any] = {}
-    for name in (*quantities(kind), *(set(file_options(kind)) - {"file"}), "quantity"):
-        value = getattr(model, name, None)
-        entry = kind.model_fields.get(name)
-        if value is not None and (entry is None or value != entry.default):
-            content[name] = value.hex() if isinstance(value, float) else value
-    for name, numbers in model.content().items():
-        content[name] = _hex(numbers)
-    return content
-
-
-def _hex(numbers: Any) -> Any:
-    nested = getattr(numbers, "tolist", lambda: numbers)()
-    return [_hex(entry) for entry in nested] if isinstance(nested, (list, tuple)) else float(nested).hex()

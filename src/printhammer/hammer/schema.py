@@ -19,7 +19,7 @@ from printhammer.hammer.file import (
     model_of,
 )
 from printhammer.hammer.uncertainty import ENTRIES, UNCERTAINTY
-from printhammer.parts.spring.forces import TERMS
+from printhammer.parts.spring.terms import TERMS
 from printhammer.support.constants import STATUSES, Quantity, quantities
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"

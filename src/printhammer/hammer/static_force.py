@@ -11,6 +11,7 @@ from typing import Any, Protocol
 from printhammer.errors import InputError
 from printhammer.hammer.statics import FARTHER, Statics, free_force, limits_of, reach_of, total_force
 from printhammer.parts import BackstopPart, MagnetPart, PackPart, Part, SpringPart, absent
+from printhammer.parts.base import domain_of
 
 
 class HammerLike(Protocol):
@@ -54,7 +55,7 @@ class StaticForce:
 
     Magnet, spring and the elastic force of the backstop are functions of x; the pack acts on its loading
     branch, as when fresh paper is pressed slowly. A `rigid` backstop excludes positions below its surface.
-    `limits`, m, is the range in which the magnet's law is valid and no rigid backstop is penetrated. `low`
+    `limits`, m, is the range in which the laws are valid and no rigid backstop is penetrated. `low`
     and `high`, m, bound the default search for equilibria: from the lower limit to the platen, the end of the
     pack or the upper limit, and at most 1 m from the origin.
     """
@@ -143,7 +144,7 @@ def statics_of(hammer: HammerLike) -> Statics:
     spring_level, _constants = law_of(hammer, hammer.spring, "spring_level")
     pack_loading, pack = law_of(hammer, hammer.pack, "pack_loading")
     backstop_elastic, backstop = law_of(hammer, hammer.backstop, "backstop_elastic")
-    low, high = hammer.magnet.domain if hammer.magnet is not None else (-math.inf, math.inf)
+    low, high = domain_of(hammer.magnet, hammer.spring)
     return Statics(
         magnet_force,
         spring_force,

@@ -145,6 +145,10 @@ def magnet_domain(q: Any, ends: Any) -> None:
         ends[0], ends[1] = q[len(q) - 2], q[len(q) - 1]
 
 
+def spring_domain(q: Any, ends: Any) -> None:
+    """Leave the displacement range as it is: the law of the spring holds everywhere."""
+
+
 def _copy(q: Any, origin: float, c: Any) -> int:
     """Write the packed constants of a law that has no packing function: the values of the part."""
     for k in range(len(q)):

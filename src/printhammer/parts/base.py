@@ -138,9 +138,20 @@ class SpringPart(Part):
     role: ClassVar[str] = "spring"
 
     @property
+    def domain(self) -> tuple[float, float]:
+        """Range of displacements in which the law is valid, `(x_min, x_max)`, m; by default unlimited."""
+        return (-math.inf, math.inf)
+
+    @property
     def viscous(self) -> bool:
         """Whether the spring dissipates energy."""
         return bool(self.function("VISCOUS"))
+
+
+def domain_of(*parts: MagnetPart | SpringPart | None) -> tuple[float, float]:
+    """Return the range of displacements in which the laws of all parts are valid, `(x_min, x_max)`, m."""
+    ranges = [(-math.inf, math.inf), *(part.domain for part in parts if part is not None)]
+    return max(low for low, _ in ranges), min(high for _, high in ranges)
 
 
 class PackPart(Part):

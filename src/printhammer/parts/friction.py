@@ -20,7 +20,7 @@ from typing import Any, ClassVar
 from printhammer.errors import InputError
 from printhammer.parts.base import DampingPart
 from printhammer.parts.damping import ViscousDamping
-from printhammer.parts.spring.forces import Friction
+from printhammer.parts.spring.terms import Friction
 
 FRICTION = True
 """Whether dry friction acts; `friction_force` returns its static and kinetic values."""

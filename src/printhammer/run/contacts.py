@@ -16,7 +16,7 @@ from printhammer.kernel.model.dots import DOT
 from printhammer.kernel.model.modes import HELD, HELD_FREE, PACK_SURFACE
 from printhammer.kernel.readout import contacts as readout
 from printhammer.kernel.readout.sums import PARTIALS
-from printhammer.parts.spring.forces import LinearContact
+from printhammer.parts.spring.terms import LinearContact
 from printhammer.results import Declared, Result, column, part, scalar
 from printhammer.results.declare import columns_of
 from printhammer.run.problem import Problem, Record

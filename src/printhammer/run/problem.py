@@ -184,7 +184,7 @@ def control_of(scales: tuple[float, float], tolerance: float) -> tuple[float, fl
 
 def bounds_of(hammer: Hammer, scales: tuple[float, float]) -> tuple[float, float, float, float]:
     """Return the displacement range of the force law, the origin, and the runaway distance, all in m."""
-    low, high = hammer.magnet.domain if hammer.magnet is not None else (-math.inf, math.inf)
+    low, high = hammer.domain
     return (low, high, hammer.origin, FAR * scales[0])
 
 

@@ -82,7 +82,7 @@ def initial_state(hammer: Hammer, state: Sequence[float] | None) -> tuple[float,
     Raises
     ------
     InputError
-        The state is not two finite numbers; its displacement is outside the range of the magnet law, or
+        The state is not two finite numbers; its displacement is outside the range of the laws, or
         behind a rigid backstop; or no state is passed and the hammer has no rest state.
     """
     if state is None:
@@ -94,14 +94,13 @@ def initial_state(hammer: Hammer, state: Sequence[float] | None) -> tuple[float,
         raise InputError.of(
             "state", tuple(state), "two finite numbers, displacement in m and velocity in m/s"
         )
-    if hammer.magnet is not None:
-        low, high = hammer.magnet.domain
-        if not low <= x <= high:
-            raise InputError.of(
-                "state",
-                tuple(state),
-                f"a displacement from {low:.9g} m to {high:.9g} m, where the law of the magnet holds",
-            )
+    low, high = hammer.domain
+    if not low <= x <= high:
+        raise InputError.of(
+            "state",
+            tuple(state),
+            f"a displacement from {low:.9g} m to {high:.9g} m, where the laws of magnet and spring hold",
+        )
     rigid = hammer.backstop is not None and hammer.backstop.law == "rigid"
     if rigid and hammer.position is not None and x < hammer.position:
         raise InputError.of("state", tuple(state), "a displacement not behind the rigid backstop")

@@ -15,7 +15,7 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import Range, range_of
 from printhammer.parts.coil import REFERENCE, Winding
 from printhammer.parts.friction import DryFriction
-from printhammer.parts.spring.forces import TERMS, Gravity
+from printhammer.parts.spring.terms import TERMS, Gravity
 from printhammer.run.supply import inductance
 from printhammer.studio.bounds import SPAN
 from printhammer.support.constants import Constant, quantities

@@ -13,7 +13,7 @@ from printhammer.hammer.names import Range
 from printhammer.parts.base import Part
 from printhammer.parts.coil import Winding
 from printhammer.parts.friction import DryFriction
-from printhammer.parts.spring.forces import LinearContact
+from printhammer.parts.spring.terms import LinearContact
 from printhammer.studio.coil import open_constants, rail_of, span_of
 from printhammer.support.constants import Constant, quantities
 from printhammer.units import from_si

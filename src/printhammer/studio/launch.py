@@ -76,10 +76,11 @@ def _hammer_inside(text: str, where: str) -> Hammer:
     except (ValueError, RecursionError) as error:
         reason = " ".join(str(error).split())
         raise InputError(f"{where}: expected a TOML file ({reason})", file=where, key="text") from None
-    for name, section in document.items():
-        if isinstance(section, Mapping) and "file" in section:
-            message = f"{where}: {name}.file names another file, which the studio does not read"
-            raise InputError(message, file=where, key=f"{name}.file")
+    for name, entry in document.items():
+        for section in entry if isinstance(entry, list) else [entry]:
+            if isinstance(section, Mapping) and "file" in section:
+                message = f"{where}: {name}.file names another file, which the studio does not read"
+                raise InputError(message, file=where, key=f"{name}.file")
     hammer = Hammer.from_toml(text, name=where)
     hammer.check()
     return hammer

@@ -125,9 +125,9 @@ def spread(regime: Regime, count: int, visited: FloatArray) -> FloatArray:
     share = (0.5 + number * np.array([1.0 / _PLASTIC, 1.0 / _PLASTIC**2])) % 1.0
     odd = (number % 2).astype(bool)
     states: FloatArray = np.where(odd, wide_low + share * (wide_high - wide_low), low + share * (high - low))
-    # Outside the range of the magnet's law, or behind a rigid backstop, no motion can start.
-    magnet, backstop = regime.hammer.magnet, regime.hammer.backstop
-    least, most = magnet.domain if magnet is not None else (-np.inf, np.inf)
+    # Outside the range of the laws, or behind a rigid backstop, no motion can start.
+    backstop = regime.hammer.backstop
+    least, most = regime.hammer.domain
     if backstop is not None and backstop.law == "rigid":
         least = max(least, backstop.position)
     states[:, 0] = np.clip(states[:, 0], least, most)

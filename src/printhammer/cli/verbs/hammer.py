@@ -120,6 +120,7 @@ def numbered(sources: list[str]) -> list[str]:
 def constants_table(hammer: Hammer, sources: list[str]) -> Table:
     """Return the table of constants, grouped by part and headed by its law."""
     laws = {key: f"{'shape' if key == 'waveform' else 'law'} {law}" for key, law in hammer.laws.items()}
+    files = hammer.files
 
     def cells(constant: Constant) -> tuple[str, ...]:
         own, style = constant.unit == constant.si_unit, STATUS_STYLES[constant.status]
@@ -137,11 +138,16 @@ def constants_table(hammer: Hammer, sources: list[str]) -> Table:
     numbers = "value", "SI", "source"
     heads = ("constant", "value", "unit", "SI", "", "status", "source", "meaning")
     made = table([Column(head, str, left=head not in numbers) for head in heads], ())
-    for section, group in groupby(hammer.constants.items(), lambda entry: entry[0].rpartition(".")[0]):
+    groups = {
+        section: list(group)
+        for section, group in groupby(hammer.constants.values(), lambda each: each.key.rpartition(".")[0])
+    }
+    for section in (*groups, *(key for key in files if key not in groups)):
         if section:
             made.add_row("")
-            made.add_row(f"[bold]\\[{section}][/bold]", f"[dim]{laws.get(section, '')}[/dim]")
-        for _key, constant in group:
+            law, file = laws.get(section, ""), escape(files.get(section, ""))
+            made.add_row(f"[bold]\\[{section}][/bold]", f"[dim]{law}[/dim]", *[""] * 5, f"[dim]{file}[/dim]")
+        for constant in groups.get(section, []):
             made.add_row(*cells(constant))
     return made
 

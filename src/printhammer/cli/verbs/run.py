@@ -77,7 +77,7 @@ def run(
     train = {"rate": rate, "period": period, "at": at, "pulses": pulses, "overlap": overlap}
     fired = _drive_of(hammer, drive, train)
     if drive is not None:
-        job.check(*tables_beside(drive, fired.waveform))
+        job.check(*tables_beside(drive, getattr(fired.waveform, "file", None)))
     motion = simulate(hammer, fired, **passed)
     return Answer(
         render(motion.summary(), units),

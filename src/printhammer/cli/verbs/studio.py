@@ -59,7 +59,7 @@ def studio(
     own = []
     for name in hammers or []:
         own.append(load_hammer(name, fired=False))
-        job.check(*tables_beside(Path(name), own[-1].magnet, own[-1].waveform))
+        job.check(*tables_beside(Path(name), *own[-1].files.values()))
     # A page with laws that no shipped hammer has compiles a WebAssembly module.
     announce_compiling()
     start, inside = read_start(state) if state else ("", None)

@@ -11,7 +11,7 @@ import numpy as np
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
-from printhammer.parts.spring.forces import LinearContact
+from printhammer.parts.spring.terms import LinearContact
 from printhammer.run.motion import Motion
 from printhammer.support.arrays import FloatArray
 
@@ -108,11 +108,11 @@ def reach(hammer: Hammer) -> tuple[float, float]:
     Raises
     ------
     InputError
-        The hammer has no platen, pack or upper limit of the magnet's law to set the scale, or no stroke.
+        The hammer has no platen, pack or upper limit of its laws to set the scale, or no stroke.
     """
     from printhammer.hammer.static_force import StaticForce
 
-    low, high = hammer.magnet.domain if hammer.magnet is not None else (-math.inf, math.inf)
+    low, high = hammer.domain
     end = min(StaticForce(hammer).end, high)
     near = hammer.origin if hammer.position is not None else max(low, min(0.0, end))
     if hammer.platen is None and hammer.pack is None and not math.isfinite(high):

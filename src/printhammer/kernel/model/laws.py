@@ -81,10 +81,11 @@ LAW_FUNCTIONS = {
 """Names of the law functions that each part may define."""
 
 PACKING = {role: (f"{role}_packed",) for role in LAW_FUNCTIONS} | {
-    "magnet": ("magnet_packed", "magnet_domain")
+    "magnet": ("magnet_packed", "magnet_domain"),
+    "spring": ("spring_packed", "spring_domain"),
 }
-"""Names of the functions that pack the constants of a part, by role; a magnet has a second function, which
-writes the displacement range of its law."""
+"""Names of the functions that pack the constants of a part, by role; for magnet and spring, a second function
+writes or narrows the displacement range of the laws."""
 
 
 def floats_of(law: str) -> int:

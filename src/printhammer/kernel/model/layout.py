@@ -2,7 +2,7 @@
 
 Inverse mass [1/kg], backstop position [m] and pack front [m] come first. The packed constants of damping,
 spring, pack, backstop, coil with supply, and magnet follow, each part at a fixed index: thirteen elements
-are reserved for the damping, 64 for the spring, sixteen for each of the others, and any number for the
+are reserved for the damping, 272 for the spring, sixteen for each of the others, and any number for the
 magnet, which is last.
 """
 
@@ -13,11 +13,11 @@ POSITION = 1
 FRONT = 2
 DAMPING = 3
 SPRING = 16
-PACK = 80
-BACKSTOP_PART = 96
-COIL = 112
-SUPPLY = 120
-MAGNET = 128
+PACK = 288
+BACKSTOP_PART = 304
+COIL = 320
+SUPPLY = 328
+MAGNET = 336
 PLACES = {
     "damping": DAMPING,
     "spring": SPRING,
@@ -34,7 +34,7 @@ ROOM = {
     "coil": SUPPLY - COIL,
 }
 """Maximum number of constants of each part; a magnet may have any number."""
-MOST_LEVELS = 12
+MOST_LEVELS = 112
 """Maximum number of displacements at which the slope of the spring force changes."""
 
 # Indices of the coil constants.

@@ -8,6 +8,7 @@ Mathematical Functions* (1964), table 25.2.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -92,6 +93,8 @@ def smooth_bounds(node: Any, after: Any, bounds: Any, hammer: Hammer) -> Any:
     if LEVELS:
         for k in range(MOST_LEVELS):
             level = spring_level(hammer[SPRING:PACK], float(k))
+            if math.isinf(level):
+                break
             first, last = node[1] - level, after[1] - level
             if first > 0.0 or last > 0.0 or (first == 0.0 and last == 0.0 and node[2] >= 0.0):
                 low = max(low, level)

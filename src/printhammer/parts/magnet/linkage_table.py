@@ -30,8 +30,8 @@ from typing import Any, ClassVar
 
 from printhammer.errors import InputError
 from printhammer.parts.base import register
-from printhammer.parts.magnet._cells import cell_of
 from printhammer.parts.magnet._grid import Grid, GridMagnet, bicubic, cell_at_zero
+from printhammer.parts.samples import cell_of
 
 
 def _inside(c: Any, x: float, current: float) -> bool:

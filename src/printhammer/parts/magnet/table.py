@@ -29,8 +29,8 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 from printhammer.parts.base import register
-from printhammer.parts.magnet._cells import cell_of
 from printhammer.parts.magnet._grid import Grid, GridMagnet, bicubic, cell_at_zero
+from printhammer.parts.samples import cell_of
 from printhammer.support.arrays import FloatArray
 
 

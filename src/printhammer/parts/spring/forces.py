@@ -4,51 +4,57 @@ A hammer file lists the forces as ``[[force]]`` and the contacts as ``[[contact]
 the position x0 of an entry and the indentation d of a contact, the sum is
 
     Fs = sum of  F + B (x - x0) + D (x - x0)^3          forces: constant, gravity, spring, cubic
+       + sum of  S(x)                                   forces sampled over the displacement
        - sum of  K d^n,  d = x - x0 > 0                 contacts on the front side
        + sum of  K d^n,  d = x0 - x > 0                 contacts on the back side
 
 Source: Newton's law of gravity near the ground, Hooke's law; H. Hertz (1882) for n = 3/2. The force of a
 contact is continuous when the contact closes. Several contacts may be closed at once, also together with pack
 or backstop: in a relay, the contact spring engages before the armature meets the pole. Contacts with damping
-have a dissipative part as well: `printhammer.parts.spring.sums`. Validity: quasi-static contacts. Weakness:
-contacts have no mass.
+have a dissipative part as well: `printhammer.parts.spring.sums`. A sampled force S is the curve of
+`printhammer.parts.samples` through its samples, NaN outside their range; its slope or curvature jumps at each
+sample. Validity: quasi-static contacts. Weakness: contacts have no mass.
 
 Packed constants: c[0] is the number of rows. The five numbers of a row follow: 0, x0, F, B, D for a force; 1
-(front) or -1 (back), x0, K, n, chi for a contact with the damping chi, 0 if the contact is elastic.
+(front) or -1 (back), x0, K, n, chi for a contact with the damping chi, 0 if the contact is elastic; 2, k, n,
+1 for straight lines or 0 for cubics, 0 for a sampled force. Its n displacements begin at c[k], after all
+rows, and the n forces follow.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar, Final, Literal, Self
+from typing import Any, ClassVar, Final
 
-import numpy as np
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import ConfigDict
 
 from printhammer.parts.base import SpringPart
-from printhammer.support.constants import quantity
+from printhammer.parts.samples import curve_at, integral_to
 
 LEVELS = True
 """Whether the slope of the law changes at the positions that `spring_level` returns."""
 
-ROOM: Final = 64
+ROOM: Final = 272
 """Number of packed constants that the kernel reserves for a spring; arbitrary."""
 
 WIDTH: Final = 5
 """Number of packed constants of a force or contact, by definition of the row."""
 
-MOST: Final = (ROOM - 1) // WIDTH
-"""Maximum number of forces and contacts, including the spring."""
+MOST: Final = 12
+"""Maximum number of forces and contacts, including the spring; arbitrary."""
+
+MOST_SAMPLES: Final = 100
+"""Maximum number of samples of all sampled forces; with `MOST` rows, they fit into `ROOM`."""
 
 FRONT, BACK = 1.0, -1.0
 """First number of the row of a contact: by definition, the sign of the side of the armature that touches."""
 
-GRAVITY: Final = 9.80665
-"""Standard acceleration of free fall, m/s^2: 3rd General Conference on Weights and Measures (1901)."""
+SAMPLED: Final = 2.0
+"""First number of the row of a sampled force, by definition of the row."""
 
 
 def spring_force(c: Any, x: float) -> float:
-    """Return the sum of all forces and contact forces, N, at the displacement `x`, m."""
+    """Return the sum of all forces and contact forces, N, at `x`, m; NaN beyond the samples of a force."""
     total = 0.0
     for k in range(int(c[0])):
         row = 1 + WIDTH * k
@@ -56,6 +62,11 @@ def spring_force(c: Any, x: float) -> float:
         side = c[row]
         if side == 0.0:
             total += c[row + 2] + (c[row + 3] + c[row + 4] * travel * travel) * travel
+        elif side == SAMPLED:
+            first, n = int(c[row + 1]), int(c[row + 2])
+            if not c[first] <= x <= c[first + n - 1]:
+                return math.nan
+            total += curve_at(c, first, n, c[row + 3] != 0.0, x)
         elif side * travel > 0.0:
             depth = side * travel
             total -= side * c[row + 2] * (depth if c[row + 3] == 1.0 else depth ** c[row + 3])
@@ -63,7 +74,7 @@ def spring_force(c: Any, x: float) -> float:
 
 
 def spring_energy(c: Any, x: float) -> float:
-    """Return the sum of the potential energies, J; the energy of an open contact is zero."""
+    """Return the sum of the potential energies, J; that of an open contact or at a first sample is zero."""
     total = 0.0
     for k in range(int(c[0])):
         row = 1 + WIDTH * k
@@ -72,6 +83,11 @@ def spring_energy(c: Any, x: float) -> float:
         if side == 0.0:
             square = travel * travel
             total -= (c[row + 2] + 0.5 * c[row + 3] * travel) * travel + 0.25 * c[row + 4] * square * square
+        elif side == SAMPLED:
+            first, n = int(c[row + 1]), int(c[row + 2])
+            if not c[first] <= x <= c[first + n - 1]:
+                return math.nan
+            total -= integral_to(c, first, n, c[row + 3] != 0.0, x)
         elif side * travel > 0.0:
             n = c[row + 3] + 1.0
             total += c[row + 2] * (side * travel) ** n / n
@@ -79,20 +95,38 @@ def spring_energy(c: Any, x: float) -> float:
 
 
 def spring_level(c: Any, k: float) -> float:
-    """Return the position of contact `k`, counted from 0, m; infinity if there are fewer contacts."""
-    left = k
+    """Return the position of kink `k`, from 0, m: a contact or an inner sample; infinity beyond the last."""
+    left = int(k)
     for i in range(int(c[0])):
         row = 1 + WIDTH * i
-        if c[row] != 0.0:
-            if left == 0.0:
+        if c[row] == SAMPLED:
+            inner = int(c[row + 2]) - 2
+            if left < inner:
+                return float(c[int(c[row + 1]) + 1 + left])
+            left -= inner
+        elif c[row] != 0.0:
+            if left == 0:
                 return float(c[row + 1])
-            left -= 1.0
+            left -= 1
     return math.inf
+
+
+def spring_domain(c: Any, ends: Any) -> None:
+    """Narrow a displacement range, m, to the samples of all sampled forces."""
+    for i in range(int(c[0])):
+        row = 1 + WIDTH * i
+        if c[row] == SAMPLED:
+            first = int(c[row + 1])
+            ends[0] = max(ends[0], c[first])
+            ends[1] = min(ends[1], c[first + int(c[row + 2]) - 1])
 
 
 def spring_packed(q: Any, origin: float, c: Any) -> int:
     """Write the packed constants to `c`, with `origin` for NaN positions; return the number of constants."""
     count = 1 + WIDTH * int(q[0])
+    for i in range(int(q[0])):
+        if q[1 + WIDTH * i] == SAMPLED:
+            count += 2 * int(q[3 + WIDTH * i])
     for k in range(count):
         c[k] = origin if math.isnan(q[k]) else q[k]
     return count
@@ -100,139 +134,6 @@ def spring_packed(q: Any, origin: float, c: Any) -> int:
 
 Row = tuple[float, float, float, float, float]
 """Packed constants of a force or contact; a NaN position stands for the position of the backstop."""
-
-
-class Term(BaseModel):
-    """Base class of the entries of ``[[force]]`` and ``[[contact]]``."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-    law: ClassVar[str]
-
-    def row(self, mass: float) -> Row:
-        """Return the row of packed constants of the entry; `mass` is the mass of the armature, kg."""
-        raise NotImplementedError
-
-
-class ConstantForce(Term):
-    """Constant force."""
-
-    law: ClassVar[str] = "constant"
-
-    force: float = quantity("N", "F", "constant force, positive toward the paper")
-
-    def row(self, mass: float) -> Row:
-        """Return the row of packed constants of the force."""
-        return (0.0, 0.0, self.force, 0.0, 0.0)
-
-
-class Gravity(Term):
-    """Weight of the armature on an inclined axis."""
-
-    law: ClassVar[str] = "gravity"
-
-    angle: float = quantity(
-        "rad", "theta", "angle of the motion above the horizontal, 90 deg for an upward blow"
-    )
-    acceleration: float = quantity("m/s^2", "g", "acceleration of free fall", gt=0, default=GRAVITY)
-
-    def row(self, mass: float) -> Row:
-        """Return the row of packed constants of the force."""
-        return (0.0, 0.0, -mass * self.acceleration * math.sin(self.angle), 0.0, 0.0)
-
-
-class FurtherSpring(Term):
-    """Linear spring with a preload at a position, by default the position of the backstop."""
-
-    law: ClassVar[str] = "spring"
-
-    preload: float = quantity("N", "P", "spring force at `position`", default=0.0)
-    stiffness: float = quantity("N/m", "K", "spring stiffness, negative for an unstable spring")
-    position: float | None = quantity("m", "x0", "position of the preload", default=None)
-
-    def row(self, mass: float) -> Row:
-        """Return the row of packed constants of the force."""
-        position = math.nan if self.position is None else self.position
-        return (0.0, position, self.preload, -self.stiffness, 0.0)
-
-
-class CubicForce(Term):
-    """Linear and cubic spring about a relaxed position."""
-
-    law: ClassVar[str] = "cubic"
-
-    stiffness: float = quantity("N/m", "K", "stiffness at the relaxed position, negative between two wells")
-    cubic: float = quantity("N/m^3", "D", "coefficient of the cubic term")
-    center: float = quantity("m", "x0", "position at which the spring is relaxed")
-
-    def row(self, mass: float) -> Row:
-        """Return the row of packed constants of the force."""
-        return (0.0, self.center, 0.0, -self.stiffness, -self.cubic)
-
-
-class Friction(Term):
-    """Dry friction of the armature in its guide; part of the damping, see `printhammer.parts.friction`."""
-
-    law: ClassVar[str] = "friction"
-
-    kinetic: float = quantity("N", "Fk", "friction force of the moving armature", gt=0)
-    static: float | None = quantity("N", "Fs", "largest friction force at rest (default: Fk)", default=None)
-
-    @model_validator(mode="after")
-    def _static_is_not_less(self) -> Self:
-        if self.static is not None and self.static < self.kinetic:
-            raise ValueError("static is less than kinetic: expected at least the kinetic friction")
-        return self
-
-    @property
-    def largest(self) -> float:
-        """Static friction, N."""
-        return self.kinetic if self.static is None else self.static
-
-
-class LinearContact(Term):
-    """Linear spring that acts on one side of a position, with or without damping."""
-
-    law: ClassVar[str] = "linear"
-    power: ClassVar[float] = 1.0
-    """Exponent of the indentation in the force law."""
-
-    side: Literal["front", "back"]
-    """Side of the armature that touches: the front if x > `position`, the back if x < `position`."""
-    position: float = quantity("m", "x0", "position at which the contact closes")
-    stiffness: float = quantity("N/m", "K", "stiffness of the contact", gt=0)
-    damping: float | None = quantity(
-        "s/m", "chi", "damping: share of the elastic force per unit speed of indentation", gt=0, default=None
-    )
-
-    @property
-    def sign(self) -> float:
-        """Direction of motion in which the indentation grows, 1 toward the paper, or -1."""
-        return FRONT if self.side == "front" else BACK
-
-    def row(self, mass: float) -> Row:
-        """Return the row of packed constants of the contact."""
-        return (self.sign, self.position, self.stiffness, self.power, self.damping or 0.0)
-
-    def force(self, depth: Any, rate: Any = 0.0) -> Any:
-        """Return the contact force, N, at indentations, m, and their rates, m/s, numbers or arrays."""
-        return self.stiffness * depth**self.power * np.maximum(1.0 + (self.damping or 0.0) * rate, 0.0)
-
-
-class HertzContact(LinearContact):
-    """Elastic contact of round bodies: the force grows with the 3/2 power of the indentation."""
-
-    law: ClassVar[str] = "hertz"
-    power: ClassVar[float] = 1.5
-
-    stiffness: float = quantity("N/m^1.5", "K", "Hertz stiffness of the contact", gt=0)
-
-
-TERMS: Final[dict[str, dict[str, type[Term]]]] = {
-    "force": {term.law: term for term in (ConstantForce, CubicForce, Friction, Gravity, FurtherSpring)},
-    "contact": {term.law: term for term in (HertzContact, LinearContact)},
-}
-"""Classes of forces and contacts, by the list of the hammer file, "force" or "contact", and by law."""
 
 
 class ForceSum(SpringPart):
@@ -243,10 +144,19 @@ class ForceSum(SpringPart):
     law: ClassVar[str] = "sum"
 
     rows: tuple[Row, ...]
+    samples: tuple[float, ...] = ()
+    """Displacements, m, then forces, N, of each sampled force, in the order of the rows."""
+
+    @property
+    def domain(self) -> tuple[float, float]:
+        """Range of displacements of the sampled forces, m."""
+        ends = [-math.inf, math.inf]
+        spring_domain(self.numbers(), ends)
+        return (ends[0], ends[1])
 
     def numbers(self) -> tuple[float, ...]:
-        """Return the number of rows, followed by the rows."""
-        return (float(len(self.rows)), *(number for row in self.rows for number in row))
+        """Return the number of rows, followed by the rows and the samples."""
+        return (float(len(self.rows)), *(number for row in self.rows for number in row), *self.samples)
 
     def packed(self, origin: float) -> tuple[float, ...]:
         """Return the packed constants; `origin` is the position of the backstop, m."""

@@ -26,19 +26,24 @@ from typing import Any, ClassVar
 from printhammer.errors import InputError
 from printhammer.parts.base import SpringPart
 from printhammer.parts.spring.forces import (
+    BACK,
+    FRONT,
     LEVELS,
     MOST,
+    MOST_SAMPLES,
+    SAMPLED,
     WIDTH,
     ForceSum,
     Row,
-    Term,
+    spring_domain,
     spring_energy,
     spring_force,
     spring_level,
     spring_packed,
 )
+from printhammer.parts.spring.terms import LinearContact, SampledForce, Term
 
-__all__ = ["LEVELS", "spring_energy", "spring_force", "spring_level", "spring_packed"]
+__all__ = ["LEVELS", "spring_domain", "spring_energy", "spring_force", "spring_level", "spring_packed"]
 
 VISCOUS = True
 """Whether the law has a dissipative part, which `spring_viscous` returns."""
@@ -89,23 +94,45 @@ def sum_of(spring: SpringPart | None, terms: Mapping[str, Term], mass: float) ->
     Raises
     ------
     InputError
-        The spring has a law that cannot be added, two contacts on the same side have the same position, or
-        there are more than `MOST` terms.
+        The spring has a law that cannot be added, two contacts on the same side have the same position, there
+        are more than `MOST` terms or `MOST_SAMPLES` samples, or two sampled forces have no common range.
     """
     rows = [] if spring is None else [_spring_row(spring)]
     taken: dict[tuple[float, float], str] = {}
     for key, term in terms.items():
         row = term.row(mass)
-        place = (row[0], row[1])
-        if row[0] != 0.0 and taken.setdefault(place, key) != key:
+        if isinstance(term, LinearContact) and taken.setdefault(row[:2], key) != key:
             raise InputError.of(
-                f"{key}.position", row[1], f"another position than that of {taken[place]}", unit="m"
+                f"{key}.position", row[1], f"another position than that of {taken[row[:2]]}", unit="m"
             )
         rows.append(row)
     if len(rows) > MOST:
         raise InputError.of("force", len(rows), f"at most {MOST} forces and contacts, the spring included")
-    damped = any(row[0] != 0.0 and row[4] > 0.0 for row in rows)
-    return (DampedForceSum if damped else ForceSum)(rows=tuple(rows))
+    damped = any(row[0] in (FRONT, BACK) and row[4] > 0.0 for row in rows)
+    sampled = {key: term.samples for key, term in terms.items() if isinstance(term, SampledForce)}
+    samples = [number for own in sampled.values() for column in zip(*own, strict=True) for number in column]
+    count = len(samples) // 2
+    if count > MOST_SAMPLES:
+        raise InputError.of("force", count, f"at most {MOST_SAMPLES} samples of all forces")
+    made = (DampedForceSum if damped else ForceSum)(rows=_indexed(rows), samples=tuple(samples))
+    low, high = made.domain
+    if not low < high:
+        key = next(reversed(sampled))
+        expected = "displacements that the other sampled forces have, too"
+        raise InputError.of(f"{key}.file", sampled[key][0][0], expected, unit="m")
+    return made
+
+
+def _indexed(rows: list[Row]) -> tuple[Row, ...]:
+    """Return rows in which those of sampled forces hold the index of their first displacement."""
+    result, first = [], 1 + WIDTH * len(rows)
+    for row in rows:
+        if row[0] == SAMPLED:
+            result.append((row[0], float(first), *row[2:]))
+            first += 2 * int(row[2])
+        else:
+            result.append(row)
+    return tuple(result)
 
 
 def _spring_row(spring: SpringPart) -> Row:

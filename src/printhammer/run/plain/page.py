@@ -69,6 +69,7 @@ if TYPE_CHECKING:
         magnet_domain,
         magnet_packed,
         pack_packed,
+        spring_domain,
         spring_packed,
     )
 
@@ -101,7 +102,7 @@ def fill_constants(
     constants : float64 array
         Array of zeros, to which the constants are written.
     ends : float64 array, shape (2,)
-        Range of displacements in which the law of the magnet is valid, m.
+        Range of displacements in which the laws of magnet and spring are valid, m.
 
     Returns
     -------
@@ -119,6 +120,7 @@ def fill_constants(
     if len(coil) > 0:
         coil_packed(coil, origin, constants[COIL:SUPPLY])
     magnet_domain(magnet, ends)
+    spring_domain(spring, ends)
     return MAGNET + max(magnet_packed(magnet, origin, constants[MAGNET:]), 1)
 
 

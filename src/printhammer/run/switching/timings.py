@@ -20,7 +20,7 @@ import numpy as np
 
 from printhammer.drive.trains import Drive, SineForce
 from printhammer.drive.waveforms.shapes import Trapezoid, Waveform
-from printhammer.parts.spring.forces import LinearContact
+from printhammer.parts.spring.terms import LinearContact
 from printhammer.results import Declared, part, scalar
 from printhammer.results.summary import FactRow, interval, quantity
 from printhammer.run.contacts import Closing

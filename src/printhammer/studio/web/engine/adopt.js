@@ -66,7 +66,7 @@ function combinedOf(combined, values) {
 function entryOf(text, shelf, templates) {
   const where = "dropped file";
   const document = tomlOf(text, where, shelf.limits);
-  const beside = Object.keys(document).find((key) => isTable(document[key]) && "file" in document[key]);
+  const beside = Object.keys(document).find((key) => [document[key]].flat().some((entry) => isTable(entry) && "file" in entry));
   if (beside) throw new Refusal(`${where}: ${beside}.file names a table, which does not come with the file: \`printhammer studio FILE\` reads both`);
   const own = entriesOf(document);
   let [template, why] = [null, ""];
