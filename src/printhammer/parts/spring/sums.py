@@ -14,7 +14,7 @@ so that the coefficient of restitution is 1 - (2/3) chi u for a small chi u. Val
 material of the contact, below the speed of permanent deformation. Weakness: contacts have no mass, and the
 elastic part of the force does not relax.
 
-Packed constants: as in `printhammer.parts.spring.forces`; the last number of the row of a contact is chi.
+Packed constants: as in `printhammer.parts.spring.sampled`; the last number of the row of a contact is chi.
 """
 
 from __future__ import annotations
@@ -25,16 +25,9 @@ from typing import Any, ClassVar
 
 from printhammer.errors import InputError
 from printhammer.parts.base import SpringPart
-from printhammer.parts.spring.forces import (
-    BACK,
-    FRONT,
-    LEVELS,
-    MOST,
-    MOST_SAMPLES,
-    SAMPLED,
-    WIDTH,
-    ForceSum,
-    Row,
+from printhammer.parts.spring.forces import LEVELS, MOST, MOST_SAMPLES, WIDTH, ForceSum, Row
+from printhammer.parts.spring.sampled import (
+    SampledSum,
     spring_domain,
     spring_energy,
     spring_force,
@@ -73,7 +66,7 @@ def spring_switch(c: Any, v: float) -> float:
     return float(product)
 
 
-class DampedForceSum(ForceSum):
+class DampedForceSum(SampledSum):
     """Sum of the spring of a hammer and of forces and contacts, at least one of which dissipates energy."""
 
     law: ClassVar[str] = "damped sum"
@@ -99,40 +92,33 @@ def sum_of(spring: SpringPart | None, terms: Mapping[str, Term], mass: float) ->
     """
     rows = [] if spring is None else [_spring_row(spring)]
     taken: dict[tuple[float, float], str] = {}
+    sampled = {key: term for key, term in terms.items() if isinstance(term, SampledForce)}
     for key, term in terms.items():
+        if isinstance(term, SampledForce):
+            continue
         row = term.row(mass)
         if isinstance(term, LinearContact) and taken.setdefault(row[:2], key) != key:
             raise InputError.of(
                 f"{key}.position", row[1], f"another position than that of {taken[row[:2]]}", unit="m"
             )
         rows.append(row)
-    if len(rows) > MOST:
-        raise InputError.of("force", len(rows), f"at most {MOST} forces and contacts, the spring included")
-    damped = any(row[0] in (FRONT, BACK) and row[4] > 0.0 for row in rows)
-    sampled = {key: term.samples for key, term in terms.items() if isinstance(term, SampledForce)}
-    samples = [number for own in sampled.values() for column in zip(*own, strict=True) for number in column]
-    count = len(samples) // 2
+    entries = len(rows) + len(sampled)
+    if entries > MOST:
+        raise InputError.of("force", entries, f"at most {MOST} forces and contacts, the spring included")
+    damped = any(row[0] != 0.0 and row[4] > 0.0 for row in rows)
+    if not (damped or sampled):
+        return ForceSum(rows=tuple(rows))
+    count = sum(len(term.samples) for term in sampled.values())
     if count > MOST_SAMPLES:
         raise InputError.of("force", count, f"at most {MOST_SAMPLES} samples of all forces")
-    made = (DampedForceSum if damped else ForceSum)(rows=_indexed(rows), samples=tuple(samples))
+    curves = tuple((term.interpolation == "linear", term.samples) for term in sampled.values())
+    made = (DampedForceSum if damped else SampledSum)(rows=tuple(rows), curves=curves)
     low, high = made.domain
     if not low < high:
         key = next(reversed(sampled))
         expected = "displacements that the other sampled forces have, too"
-        raise InputError.of(f"{key}.file", sampled[key][0][0], expected, unit="m")
+        raise InputError.of(f"{key}.file", sampled[key].samples[0][0], expected, unit="m")
     return made
-
-
-def _indexed(rows: list[Row]) -> tuple[Row, ...]:
-    """Return rows in which those of sampled forces hold the index of their first displacement."""
-    result, first = [], 1 + WIDTH * len(rows)
-    for row in rows:
-        if row[0] == SAMPLED:
-            result.append((row[0], float(first), *row[2:]))
-            first += 2 * int(row[2])
-        else:
-            result.append(row)
-    return tuple(result)
 
 
 def _spring_row(spring: SpringPart) -> Row:

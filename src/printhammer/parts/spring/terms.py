@@ -2,7 +2,7 @@
 
 Each class is one law, with its constants in SI. `Term.row` converts an entry to a row of the sum of forces,
 see `printhammer.parts.spring.forces`; dry friction becomes part of the damping instead, see
-`printhammer.parts.friction`.
+`printhammer.parts.friction`, and a sampled force a curve, see `printhammer.parts.spring.sampled`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationInfo, model_validator
 
 from printhammer.errors import InputError
-from printhammer.parts.spring.forces import BACK, FRONT, MOST_SAMPLES, SAMPLED, Row
+from printhammer.parts.spring.forces import BACK, FRONT, MOST_SAMPLES, Row
 from printhammer.support.constants import folder_of, quantity
 from printhammer.support.tables.readings import read_table
 
@@ -140,10 +140,6 @@ class SampledForce(Term):
     def samples(self) -> tuple[tuple[float, float], ...]:
         """Displacements, m, ascending, and forces, N, of the samples."""
         return self._samples
-
-    def row(self, mass: float) -> Row:
-        """Return the row of packed constants of the force, without the index of the first sample."""
-        return (SAMPLED, 0.0, float(len(self._samples)), float(self.interpolation == "linear"), 0.0)
 
 
 def _samples_of(path: Path) -> tuple[tuple[float, float], ...]:

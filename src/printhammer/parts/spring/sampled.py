@@ -1,0 +1,113 @@
+"""Sum of the spring and of the additional forces and contacts of a hammer, with sampled forces.
+
+    Fs = sum of forces and contacts + sum of S(x)
+
+S is the curve of `printhammer.parts.samples` through samples of a force over the displacement, NaN outside
+their range. Its slope, or with shape-preserving cubics its curvature, jumps at each sample. Source: the
+measurement in the file that the entry names. Validity: displacements between the first and the last sample.
+Weakness: the curve also follows the noise of the samples, and a hysteresis is lost.
+
+Packed constants: those of `printhammer.parts.spring.forces`, then the number of curves. Each curve follows
+with its number n of samples, 1 for straight lines or 0 for cubics, n displacements, ascending, and n forces.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar
+
+from printhammer.parts.samples import curve_at, integral_to
+from printhammer.parts.spring.forces import LEVELS, WIDTH, ForceSum
+from printhammer.parts.spring.forces import spring_energy as energy_of_rows
+from printhammer.parts.spring.forces import spring_force as force_of_rows
+from printhammer.parts.spring.forces import spring_level as level_of_rows
+from printhammer.parts.spring.forces import spring_packed as rows_packed
+
+__all__ = ["LEVELS", "spring_domain", "spring_energy", "spring_force", "spring_level", "spring_packed"]
+
+
+def spring_force(c: Any, x: float) -> float:
+    """Return the sum of all forces and contact forces, N, at `x`, m; NaN beyond the samples of a force."""
+    total = force_of_rows(c, x)
+    at = 1 + WIDTH * int(c[0])
+    first = at + 3
+    for _ in range(int(c[at])):
+        n = int(c[first - 2])
+        if not c[first] <= x <= c[first + n - 1]:
+            return math.nan
+        total += curve_at(c, first, n, c[first - 1] != 0.0, x)
+        first += 2 * n + 2
+    return float(total)
+
+
+def spring_energy(c: Any, x: float) -> float:
+    """Return the sum of the potential energies, J; that of a sampled force is zero at its first sample."""
+    total = energy_of_rows(c, x)
+    at = 1 + WIDTH * int(c[0])
+    first = at + 3
+    for _ in range(int(c[at])):
+        n = int(c[first - 2])
+        if not c[first] <= x <= c[first + n - 1]:
+            return math.nan
+        total -= integral_to(c, first, n, c[first - 1] != 0.0, x)
+        first += 2 * n + 2
+    return float(total)
+
+
+def spring_level(c: Any, k: float) -> float:
+    """Return the position of kink `k`, from 0, m: an inner sample or a contact; infinity beyond the last."""
+    at = 1 + WIDTH * int(c[0])
+    first = at + 3
+    left = int(k)
+    for _ in range(int(c[at])):
+        n = int(c[first - 2])
+        if left < n - 2:
+            return float(c[first + 1 + left])
+        left -= n - 2
+        first += 2 * n + 2
+    return level_of_rows(c, float(left))
+
+
+def spring_domain(c: Any, ends: Any) -> None:
+    """Narrow a displacement range, m, to the samples of all sampled forces."""
+    at = 1 + WIDTH * int(c[0])
+    first = at + 3
+    for _ in range(int(c[at])):
+        n = int(c[first - 2])
+        ends[0] = max(ends[0], c[first])
+        ends[1] = min(ends[1], c[first + n - 1])
+        first += 2 * n + 2
+
+
+def spring_packed(q: Any, origin: float, c: Any) -> int:
+    """Write the packed constants to `c`, with `origin` for NaN positions; return the number of constants."""
+    for k in range(rows_packed(q, origin, c), len(q)):
+        c[k] = q[k]
+    return len(q)
+
+
+Curve = tuple[bool, tuple[tuple[float, float], ...]]
+"""Whether the lines between samples are straight, and displacements, m, with forces, N."""
+
+
+class SampledSum(ForceSum):
+    """Sum of the spring of a hammer and of its forces and contacts, of which any number are sampled."""
+
+    law: ClassVar[str] = "sampled sum"
+
+    curves: tuple[Curve, ...] = ()
+
+    @property
+    def domain(self) -> tuple[float, float]:
+        """Range of displacements of the sampled forces, m."""
+        ends = [-math.inf, math.inf]
+        spring_domain(self.numbers(), ends)
+        return (ends[0], ends[1])
+
+    def numbers(self) -> tuple[float, ...]:
+        """Return the number of rows, the rows, the number of curves, and the curves."""
+        numbers = [*super().numbers(), float(len(self.curves))]
+        for straight, samples in self.curves:
+            numbers += [float(len(samples)), float(straight)]
+            numbers += [number for column in zip(*samples, strict=True) for number in column]
+        return tuple(numbers)
