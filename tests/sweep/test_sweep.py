@@ -48,6 +48,7 @@ def check_member(row: xr.Dataset, motion: ph.Motion) -> None:
     """Compare a member with the motion of the same hammer under the same drive."""
     assert STATUSES[int(row.status)] == motion.status
     assert close(row.reached, motion.end)
+    assert bool(row.unsettled) == bool(motion.unsettled)
     for dot in motion.dots:
         found = row.isel(firing=dot.index)
         assert bool(found.fired)
@@ -188,10 +189,10 @@ def test_a_failed_member_is_a_row_of_the_table_with_its_status(tmp_path: Path) -
     }
     ph.sweep(spec, tmp_path / "r.csv")
     rows = (tmp_path / "r.csv").read_text(encoding="utf-8").splitlines()
-    assert rows[0] == "pack_front [m],status,reached [s],steps,struck_1,struck_2,lost_dots"
+    assert rows[0] == "pack_front [m],status,reached [s],steps,unsettled,struck_1,struck_2,lost_dots"
     assert rows[1].split(",")[1] == "ok"
-    assert rows[1].split(",")[4:] == ["True", "True", "0"]
-    assert rows[2].split(",")[1:] == ["no such hammer", "", "", "", "", ""]
+    assert rows[1].split(",")[4:] == ["False", "True", "True", "0"]
+    assert rows[2].split(",")[1:] == ["no such hammer", "", "", "", "", "", ""]
 
 
 def test_provenance_and_units(tmp_path: Path, hammer: ph.Hammer) -> None:
@@ -307,3 +308,60 @@ def test_a_name_in_csv_gives_a_table_of_the_store_beside_it(
     with refused("out", str(tmp_path / "other.csv")):
         ph.sweep(spec_file(count=2), tmp_path / "other.csv")
     assert (tmp_path / "other.csv").read_text(encoding="utf-8") == "of somebody else"
+
+
+@pytest.mark.parametrize(
+    ("name", "axis", "expected"),
+    [
+        # Without a spring, the armature of the pot magnet stays at its pole.
+        ("pot-magnet", {"key": "mass", "values": ["20 g", "30 g"]}, [True, True]),
+        # Of two stops the elastic one makes the armature bounce for ever.
+        ("braille-embosser", {"key": "backstop.restitution", "values": ["0.3", "1"]}, [False, True]),
+    ],
+)
+def test_members_that_are_not_at_rest_are_marked(
+    tmp_path: Path, name: str, axis: dict[str, Any], expected: list[bool]
+) -> None:
+    """Against the motion of the same hammer for twice as long, which goes on away from rest or does not."""
+    train = {"train": {"pulses": 2, "rate": "10 Hz"}}
+    spec = {
+        "format": 1,
+        "hammer": name,
+        "drive": train,
+        "axis": [axis],
+        "outputs": {"scalars": ["lost_dots"]},
+    }
+    found = ph.sweep(spec, tmp_path / "out.zarr")
+    assert found.unsettled.values.tolist() == expected
+    assert (found.status == 0).all()
+    hammer = ph.load(name)
+    assert hammer.front is not None
+    for value, end, unsettled in zip(axis["values"], found.reached.values, expected, strict=True):
+        other = hammer.replace(axis["key"], value)
+        drive = ph.PulseTrain(other.waveform, rate=10.0, pulses=2)
+        motion = ph.simulate(other, drive, duration=2.0 * float(end))
+        away = np.abs(motion.at(np.linspace(end, 2.0 * end, 2000))[0] - other.rest).max()
+        assert bool(away > 0.02 * (hammer.front - hammer.rest)) is unsettled
+    timed = ph.sweep({**spec, "duration": "300 ms"}, tmp_path / "timed.zarr")
+    assert not timed.unsettled.any()
+
+
+def test_oscillators_settle_in_a_sweep_as_in_a_run(tmp_path: Path) -> None:
+    """Without a pack; the force ends, and the window is bounded."""
+    spec = {
+        "format": 1,
+        "hammer": "duffing-holmes",
+        "drive": {"waveform": {"shape": "half-sine", "amplitude": "0.3 N", "width": "1 s"}}
+        | {"train": {"pulses": 2, "rate": "0.5 Hz"}},
+        "axis": [
+            {"key": "damping.coefficient", "values": ["0 N s/m", "1e-4 N s/m", "0.25 N s/m", "3 N s/m"]}
+        ],
+        "outputs": {"final": True},
+    }
+    found = ph.sweep(spec, tmp_path / "out.zarr")
+    hammer = ph.load("duffing-holmes")
+    base = read_spec(spec).base
+    for value, row in zip(spec["axis"][0]["values"], found.unsettled.values, strict=True):
+        drive = ph.PulseTrain(base.waveform, pulses=2, rate=0.5)
+        assert bool(ph.simulate(hammer.replace("damping.coefficient", value), drive).unsettled) == bool(row)
+    assert found.unsettled.values[0]

@@ -22,7 +22,7 @@ from printhammer.run.window import (
     last_wait,
     least_wait,
     longest_of,
-    wait_of,
+    window_of,
 )
 from printhammer.support.arrays import FloatArray
 
@@ -30,7 +30,14 @@ from printhammer.support.arrays import FloatArray
 def waits_of(
     hammers: Sequence[Hammer], waveforms: Sequence[Waveform], threads: int | None = None
 ) -> FloatArray:
-    """Compute the time from the last firing to the end of each run, s, like `wait_of`, by ensembles.
+    """Compute the time from the last firing to the end of each run, s, like `wait_of`, by ensembles."""
+    return windows_of(hammers, waveforms, threads)[0]
+
+
+def windows_of(
+    hammers: Sequence[Hammer], waveforms: Sequence[Waveform], threads: int | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Compute the window of each run by ensembles; return waits and flight times, s, as in `Window`.
 
     One hammer and one waveform for each run, shape (runs,); equal objects are simulated once. Devices whose
     armature does not rest clear of a pack are simulated singly: most of the work is then the search for the
@@ -46,13 +53,13 @@ def waits_of(
             pairs.append((hammer, waveform))
         which.append(places[key])
     waits = np.array([least_wait(waveform) for _hammer, waveform in pairs])
-    last = np.full(len(pairs), np.nan)
+    last, flights = np.full(len(pairs), np.nan), np.full(len(pairs), np.nan)
     left = []
     for i, (hammer, waveform) in enumerate(pairs):
         if has_window(hammer, waveform) and has_flight(hammer):
             left.append(i)
         else:
-            waits[i] = wait_of(hammer, waveform)
+            waits[i], flights[i] = window_of(hammer, waveform)
     while left:
         drives = {id(pairs[i][1]): PulseTrain(pairs[i][1]) for i in left}
         result = Ensemble(
@@ -66,12 +73,14 @@ def waits_of(
         assert result.strobes is not None
         columns = result.ok, result.dots.flight_time[:, 0], result.strobes.x[:, 0], result.strobes.v[:, 0]
         seen = [Single(*row) for row in zip(*(column.tolist() for column in columns), strict=True)]
+        flights[left] = [each.flight for each in seen]
         left = [i for i, each in zip(left, seen, strict=True) if not is_enough(pairs[i][0], each, waits[i])]
         for i in left:
             last[i] = last_wait(*pairs[i]) if math.isnan(last[i]) else last[i]
         left = [i for i in left if waits[i] < last[i]]
         waits[left] *= 2.0
-    return np.asarray(waits[np.array(which, dtype=np.int64)])
+    places_of = np.array(which, dtype=np.int64)
+    return waits[places_of], flights[places_of]
 
 
 def longest_waveforms(drives: Sequence[Drive]) -> list[Waveform]:

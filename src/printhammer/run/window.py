@@ -78,7 +78,7 @@ def least_wait(waveform: Waveform) -> float:
 def wait_of(hammer: Hammer, waveform: Waveform | None = None) -> float:
     """Compute the time from the last firing to the end of a run, s, by default for the hammer's waveform."""
     pulse = hammer.waveform if waveform is None else waveform
-    return CYCLE if pulse is None else _window_of(hammer, pulse).wait
+    return CYCLE if pulse is None else window_of(hammer, pulse).wait
 
 
 def time_scale(hammer: Hammer, waveform: Waveform | None = None) -> float:
@@ -91,7 +91,7 @@ def time_scale(hammer: Hammer, waveform: Waveform | None = None) -> float:
     pulse = hammer.waveform if waveform is None else waveform
     if pulse is None or not math.isfinite(pulse.support):
         return 1.0
-    flight = _window_of(hammer, pulse).flight
+    flight = window_of(hammer, pulse).flight
     busy = max(0.0 if math.isnan(flight) else flight, _ON * float(getattr(pulse, "width", pulse.support)))
     decade = 10.0 ** math.floor(math.log10(busy / _FLIGHT))
     return min(
@@ -105,7 +105,7 @@ def scaled_rate(hammer: Hammer, rate: float, waveform: Waveform | None = None) -
     return rate / time_scale(hammer, waveform)
 
 
-def _window_of(hammer: Hammer, pulse: Waveform) -> Window:
+def window_of(hammer: Hammer, pulse: Waveform) -> Window:
     """Compute the window of a run from single pulses of a device; windows are cached."""
     if not has_window(hammer, pulse):
         return Window(least_wait(pulse), math.nan)
@@ -191,18 +191,31 @@ def unsettled(problem: Problem, record: Record) -> str:
     """
     hammer, nodes = problem.hammer, record.nodes
     x, v = float(nodes[-1, 1]), float(nodes[-1, 2])
-    if record.status != OK or (len(nodes) > 1 and HELD < nodes[-2, 3] <= HELD_FREE):
+    if record.status != OK or (len(nodes) > 1 and is_held(nodes[-2, 3])):
         return ""
     pulse = longest_of(problem.drive)
     if not has_window(hammer, pulse):
         return "the hammer has no rest position that the armature could reach by the end of the run"
-    window, rest, front = _window_of(hammer, pulse), hammer.rest, hammer.front
+    rest, front = hammer.rest, hammer.front
     if front is None or not has_flight(hammer):
         front = rest + _reach(hammer, nodes, problem.scales[0])
-    span = window.wait if math.isnan(window.flight) else FLIGHTS * window.flight
-    if is_window(True, math.nan, x, v, rest, front, span):
+    if is_settled(window_of(hammer, pulse), x, v, rest, front):
         return ""
     return (
         f"the armature is not at rest at the end of the run: {x - rest:.4g} m from its rest position,"
         f" at {v:.4g} m/s"
     )
+
+
+def is_held(mode: float) -> bool:
+    """Whether a code of `printhammer.kernel.model.modes` is that of an armature held by dry friction."""
+    return HELD < mode <= HELD_FREE
+
+
+def is_settled(window: Window, x: float, v: float, rest: float, front: float) -> bool:
+    """Whether an armature at x, m, with the velocity v, m/s, is at rest, by the thresholds of `is_enough`.
+
+    `front` is the front of the pack, m, or the rest position plus the reach of the motion.
+    """
+    span = window.wait if math.isnan(window.flight) else FLIGHTS * window.flight
+    return is_window(True, math.nan, x, v, rest, front, span)

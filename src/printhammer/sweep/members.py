@@ -20,8 +20,8 @@ from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import RATE
 from printhammer.results import Declared, part, scalar
-from printhammer.run.waits import longest_waveforms, waits_of
-from printhammer.run.window import end_of
+from printhammer.run.waits import longest_waveforms, windows_of
+from printhammer.run.window import Window, end_of
 from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.sweep.axes import COUNTS, Axis
 
@@ -43,12 +43,16 @@ class Member:
 
 
 class Members(NamedTuple):
-    """Several runs of a sweep: the fields of `Member`, one entry per run; `states`: shape (members, 2)."""
+    """Several runs of a sweep: the fields of `Member`, one entry per run; `states`: shape (members, 2).
+
+    `windows` are the windows that set the ends of the runs; None if the spec states a duration.
+    """
 
     hammers: list[Hammer]
     drives: Sequence[Drive]
     ends: FloatArray
     states: FloatArray
+    windows: list[Window] | None
 
 
 class Base(Declared):
@@ -117,11 +121,14 @@ class Maker:
                 single.append(drive)
         chosen = np.array(which, dtype=np.int64)
         drives = single if trains is None else trains.take(chosen)
+        windows = None
         if self.base.duration is not None:
             ends = np.full(len(chosen), self.base.duration)
         else:
-            ends = firings_of(drives).last + waits_of(hammers, longest_waveforms(drives), threads)
-        return chosen, Members(hammers, drives, ends, np.array(states).reshape(-1, 2))
+            waits, flights = windows_of(hammers, longest_waveforms(drives), threads)
+            ends = firings_of(drives).last + waits
+            windows = [Window(*each) for each in zip(waits.tolist(), flights.tolist(), strict=True)]
+        return chosen, Members(hammers, drives, ends, np.array(states).reshape(-1, 2), windows)
 
     def _trains(self, rows: FloatArray) -> PulseTrains | None:
         """Return the drives of all rows as a batch, if they are periodic trains that differ only in rate."""

@@ -64,10 +64,16 @@ class Output:
 
 _CODES: Final = ("status", "strobe_branch")
 
+UNSETTLED: Final = Output(
+    "unsettled", "", "bool", "", "whether the armature is not at rest at the end of the window of the device"
+)
+"""Output that is false for members with a status other than ok, and if the spec states a duration."""
+
 ALWAYS: Final = (
     Output("status", "", "int8", "", "status of the run"),
     Output("reached", "", "float64", "s", "time at which the run ended"),
     Output("steps", "", "int64", "", "steps of the integrator"),
+    UNSETTLED,
 )
 """Outputs stored for every member."""
 

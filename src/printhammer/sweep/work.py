@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import Any, Final
 
@@ -12,8 +12,11 @@ import numpy as np
 
 from printhammer.drive.batch import firings_of
 from printhammer.errors import InputError
-from printhammer.run.ensemble import DotTable, Ensemble
+from printhammer.run.ensemble import DotTable, Ensemble, EnsembleResult
 from printhammer.run.motion import Motion
+from printhammer.run.simulate import simulate
+from printhammer.run.waits import longest_waveforms
+from printhammer.run.window import Window, has_flight, has_window, is_held, is_settled
 from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.threads import in_threads, thread_count
 from printhammer.sweep.members import Base, Maker, Members
@@ -26,6 +29,7 @@ from printhammer.sweep.outputs import (
     OF_MOTION,
     STATUSES,
     STROBES,
+    UNSETTLED,
     Outputs,
 )
 from printhammer.sweep.plan import Plan
@@ -99,7 +103,8 @@ def _from_ensemble(
     threads: int,
     tell: Callable[[int, int], None],
 ) -> None:
-    moments, places, ends = _moments(members, outputs)
+    windows = members.windows
+    moments, places, ends = _moments(members, outputs, ending=windows is not None or outputs.wants(*FINAL))
     runs = ensemble.run(
         dots=outputs.wants(*DOTS, *OF_DOTS),
         strobes=moments,
@@ -120,6 +125,8 @@ def _from_ensemble(
         if outputs.wants(*OF_DOTS):
             for name, values in _scalars(runs.dots, results.keys()).items():
                 results[name][which] = values
+    if windows is not None:
+        results[UNSETTLED.name][which] = _unsettled(members, windows, ends, runs, ensemble.tolerance)
     if runs.strobes is not None:
         for i, row in enumerate(which):
             for output in STROBES:
@@ -132,9 +139,39 @@ def _from_ensemble(
                     results[output.name][row] = values[i, ends[i]]
 
 
-def _moments(members: Members, outputs: Outputs) -> tuple[list[FloatArray] | None, list[Any], list[int]]:
-    """Return each member's output times, s, and the array indices of the firings and of the end time."""
-    strobes, final = outputs.wants(*STROBES), outputs.wants(*FINAL)
+def _unsettled(
+    members: Members, windows: Sequence[Window], ends: Sequence[int], runs: EnsembleResult, tolerance: float
+) -> list[bool]:
+    """Return whether the armature of each member is not at rest at the end of its window.
+
+    The criterion is that of `printhammer.run.window.unsettled`; `ends` are the indices of the end states.
+    """
+    assert runs.strobes is not None
+    found = []
+    waveforms = longest_waveforms(members.drives)
+    for i, (hammer, waveform) in enumerate(zip(members.hammers, waveforms, strict=True)):
+        place = i, ends[i]
+        x, v, mode = (float(getattr(runs.strobes, name)[place]) for name in ("x", "v", "branch"))
+        if not runs.ok[i] or is_held(mode):
+            found.append(False)
+        elif hammer.front is not None and has_window(hammer, waveform) and has_flight(hammer):
+            found.append(not is_settled(windows[i], x, v, hammer.rest, hammer.front))
+        else:
+            # The threshold depends on the largest displacement of the motion.
+            state = tuple(members.states[i].tolist())
+            motion = simulate(hammer, members.drives[i], state=state, tolerance=tolerance, points=2)
+            found.append(bool(motion.unsettled))
+    return found
+
+
+def _moments(
+    members: Members, outputs: Outputs, *, ending: bool
+) -> tuple[list[FloatArray] | None, list[Any], list[int]]:
+    """Return each member's output times, s, and the array indices of the firings and of the end time.
+
+    `ending` states whether the end time is an output time.
+    """
+    strobes, final = outputs.wants(*STROBES), ending
     if not strobes and not final:
         return None, [], []
     moments, places, ends = [], [], []

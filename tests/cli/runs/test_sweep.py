@@ -38,6 +38,18 @@ def test_a_sweep_tells_how_its_members_ended(cli, spec: Path, tmp_path: Path) ->
     assert "all of them computed before" in second.out
 
 
+def test_members_that_are_not_at_rest_are_counted(cli, spec: Path, tmp_path: Path) -> None:
+    """An armature without a spring stays at its pole after a pulse, and a spring returns another one."""
+    for name, said in (("pot-magnet", "1 of them is not at rest"), ("relay-5v", "")):
+        text = SPEC.replace("hendriks-1983", name).replace('"1 kHz"', '"5 Hz"')
+        spec.write_text(re.sub("axis = .*", 'axis = [{ key = "mass", values = ["10 g"] }]', text), "utf-8")
+        outcome = cli("sweep", spec, "--out", tmp_path / f"{name}.zarr")
+        assert outcome.status == 0
+        assert "1 members: 1 ok" in outcome.out
+        assert ("not at rest" in outcome.out) == bool(said)
+        assert said in outcome.out
+
+
 def test_a_check_does_nothing(cli, spec: Path, tmp_path: Path) -> None:
     outcome = cli("sweep", spec, "--check")
     assert outcome.status == 0

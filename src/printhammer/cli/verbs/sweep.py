@@ -78,7 +78,7 @@ def sweep(
 
 
 def ended(result: xr.Dataset, new: float, seconds: float) -> str:
-    """Format the outcome of a sweep on one line: number of members by status, and computation time."""
+    """Format the outcome of a sweep: numbers of members by status and not at rest, and computation time."""
     from collections import Counter
 
     from printhammer.sweep.outputs import STATUSES
@@ -89,7 +89,14 @@ def ended(result: xr.Dataset, new: float, seconds: float) -> str:
         for code, count in sorted(counts.items())
     )
     how = f"{new:.0f} of them now, in {duration_text(seconds)}" if new else "all of them computed before"
-    return f"{result['status'].size} members: {each}; {how}"
+    lines = [f"{result['status'].size} members: {each}; {how}"]
+    if unsettled := int(result["unsettled"].sum()):
+        verb = "is" if unsettled == 1 else "are"
+        lines.append(
+            f"[yellow]{unsettled}[/] of them {verb} not at rest at the end of the run (column unsettled):"
+            " later contacts are not counted; a duration in the spec sets longer runs"
+        )
+    return "\n".join(lines)
 
 
 _LINE_EVERY: Final = 10.0  # Interval between progress lines, s; arbitrary
