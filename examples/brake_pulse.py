@@ -3,7 +3,7 @@ Brake pulse
 ===========
 
 After a dot, the armature falls back and rebounds from the backstop several times. A
-second, narrower pulse, fired while the armature falls, makes it land softly: the
+second, narrower pulse, fired while the armature falls, lets it land softly: the
 drive, instead of the damping, absorbs the energy. A scan over the time and the width
 of this brake pulse finds the best one.
 """

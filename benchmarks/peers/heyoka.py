@@ -292,7 +292,7 @@ def entries(task: Task, quick: bool) -> list[Entry]:
     Raises
     ------
     Absent
-        It is not installed.
+        heyoka is not installed.
     """
     hy = _heyoka()
     pulses = 2 if quick else 50
@@ -322,7 +322,7 @@ def ensembles(task: Task, quick: bool, members: int) -> list[Entry]:
     Raises
     ------
     Absent
-        It is not installed.
+        heyoka is not installed.
     """
     hy = _heyoka()
     tasks = ensemble_tasks(task, members)

@@ -72,7 +72,7 @@ def load(name: str) -> ph.Hammer:
 
 
 def fastest(hammer: ph.Hammer, strategy: Strategy, controller: Controller, step: float) -> tuple[float, str]:
-    """Find the safe rate, Hz, on a coarse and then a fine grid; return it and the next failure."""
+    """Find the safe rate, Hz, on a coarse and then a fine grid; return the rate and the next failure."""
     given = {"nominal": controller.single, "tolerance": DISPLAY_TOLERANCE}
     coarse = safe_rate(hammer, strategy, first=FIRST, step=step, **given)
     if not np.isfinite(coarse.rate) or coarse.failure is None:

@@ -209,7 +209,7 @@ def dry_product() -> float:
 
 
 def left_at_rest() -> float:
-    """Return the displacement at which dry friction holds the mass that is let go at 1."""
+    """Return the displacement at which dry friction holds the mass after a release at 1."""
     (stick,) = ph.simulate(
         ph.load("den-hartog-1931"), ph.SineForce(0.0, 1.0), duration=10.0, state=(1.0, 0.0), tolerance=1e-13
     ).sticks

@@ -102,9 +102,9 @@ def cells(good: np.ndarray, lost: np.ndarray | None = None) -> list[Cell]:
 def learned(
     law: LearningLaw, units: list[ph.Hammer], sensor: ImpactSensor
 ) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-    """Return what units print after each number of dots: their shares within limits, and the mask of losers.
+    """Return fractions of dots within limits and the mask of losers, per unit, by number of test dots.
 
-    A loser prints fewer dots than in the better open loop, after this number of dots or a smaller one.
+    A loser prints fewer dots than in the better open loop, after this or a smaller number of test dots.
     """
     press = law.production.press([with_pulse(unit, law.entries.task.pulse) for unit in units])
     loops = printed(order_loops(press, law.entries), law.entries.task)
@@ -236,7 +236,7 @@ def looped(controller: Controller, units: list[ph.Hammer], rate: float) -> np.nd
 
 
 def at_asked(table: Measured) -> str:
-    """Return the rate of a table in the caption of a picture."""
+    """Format the rate of a table for the caption of a picture."""
     return f"{ASKED * table.settings['safe_rate']:,.0f} Hz"
 
 
@@ -389,7 +389,7 @@ def tolerance(hammer: ph.Hammer, count: int, seed: int) -> list[list[Cell]]:
 
 
 def main() -> None:
-    """Measure what is asked for."""
+    """Measure the requested tables, or draw the requested picture."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--units", type=int, default=100)
     parser.add_argument("--seed", type=int, default=1)

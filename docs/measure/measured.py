@@ -41,7 +41,7 @@ OUTSIDE = ("studies/", "tests/")
 Cell = bool | int | float | str | None
 UNSEEN = (ast.Import, ast.ImportFrom)
 UNCOUNTED = tuple(SOURCES / "kernel" / "compile" / name for name in ("cache.py", "records.py", "web"))
-"""Where machine code is kept, what is said while it is made, and WebAssembly: no table depends on them."""
+"""Modules on which no table depends: cache of machine code, messages of the compiler, WebAssembly."""
 
 
 class Column(BaseModel):
@@ -199,7 +199,7 @@ def _statements(room: str) -> tuple[str, ...]:
 
 
 def _other_text(node: ast.AST) -> str | None:
-    """Return the text of a node of which something does not count, None for others."""
+    """Return the text of a node that counts in part or not at all; None for all other nodes."""
     if isinstance(node, UNSEEN) or _is_for_types(node):
         return ""
     if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):

@@ -105,7 +105,7 @@ def measure(hammer: ph.Hammer, units: list[ph.Hammer], share: float) -> list[lis
 
 
 def main() -> None:
-    """Measure what is asked for."""
+    """Measure the requested table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--units", type=int, default=10)
     parser.add_argument("--seed", type=int, default=1)

@@ -121,7 +121,7 @@ def curves(path: Path) -> None:
 
 
 def main() -> None:
-    """Measure what is asked for."""
+    """Measure the table, or draw the measured table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--units", type=int, default=100)
     parser.add_argument("--seed", type=int, default=1)

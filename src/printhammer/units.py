@@ -169,7 +169,7 @@ def is_unit_of(unit: str, si_unit: str) -> bool:
 
 
 def parse(text: str, si_unit: str) -> float:
-    """Parse a number with its unit, such as "60 lbf", and convert it to SI; arguments as for `split`.
+    """Parse a number with its unit, such as "60 lbf"; return the number in SI; arguments as for `split`.
 
     Raises
     ------

@@ -213,7 +213,7 @@ def judge_all(
 
 
 def judge(context: Context, claim: Claim) -> JudgedClaim:
-    """Evaluate one claim: measure its values and compare them with their bands."""
+    """Evaluate one claim: measure its values, and compare the values with their bands."""
     if claim.name in PENDING:
         return JudgedClaim(claim, None, "not yet", f"Not judged yet: requires {PENDING[claim.name]}.")
     start = perf_counter()

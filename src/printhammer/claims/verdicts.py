@@ -53,7 +53,7 @@ def panel_name(period: float) -> str:
 
 
 def panel_strobes(context: Context) -> list[Strobe]:
-    """Compute the classified strobe points of the panels of Fig. 11; the context caches them."""
+    """Compute the classified strobe points of the panels of Fig. 11; the context caches the result."""
     points = claims()["poincare_window"].settings["points"]
     return context.once(
         _PANELS,

@@ -111,7 +111,7 @@ def results(what: str, *more: str, **options: Any) -> Files:
 
 
 def file(what: str, *endings: str, **more: Any) -> Files:
-    """Declare an option for one output file that is not a picture; `many=True` makes it repeatable."""
+    """Declare an option for an output file that is not a picture; repeatable with `many=True`."""
     return files(what, *endings, **{"many": False, "pictures": False, **more})
 
 

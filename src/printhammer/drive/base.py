@@ -142,7 +142,7 @@ class Drive:
         return self._with_waveform(self._waveform.scaled(read_number(factor, "1", "factor")))
 
     def to_toml(self) -> str:
-        """Return the text of a drive file; parsing it yields an equal drive."""
+        """Return the text of a drive file, from which `read_drive` parses an equal drive."""
         name, table = self._table()
         tables = {name: table}
         if name != "sine":

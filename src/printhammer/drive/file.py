@@ -109,7 +109,7 @@ def drive_of(
 
 
 def save_drive(drive: Drive, path: str | Path) -> None:
-    """Write a drive file; reading it yields an equal drive."""
+    """Write a drive file, from which `load_drive` reads an equal drive."""
     try:
         Path(path).write_text(drive.to_toml(), encoding="utf-8")
     except OSError as error:

@@ -123,7 +123,7 @@ def read_times(at: Iterable[float | str]) -> FloatArray:
 
 
 def checked_times(times: npt.ArrayLike) -> FloatArray:
-    """Validate firing times, s, and return them read-only."""
+    """Validate firing times, s; return a read-only array."""
     result = np.array(times, dtype=np.float64)
     if result.ndim != 1 or not 1 <= result.size <= MOST_PULSES:
         raise InputError(

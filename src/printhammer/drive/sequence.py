@@ -137,7 +137,7 @@ class PulseSequence(Drive):
         return PulseSequence(self._waveforms, times, self._overlap)
 
     def to_toml(self) -> str:
-        """Return the text of a drive file; parsing it yields an equal drive."""
+        """Return the text of a drive file, from which `read_drive` parses an equal drive."""
         names = [f"pulse-{number + 1}" for number in range(len(self._tables))]
         first = np.unique(self._which, return_index=True)[1]
         shapes = {names[k]: waveform_text(self._waveforms[i]) for k, i in enumerate(first.tolist())}
@@ -203,7 +203,7 @@ class PulseSequence(Drive):
 
 
 def _validate(waveforms: Any) -> list[Waveform]:
-    """Check that the waveforms of a sequence end and have a common quantity; return them as a list."""
+    """Check that all waveforms of a sequence end and drive the same quantity; return a list."""
     try:
         fired = [] if isinstance(waveforms, Waveform) else list(waveforms)
     except TypeError:

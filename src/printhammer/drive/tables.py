@@ -312,7 +312,7 @@ def fill_table(shape: int, fields: Any, table: Any) -> int:
 
 
 def pulse(shape: int, fields: Any, table: Any, about: Any) -> int:
-    """Write the segment table of a pulse and the numbers that describe it; return the row count.
+    """Write the segment table of a pulse, and numbers that describe the pulse; return the row count.
 
     Parameters
     ----------

@@ -221,7 +221,7 @@ def _panel(ax: Axes, study: DampingStudy, values: FloatArray, otherwise: list[st
 
 @styled
 def plot_tolerance(batch: ToleranceYield, *, bars: int = 8) -> Figure:
-    """Draw a tolerance yield, and the constants with the largest influence on it.
+    """Draw a tolerance yield, and the constants with the largest influence on the yield.
 
     Left: fraction of hammers that print every pattern within limits, against the rate; or, for a single rate,
     the single-pulse dots of passing and failing hammers. Right: rank correlation of each constant with the

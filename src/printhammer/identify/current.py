@@ -1,4 +1,4 @@
-"""Current of a voltage-driven coil as a current probe shows it: simulation, and reading of records.
+"""Coil current under a voltage drive, as read by a current probe: simulation, and reading of records.
 
 A record has the columns ``time`` and ``current``, optionally ``voltage``; one shot per file. The armature is
 free or locked. The probe is a first-order low-pass; the current is interpolated linearly between points at
@@ -39,10 +39,10 @@ _MOST: Final = 2_000_000
 """Largest number of time steps in a record, to limit the memory use; arbitrary."""
 
 _LOCKED: Final = 1e9
-"""Mass that stands for a locked armature, kg; 100 N displace it by only 0.05 um in one second. Arbitrary."""
+"""Mass that stands for a locked armature, kg; 100 N move the mass by only 0.05 um in 1 s. Arbitrary."""
 
 _STEEP: Final = 0.3  # Arbitrary
-"""Voltage change between two rows, as a fraction of the voltage range, above which it counts as an edge."""
+"""Voltage change between two rows, as a fraction of the voltage range, that counts as an edge."""
 
 _EDGES: Final = 8
 """Number of edges above which a voltage counts as continuous and is interpolated linearly; arbitrary."""
@@ -291,7 +291,7 @@ def bounds_of(error: ProbeError, longest: float) -> tuple[float, float]:
 
 
 def resolution_of(values: FloatArray) -> float:
-    """Return the quantisation step of readings; 0 if they are not quantised, or if too few values repeat."""
+    """Return the quantisation step of readings; 0 without quantisation, or if too few values repeat."""
     levels = np.unique(values)
     if len(levels) < 3 or len(levels) == len(values):
         return 0.0

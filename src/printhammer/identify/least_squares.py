@@ -227,7 +227,7 @@ def _next_held(solution: Solution, data: FloatArray) -> int | None:
 
 
 def _held_at(law: Law, data: FloatArray, solution: Solution, free: BoolArray, held: int) -> FloatArray:
-    """Hold a parameter at its default, or at its estimate if the data exclude the default; refit the rest.
+    """Hold a parameter at its default, or at its estimate if the data exclude the default; refit the others.
 
     A parameter at a bound stays there, but the value `rest` is tried first: where two parameters have the
     same effect, one can end at its bound because the other compensates for it.

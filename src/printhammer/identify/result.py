@@ -43,7 +43,7 @@ REPLACED: Final = {
     "backstop.stiffness": [f"backstop.{name}" for name in _BODIES],
     "backstop.damping": ["backstop.restitution", "backstop.restitution_speed"],
 }
-"""Constants to remove from a hammer when the key is set, since they determine the same property."""
+"""Constants that a fitted constant replaces in a hammer file, by key of the fitted constant."""
 
 
 HELD: Final = "held, the data do not determine it"

@@ -79,7 +79,7 @@ def map_dataset(
 
 
 def places_of(chart: xr.Dataset) -> dict[str, float]:
-    """Return the positions [m] of backstop, pack and platen, as far as a map contains them, by surface."""
+    """Return the positions [m] of backstop, pack and platen stated in a map, by surface."""
     return {name: float(chart.attrs[key]) for name, key in PLACES.items() if key in chart.attrs}
 
 

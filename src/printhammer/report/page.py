@@ -399,7 +399,7 @@ def _parts(hammer: Hammer) -> list[dict[str, Any]]:
 
 
 def _judged_lines(result: JudgedClaim) -> list[dict[str, Any]]:
-    """Format the measured values of a claim that have bands: name, value, band, and whether it is met."""
+    """Format the banded values of a claim: name, measured value, band, and whether the band is met."""
     value, missed = result.value or {}, set(result.missed)
     lines = []
     for name, wanted in result.claim.band.items():

@@ -67,7 +67,7 @@ class Reopened(Declared):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Provenance of the result, as far as the file states it."""
+        """Provenance of the result, as stated in the file."""
         return {key: value for key, value in self.attributes.items() if key in KEYS}
 
 
@@ -218,7 +218,7 @@ def frame(
 
 
 def csv_text(table: pd.DataFrame) -> str:
-    """Format a table as CSV with all digits; its `attrs` precede it as lines ``# key: value``."""
+    """Format a table as CSV with all digits, below lines ``# key: value`` with its `attrs`."""
     head = "".join(f"# {key}: {_text(value)}\n" for key, value in table.attrs.items())
     return head + str(table.to_csv(index=False, float_format="%.17g", lineterminator="\n"))
 

@@ -176,7 +176,7 @@ class Store:
         _flush([self.path.parent])
 
     def _put(self, files: Mapping[str, bytes]) -> None:
-        """Write files atomically and flush them to disk."""
+        """Write files atomically, and flush all files to disk."""
         draft = self.path / _DRAFT
         touched: set[Path] = set()
         try:

@@ -70,7 +70,7 @@ def repeated(name: str, sentences: Iterable[str]) -> list[FactRow]:
 
 
 def multiplier(value: complex) -> str:
-    """Format a Floquet multiplier, without an imaginary part if it is real."""
+    """Format a Floquet multiplier; a real multiplier without an imaginary part."""
     real = f"{value.real:+.4g}"
     return real if value.imag == 0.0 else f"{real}{value.imag:+.4g}i"
 

@@ -302,7 +302,7 @@ class Job:
         return -(-count // pieces)
 
     def prepare(self, lanes: bool) -> None:
-        """Load the machine code of the kernel in this thread, before worker threads call it."""
+        """Load the machine code of the kernel in this thread, before worker threads call the kernel."""
         if lanes:
             self.lane_piece(0, 0)
         else:

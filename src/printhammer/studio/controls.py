@@ -34,7 +34,7 @@ SHOWN: Final = {
     "F": ("uF", "uF"),
     "degC": ("degC", "degC"),
 }
-"""Units in which a quantity is shown, by its SI unit: metric, inch-pound; otherwise the SI unit itself."""
+"""Display units of a quantity, metric and inch-pound, by SI unit; the SI unit itself if not listed."""
 
 _INCHES: Final = {"um": "mil", "mm": "in", "m": "in"}
 """Inch unit shown in place of a metric unit of length."""

@@ -131,7 +131,7 @@ class Maker:
         return chosen, Members(hammers, drives, ends, np.array(states).reshape(-1, 2), windows)
 
     def _trains(self, rows: FloatArray) -> PulseTrains | None:
-        """Return the drives of all rows as a batch, if they are periodic trains that differ only in rate."""
+        """Return the drives of all rows as a batch; None unless all are trains that differ only in rate."""
         base, changed = self.base, [axis for axis in self.base.axes if axis.target in _OF_DRIVE]
         if base.kind != "train" or [axis.field for axis in changed] != [RATE] or "waveform" in base.drive:
             return None

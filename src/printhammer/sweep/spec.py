@@ -175,7 +175,7 @@ def _drive_tables(source: dict[str, Any] | str, folder: Path) -> tuple[dict[str,
 
 
 def _checked_drive(base: Base, own: Mapping[str, Any] | None) -> Base:
-    """Validate a drive independently of the axes; parse its waveform unless an axis changes it."""
+    """Validate a drive independently of the axes; parse its waveform unless an axis changes the waveform."""
     kinds = [name for name in KINDS if name in base.drive]
     if len(kinds) != 1 or not isinstance(base.drive[kinds[0]], Mapping):
         tables = ", ".join(f"[drive.{name}]" for name in KINDS)

@@ -67,7 +67,7 @@ def at_gauge(
 
 
 def distances(constants: FloatArray, others: FloatArray) -> FloatArray:
-    """Return the distances of a hammer from others: the third largest relative difference of constants.
+    """Return distances between hammers: the third largest relative difference of the constants.
 
     Two hammers are clearly different if this distance is at least `APART`. `constants` has shape (k,),
     `others` (n, k); the result has shape (n,).

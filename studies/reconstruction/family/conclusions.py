@@ -147,7 +147,7 @@ def settle_out(context: Context) -> float:
     Raises
     ------
     NotMeasurableError
-        There is no such rebound, or the last one does not end within the run.
+        No rebound is that high, or the last such rebound does not end within the run.
     """
     limit = SETTLED * context.stroke
     ends = [bounce.end for bounce in rebounds(context.single, context.position) if bounce.height > limit]

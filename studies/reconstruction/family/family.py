@@ -66,7 +66,7 @@ def family_hammers(folder: str | Path | None = None) -> list[Hammer]:
     Raises
     ------
     InputError
-        There is no table, or the file is not a valid one.
+        There is no table of the family, or its file is invalid.
     """
     results = shipped_results() if folder is None else Results(Path(folder))
     table = family_table(results)
@@ -86,7 +86,7 @@ def family_table(results: Results) -> Family:
     Raises
     ------
     InputError
-        There is no table, or the file is not a valid one.
+        There is no table of the family, or its file is invalid.
     """
     table = results.family
     if table is None:

@@ -40,7 +40,7 @@ def read_logs(paths: Iterable[str | Path]) -> list[Logged]:
     Raises
     ------
     InputError
-        A file cannot be read, is not such a log, or contains no candidates.
+        A file cannot be read, is not a log of judged candidates, or contains no candidates.
     """
     hammers: dict[Key, tuple[dict[str, Any], str]] = {}
     for path in map(Path, paths):

@@ -34,7 +34,7 @@ class Shelf:
                 self._judged[row["fingerprint"]] = row["judged"]
 
     def get(self, hammer: Hammer) -> dict[str, Any] | None:
-        """Return the stored results for a hammer; None if there are none."""
+        """Return the stored results for a hammer; None for a hammer that is not stored."""
         return self._judged.get(hammer.fingerprint)
 
     def put(self, hammer: Hammer, judged: dict[str, Any]) -> None:

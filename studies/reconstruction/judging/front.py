@@ -54,7 +54,7 @@ def front(rows: Sequence[dict[str, Any]], core_time: float = 0.0) -> Front:
     Raises
     ------
     InputError
-        No candidate has been judged on all claims.
+        No candidate has been judged by all claims.
     """
     known = [name for name in claims() if name != FIGURE_11]
     complete = [

@@ -46,8 +46,8 @@ def row_of(constants: Mapping[str, float], names: Iterable[str], *, panels: bool
     """Judge a candidate (constants, SI) by the named claims, and by Fig. 11 if `panels` is set.
 
     The claim on Fig. 11, with all its perturbations, is judged only if all panels are as printed without
-    them. The row has `constants`, `verdicts` (claim to true or false), `values` (claim to the measured values
-    of the quantities that have a band), and, with Fig. 11, `panels` and `panel_verdicts`.
+    perturbations. The row has `constants`, `verdicts` (claim to true or false), `values` (claim to the
+    measured values of the quantities that have a band), and, with Fig. 11, `panels` and `panel_verdicts`.
     """
     hammer = hammer_of(constants)
     context = Context(hammer)

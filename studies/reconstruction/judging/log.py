@@ -33,7 +33,7 @@ def read_judged(path: Path, *, some: bool = False) -> list[dict[str, Any]]:
     Raises
     ------
     InputError
-        The file cannot be read or is not such a log, or it is empty and `some` is set.
+        The file cannot be read or is not a log of judged candidates; or the log is empty, and `some` is set.
     """
     candidates: dict[Key, dict[str, Any]] = {}
     for number, line in enumerate(read_text(path).split("\n")[:-1], 1):

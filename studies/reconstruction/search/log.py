@@ -28,7 +28,7 @@ def read_search(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     Raises
     ------
     InputError
-        The file cannot be read, or it is not such a log.
+        The file cannot be read, or is not the log of a search.
     """
     rows = []
     for number, line in enumerate(read_text(path, "log", required=True).split("\n")[:-1], 1):

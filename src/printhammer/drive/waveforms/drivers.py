@@ -1,4 +1,4 @@
-"""Drivers of a coil: a switched voltage supply, and the path of the current while it decays.
+"""Drivers of a coil: a switched voltage supply, and the path of the decaying current.
 
 The latest firing always replaces earlier firings: a driver is a single output stage. Voltages are those of
 the supply; a diode, the resistance of the supply and the thresholds of a chopper act in the circuit of the

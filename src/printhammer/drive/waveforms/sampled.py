@@ -36,7 +36,7 @@ class Samples:
 
 
 def checked(times: npt.ArrayLike, values: npt.ArrayLike, quantity: QuantityName, what: str) -> Samples:
-    """Validate samples and return them as a record.
+    """Validate samples; return a record.
 
     Raises
     ------

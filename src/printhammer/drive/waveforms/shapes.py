@@ -34,7 +34,7 @@ _ROUNDING: Final = 1e-14  # Relative difference between times that counts as rou
 
 
 class Chain(Waveform):
-    """Several consecutive waveforms in one firing, each at an offset; the drive is zero between them.
+    """Several consecutive waveforms in one firing, each at an offset, with a zero drive in between.
 
     `parts` are pairs of the offset, s or a string with a unit, and the waveform, in ascending order; all
     are currents or all are forces. A waveform may begin once the preceding one has ended or decayed to `TAIL`

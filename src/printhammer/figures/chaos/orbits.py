@@ -31,7 +31,7 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray
 
 POINTS: Final = 600  # Arbitrary
-"""Number of strobe points drawn under the orbits; a third as many firings are discarded before them."""
+"""Number of strobe points drawn under the orbits, after a third as many discarded firings."""
 
 _MARKS: Final = (("o", style.BLUE), ("s", style.ORANGE), ("^", style.GREEN), ("D", style.YELLOW))
 """Marker and colour of orbits of 1, 2, 3 and 4 firings."""

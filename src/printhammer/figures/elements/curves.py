@@ -43,7 +43,7 @@ def fired(hammer: Hammer, times: Iterable[float] = (0.0,), duration: float | str
 
 
 def places(hammer: Hammer) -> dict[str, float]:
-    """Return the positions, m, of backstop, pack, platen and additional contacts, by name, if they exist."""
+    """Return the positions, m, of the backstop, pack, platen and additional contacts of a hammer, by name."""
     own = {"backstop": hammer.position, "pack": hammer.front, "platen": hammer.platen}
     contacts = {
         key.partition(".")[2]: term.position

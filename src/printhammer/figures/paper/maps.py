@@ -78,7 +78,7 @@ _TALL: Final = 0.22
 _TICK: Final = 0.008  # Length of a tick, in units of the picture width; arbitrary
 
 _SHEETS: Final = 2.0
-"""Common z-order of curves and the sheets below them, so that they are drawn in order of creation."""
+"""Common z-order of curves and white sheets, so that matplotlib draws all in order of creation."""
 
 _FLAT: Final = 4e-4
 """Tolerance of thinned curves, in units of the picture width; corresponds to 0.15 points. Arbitrary."""

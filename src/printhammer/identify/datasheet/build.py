@@ -81,7 +81,7 @@ class Sheet:
     forces: FloatArray
     """Gaps, m, and the forces at the gaps, N."""
     inductance: tuple[float, float] | None
-    """Inductance at small currents, H, and the gap where it was measured, m."""
+    """Inductance at small currents, H, and the gap of the measurement, m."""
     turns: float | None
     """Number of turns of the coil; None if not stated."""
     area: float | None

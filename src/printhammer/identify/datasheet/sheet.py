@@ -104,7 +104,7 @@ class DataSheet:
     force: list[tuple[Entry, Entry]]
     """Gap and force pairs, in the order of the data sheet."""
     inductance: tuple[Entry, Entry] | None
-    """Inductance, and the gap at which it was measured."""
+    """Inductance, and the gap of the measurement."""
     driver: dict[str, Any]
     assumed: frozenset[str]
     """Keys whose values were guessed by the person who transcribed the data sheet."""
@@ -112,7 +112,7 @@ class DataSheet:
     """Sources of individual quantities, by key."""
 
     def si(self, key: str, otherwise: float = math.nan) -> float:
-        """Return a quantity of the data sheet in SI, or `otherwise` if it is missing."""
+        """Return a quantity of the data sheet in SI; for a missing quantity, `otherwise`."""
         return self.entries[key].si if key in self.entries else otherwise
 
     def origin(self, key: str) -> tuple[str, str]:

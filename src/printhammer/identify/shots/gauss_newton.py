@@ -96,7 +96,7 @@ def tied_constants(names: Sequence[str], values: FloatArray, covariance: FloatAr
 
 
 def weak(values: FloatArray, covariance: FloatArray) -> list[int]:
-    """Return the indices of the weakly determined constants: those with a large relative standard error."""
+    """Return the indices of the weakly determined constants, whose relative standard error is large."""
     errors = np.sqrt(np.diag(covariance))
     return [int(i) for i in np.flatnonzero(errors > _WEAK * np.abs(values))]
 

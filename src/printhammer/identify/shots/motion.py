@@ -392,7 +392,7 @@ def _assemble(
 
 
 def _definite(covariance: FloatArray, values: FloatArray) -> FloatArray:
-    """Regularise a covariance matrix by a small diagonal, so that it can be inverted."""
+    """Regularise a covariance matrix by a small diagonal, so that the matrix can be inverted."""
     return covariance + np.diag((1e-12 * values) ** 2 + 1e-13 * covariance.diagonal())
 
 

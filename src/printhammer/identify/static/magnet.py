@@ -248,7 +248,7 @@ def _data(table: Readings, alone: Readings | None) -> Data:
 
 
 def _check(table: Readings, alone: Readings | None, zero: float, position: float | None) -> int:
-    """Check that a table allows a fit; return the number of distinct currents, 0 if they are continuous."""
+    """Check that a table allows a fit; return the number of distinct currents, 0 for a continuum."""
     x, current, force = (table.values[name] for name in ("displacement", "current", "force"))
     low = int(np.argmin(x))
     if x[low] <= zero:

@@ -38,7 +38,7 @@ _REACH: Final = 1e3
 """Largest factor between a fitted constant and its initial guess; arbitrary."""
 
 _ABSENT_HIGH: Final = ("saturation_flux", "leakage_reach")
-"""Constants whose effect vanishes when they are large; the effect of every other constant vanishes at 0."""
+"""Constants whose effect vanishes at large values; the effect of every other constant vanishes at 0."""
 
 _FACTOR: Final = 4.0  # Arbitrary
 """Ratio of force to i^2/2 dL/dg that saturation cannot explain, e.g. 4.4 for forces in lbf instead of N."""

@@ -378,7 +378,7 @@ def quality(
 
 
 def pattern_of(pattern: str | int | npt.ArrayLike) -> BoolArray:
-    """Convert a pattern, as `quality` accepts it, to a mask of the slots with a dot."""
+    """Convert a pattern, in any form that `quality` accepts, to a mask of the slots with a dot."""
     if isinstance(pattern, str):
         if not pattern or set(pattern) - {"0", "1"}:
             raise InputError.of("pattern", pattern, "slots such as '10110111'")

@@ -181,7 +181,7 @@ def tolerance_yield(
     effort: Effort = DISPLAY,
     **_keywords: Unpack[Keywords],
 ) -> ToleranceYield:
-    """Draw hammers about a design, and determine which of them print within limits.
+    """Draw hammers about a design, and determine which hammers print within limits.
 
     Every constant is uniform within its spread, drawn by a scrambled Sobol sequence.
 

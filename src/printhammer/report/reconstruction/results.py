@@ -115,7 +115,7 @@ class BaseRates(_Table):
     poincare_panels: dict[str, _Panel] = Field({}, description="the counts of each panel of Fig. 11")
 
     def share(self, name: str) -> Share | None:
-        """Return the fraction of random hammers for which a claim holds; None if it was not measured."""
+        """Return the fraction of random hammers for which a claim holds; None for a claim not measured."""
         return _share(self.claims.get(name))
 
     @property
@@ -136,7 +136,7 @@ class Predictions(_Table):
     claims: dict[_ClaimName, _Predicted] = Field(description="the counts of each claim")
 
     def share(self, name: str) -> Share | None:
-        """Return the fraction of the hammers for which a claim holds; None if it was not measured."""
+        """Return the fraction of the hammers for which a claim holds; None for a claim not measured."""
         return _share(self.claims.get(name))
 
 
@@ -193,7 +193,7 @@ class FamilyMember(_Table):
 
 
 class Conclusion(_Table):
-    """Conclusion about the hammers of the reconstructed family, and whether it holds for all of them."""
+    """Conclusion about the hammers of the reconstructed family, and whether all members agree."""
 
     low: _Number | None = Field(description="the lowest value in the family")
     high: _Number | None = Field(description="the highest value in the family")

@@ -1,1 +1,1 @@
-"""Switching of electrical contacts, as makers of relays measure it."""
+"""Switching times of electrical contacts, as measured by makers of relays."""

@@ -97,7 +97,7 @@ class Columns:
 
     sources: dict[str, Source]
     clock: Clock | None = None
-    """Times of the rows if they are evenly sampled; None if a column holds the times."""
+    """Times of evenly sampled rows; None if a column holds the times."""
     delays: dict[str, float] = field(default_factory=dict)
     """Delay of each quantity relative to the time column, s."""
     where: str = "--columns"

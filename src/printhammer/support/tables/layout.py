@@ -38,7 +38,7 @@ ALIASES: Final = {
     "force": ("force", "f", "kraft"),
     "voltage": ("voltage", "u", "spannung", "tension"),
 }
-"""Quantities by the column names that denote them, in lower case."""
+"""Names of columns, in lower case, by quantity."""
 
 _MEASURED: Final = ("s", "V", "A", "m", "N", "Hz", "m/s", "ohm", "Wb", "H")
 _COUNTS: Final = frozenset({"number", "sequence", "samples", "sample", "#", "pts", "points"})
