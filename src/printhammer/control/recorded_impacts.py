@@ -24,7 +24,7 @@ from printhammer.support.arrays import FloatArray
 from printhammer.support.tables.readings import Readings, read_table
 
 _BITS: Final = 24
-"""Resolution, bits, of a converter without noticeable rounding; a record's rounding counts as noise."""
+"""Resolution, bits, without noticeable rounding; the noise estimate of a record includes rounding."""
 
 _UNITS: Final = 20  # Number of simulated units behind an uncertainty; arbitrary
 

@@ -147,7 +147,7 @@ def has_window(hammer: Hammer, waveform: Waveform) -> bool:
 
 
 def has_flight(hammer: Hammer) -> bool:
-    """Whether the armature rests clear of a pack, to which a pulse can throw it."""
+    """Whether the armature rests at a distance from a pack, and so can fly to the pack."""
     return hammer.front is not None and hammer.rest < hammer.front
 
 

@@ -69,7 +69,7 @@ _CLOSER: Final = 4.0  # Arbitrary
 _ASIDE: Final = 0.5
 """Largest offset of a doubled orbit from the critical direction, relative to its distance; arbitrary."""
 _NEW_MULTIPLIER: Final = 0.3
-"""Largest distance from 1 of a doubled orbit's nearest multiplier, near its period doubling; arbitrary."""
+"""Largest distance between 1 and the nearest multiplier of an orbit near its birth by doubling; arbitrary."""
 _HALF_NEAR: Final = 0.05  # Arbitrary
 """Largest scaled distance at which an orbit and an orbit of half its period meet at a doubling."""
 _HALF_DOUBLES: Final = 0.5

@@ -227,7 +227,7 @@ def joined(
 
 
 def _is_new(cycle: FloatArray, kept: FloatArray, apart: float) -> bool:
-    """Whether a cycle of states differs by more than `apart` from all known cycles, cyclically shifted."""
+    """Whether a cycle of states, in any cyclic shift, differs by more than `apart` from all known cycles."""
     if not len(kept):
         return True
     return all(

@@ -272,7 +272,7 @@ def quiet_section(
 
 
 def is_on_impact(regime: Regime, state: FloatArray, firings: int, tolerance: float) -> bool:
-    """Whether an orbit hits a rigid backstop within a thousandth of a period of its section."""
+    """Whether an orbit hits a rigid backstop within a thousandth of a period of the strobe section."""
     backstop = regime.hammer.backstop
     if backstop is None or backstop.law != "rigid":
         return False

@@ -64,7 +64,7 @@ class Verdict(Declared):
     first: int = part("first firing used for the classification; the very first firing is number 1")
     last: int = part("last firing used for the classification")
     tolerance: float = part("tolerance of the integration")
-    reason: str = part('why the verdict is "undecided"; else empty', default="")
+    reason: str = part('reason for the verdict "undecided"; else empty', default="")
     multiplier: float = part(
         "largest absolute Floquet multiplier of the orbit by which Newton's method confirmed the period",
         more="NaN if the states alone prove it",

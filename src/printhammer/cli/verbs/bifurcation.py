@@ -189,7 +189,8 @@ def basins(
         "Largest period, in firings, of the saddle orbits whose manifolds are drawn."
     ),
     quench: bool = opt.switch(
-        "Map the dots of two successive pulses from rest, instead of basins.", panel=_QUENCH
+        "Map, by gap and width, whether the second of two pulses prints a dot, instead of basins.",
+        panel=_QUENCH,
     ),
     units: Units = opt.UNITS,
     **passed: Any,

@@ -157,7 +157,7 @@ def feedback(
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:
-    """Simulate all patterns of eight slots, and two dots at all distances, with position feedback.
+    """Simulate all patterns of eight slots, and pairs of dots at a range of gaps, with position feedback.
 
     The exit status is 1 if, with feedback, a dot exceeds the limits on force and arrival time.
     """

@@ -144,7 +144,7 @@ def released_forces(plant: Plant, forces: ForceMap, keys: list[tuple[int, float,
 def impact_map(
     plant: Plant, forces: ForceMap, launched: float, progress: Progress | None = None
 ) -> ImpactMap:
-    """Simulate every switching action of the coil after every touch; `launched` is the launch width, s."""
+    """Simulate all switching actions of the coil after each touch; `launched` is the launch width, s."""
     single, driver = plant.single, plant.driver
     scale = single.flight_time
     fires = np.concatenate([_EARLY, _LATE]) * scale

@@ -70,7 +70,7 @@ def refined(draft: Draft) -> Draft:
 
 
 def _halfway(draft: Draft, lower: IntArray) -> Draft:
-    """Interpolate and evaluate a draft halfway between the rates with indices `lower` and the next rates."""
+    """Interpolate and evaluate a draft table halfway between rates `lower` (indices) and the next rates."""
     table = draft.table()
     rates = 0.5 * (draft.rates[lower] + draft.rates[lower + 1])
     settings = np.array([table.at(float(rate)) for rate in rates])

@@ -81,7 +81,7 @@ def plot_chart(chart: StabilityChart) -> Figure:
 
 
 def edges(axis: np.ndarray) -> np.ndarray:
-    """Compute the cell edges around evenly spaced values, one more than there are values."""
+    """Compute the edges of the cells around n evenly spaced values, shape (n + 1,)."""
     half = 0.5 * (axis[1] - axis[0]) if len(axis) > 1 else 0.5 * abs(axis[0])
     return np.append(axis - half, axis[-1] + half)
 

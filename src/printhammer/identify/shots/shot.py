@@ -40,8 +40,8 @@ class Touch(Declared):
     """Contact with backstop or pack, detected in a record."""
 
     surface: Surface = part('either "pack" or "backstop"')
-    first: int = part("index of its first sample")
-    last: int = part("index of its last sample")
+    first: int = part("index of the first sample")
+    last: int = part("index of the last sample")
 
     @property
     def count(self) -> int:

@@ -104,7 +104,7 @@ class BuzzSearch(Declared):
     """Result of the search for a buzz-printing train: the best train, or the reason why none was found."""
 
     train: BuzzTrain | None = part("the best train, if it prints enough dots; otherwise None")
-    reason: str = part("why no train prints enough dots, in one sentence; otherwise empty")
+    reason: str = part("reason why no train prints enough dots, in one sentence; otherwise empty")
     best: BuzzTrain | None = part(
         "the best train simulated, equal to `train` on success; None if no train has a dot in the force range"
     )

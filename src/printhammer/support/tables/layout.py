@@ -62,7 +62,7 @@ class Heading(NamedTuple):
 
     @property
     def quantity(self) -> str:
-        """Quantity that the name denotes; empty if the name is unknown."""
+        """Quantity that the column name denotes, such as "current"; empty if the name is unknown."""
         name = self.name.lower()
         return next((what for what, names in ALIASES.items() if name in names), "")
 
