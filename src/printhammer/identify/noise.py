@@ -12,7 +12,7 @@ _MAD: Final = 1.482602218505602
 """Ratio of standard deviation to median absolute deviation, by definition of the normal distribution."""
 _SPIKE: Final = 10.0  # Factor on the noise above which a reading is a spike; arbitrary
 _FAR: Final = 4.5
-"""Outlier threshold, in standard deviations, exceeded by fewer than 1 in 100 000 normal residuals."""
+"""Outlier threshold, in standard deviations, so that fewer than 1 in 100,000 normal values are outliers."""
 _LONGEST_MEMORY: Final = 8  # Largest lag of the autocorrelation of the noise; arbitrary
 
 _CLIP: Final = 2.5
