@@ -16,7 +16,7 @@ PERIOD = 1.3e-3
 
 @cache
 def orbits(hammer: ph.Hammer) -> Orbits:
-    return ph.orbits(hammer, period=PERIOD, longest=2, starts=100, guesses=8)
+    return ph.orbits(hammer, period=PERIOD, longest=2, starts=100, guesses=8, follow=0)
 
 
 @cache

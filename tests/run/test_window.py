@@ -57,7 +57,7 @@ def test_the_hammer_of_the_paper_keeps_its_four_milliseconds() -> None:
 
 
 def test_a_slow_device_is_waited_for_until_it_has_struck_and_settled() -> None:
-    relay, printer = ph.load("relay-5v"), ph.load("impact-wire")
+    relay, printer = ph.load("relay-5v"), ph.load("hendriks-1983")
     single = nominal(relay)
     wait = wait_of(relay)
     assert wait >= least_wait(relay.waveform) == CYCLE + relay.waveform.width

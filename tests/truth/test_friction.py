@@ -181,6 +181,7 @@ def test_a_pack_with_memory_holds_an_armature_under_friction() -> None:
         assert abs(energy.residual) < 1e-8 * energy.throughput
 
 
+@pytest.mark.slow
 def test_random_plungers_stop_and_start_in_a_pack_with_memory() -> None:
     """Coil, spring, friction and a pack with memory, half of them with equal static and kinetic force."""
     rng = np.random.default_rng(38)

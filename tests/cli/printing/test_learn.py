@@ -3,10 +3,15 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
 import printhammer as ph
+from printhammer.control.learning.law import RUNS
 
 
-def test_a_unit_learns_its_table(cli: Callable, tmp_path: Path) -> None:
+def test_a_unit_learns_its_table(cli: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """After two stages; the commands of docs/howto/learning.md have all."""
+    monkeypatch.setattr("printhammer.control.learning.learn.RUNS", RUNS[:2])
     unit, table, picture = tmp_path / "unit.toml", tmp_path / "learned.csv", tmp_path / "lines.png"
     ph.load("hendriks-1983-1").replace("magnet.Am", 0.282).save(unit)
     words = ("--rate", "1.275kHz", "--force-noise", 0.03, "--members", 100, "--serial", "A17", "--unit", unit)

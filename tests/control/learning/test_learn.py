@@ -23,7 +23,7 @@ from printhammer.control.learning.law import (
     order_loops,
 )
 from printhammer.control.learning.learn import table_of
-from printhammer.control.learning.learner import Learner, is_explained
+from printhammer.control.learning.learner import Learner, is_explained, mean
 from printhammer.control.learning.lines import DOTS, LINE, Press, Rung, candidates, printed
 from printhammer.control.learning.sensor import ImpactSensor, Readings
 from printhammer.control.pulses import of_width
@@ -212,20 +212,38 @@ def test_no_reading_leads_beyond_the_bounds(law: LearningLaw, late: float) -> No
             assert (fired >= np.minimum(clear + MARGIN * (brake[own] == 0.0), base) - 1e-9).all()
 
 
-def test_a_missed_impact_changes_little(law: LearningLaw) -> None:
-    whole, holed = Learner(law), Learner(law)
+@pytest.fixture(scope="module")
+def whole(law: LearningLaw) -> Learner:
+    """Return a learner that was shown the nominal hammer for a stage."""
+    learner = Learner(law)
+    show(learner, *readings(law))
+    return learner
+
+
+def test_a_missed_impact_changes_little(law: LearningLaw, whole: Learner) -> None:
+    holed = Learner(law)
     rungs, line = readings(law)
-    show(whole, rungs, line)
     time = rungs.time.copy()
     time[0] = np.nan
     show(holed, Readings(time, rungs.force), line)
     assert holed.corrections == pytest.approx(whole.corrections, abs=1.0)
 
 
-def test_an_impact_that_was_none_changes_little(law: LearningLaw) -> None:
-    whole, fooled = Learner(law), Learner(law)
+def test_of_three_readings_an_outlier_is_left_out_of_the_mean() -> None:
+    """Times of two dots, the second of which no run shows; of two readings either may be the outlier."""
+    early, late, missed = 1e-6, 61e-6, float("nan")
+    noise = np.full(2, 5e-6)
+    three = mean([np.array([time, missed]) for time in (early, late, early)], noise)
+    assert three.value == pytest.approx([early, missed], nan_ok=True)
+    assert three.seen.tolist() == [2.0, 0.0]
+    two = mean([np.array([time, missed]) for time in (early, late)], noise)
+    assert two.value == pytest.approx([31e-6, missed], nan_ok=True)
+    assert two.seen.tolist() == [2.0, 0.0]
+
+
+def test_an_impact_that_was_none_changes_little(law: LearningLaw, whole: Learner) -> None:
+    fooled = Learner(law)
     rungs, line = readings(law)
-    show(whole, rungs, line)
     time = line.time.copy()
     time[5] = 60e-6
     show(fooled, rungs, Readings(time, line.force))

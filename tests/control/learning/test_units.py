@@ -118,14 +118,6 @@ def test_a_hidden_offset_of_the_sensor_costs_nothing(
     assert abs(mean - delay) < 4.0 * deviation + 2e-6
 
 
-@pytest.mark.slow
-def test_nothing_is_lost_where_the_own_pulse_prints_every_dot(at_safe_rate: LearningLaw) -> None:
-    """Near the safe rate the fast switch loses a third of a row that the own pulse of the hammer prints."""
-    (unit,) = Variability().times(0.5).draw(nominal(), 1, 1)
-    _learners, stages = calibrate(at_safe_rate, [unit], ImpactSensor(seed=7))
-    assert (worse(at_safe_rate, unit, stages) <= 0.0).all()
-
-
 class Hidden(ImpactSensor):
     """A sensor with another constant offset for each unit, up to 50 us, which nobody states."""
 
