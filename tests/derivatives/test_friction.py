@@ -115,7 +115,105 @@ def test_exponents_of_a_periodic_motion_that_sticks() -> None:
     assert found.exponents[1] == -math.inf
 
 
+DOT = ("flight_time", "impact_speed", "net_loss")
+RUN = ("pack_loss", "damping_loss")
+STEPS = ((1, 8.0), (-1, -8.0), (2, -1.0), (-2, 1.0))
+"""Offsets and weights, times 12, of central differences: Abramowitz and Stegun (1964), table 25.2."""
+
+
+def plunger(rng: np.random.Generator, kind: str) -> tuple[ph.Hammer, float]:
+    """Plunger in a tube, and the time between its pulses: between stops, or without a backstop."""
+    kinetic = float(rng.uniform(0.05, 0.2))
+    friction = {"law": "friction", "kinetic": kinetic, "static": kinetic * float(rng.uniform(1.2, 2.0))}
+    parts: dict[str, object] = {
+        "force.guide": friction,
+        "force.weight": {"law": "gravity", "angle": "60 deg"},
+        "contact.leaf": {"law": "linear", "side": "front", "position": 0.3e-3, "stiffness": 3e3},
+        "damping": {"law": "viscous", "coefficient": float(rng.uniform(0.02, 0.06))},
+        "waveform": {"shape": "half-sine", "amplitude": "3 N", "width": 1.5e-3},
+    }
+    if kind == "free":
+        # Without a preload, friction holds the plunger somewhere on its way back.
+        parts["spring"] = {"law": "preload", "preload": 0.0, "stiffness": float(rng.uniform(500.0, 3000.0))}
+        parts["pack"] = {"law": "dashpot", "front": 0.5e-3, "stiffness": 1e6, "damping": 10.0}
+    else:
+        preload, stiffness = -float(rng.uniform(0.1, 0.5)), float(rng.uniform(100.0, 1500.0))
+        parts["spring"] = {"law": "preload", "preload": preload, "stiffness": stiffness}
+        parts["backstop"] = {"law": "rigid", "position": 0.0, "restitution": 0.3}
+        parts["pack"] = {"law": "rigid", "front": 0.5e-3, "restitution": 0.4}
+    if kind == "sharp":
+        sharp = {"shape": "rectangle", "amplitude": "3 N", "width": 0.5e-3, "rise": 0.0, "decay": 0.0}
+        parts["waveform"] = sharp
+    return ph.Hammer.build(1e-3).replace(parts), float(rng.uniform(6e-3, 12e-3))
+
+
+def numbers_of(hammer: ph.Hammer, period: float) -> np.ndarray:
+    """Quantities of the dots, and losses of the run."""
+    drive = ph.PulseTrain(hammer.waveform, period=period, pulses=3)
+    result = ph.sensitivities(hammer, drive, duration=0.05, tolerance=1e-14, constants=["mass"])
+    dots = result.dots[:, [result.quantities.index(name) for name in DOT]]
+    losses = result.run[[result.run_quantities.index(name) for name in RUN]]
+    return np.concatenate([dots.ravel(), losses])
+
+
+@pytest.mark.parametrize("kind", ["stops", "sharp", "free"])
+def test_sensitivities_follow_stops_and_releases(kind: str) -> None:
+    """Releases by a growing force and by a sharp edge, from rigid stops and where friction holds."""
+    rng = np.random.default_rng(1931)
+    sticks = 0
+    for _ in range(3):
+        hammer, period = plunger(rng, kind)
+        drive = ph.PulseTrain(hammer.waveform, period=period, pulses=3)
+        sticks += len(ph.simulate(hammer, drive).sticks)
+        result = ph.sensitivities(hammer, drive, duration=0.05, tolerance=1e-13)
+        assert result.ok
+        base = numbers_of(hammer, period)
+        rows = [result.quantities.index(name) for name in DOT]
+        ledger = [result.run_quantities.index(name) for name in RUN]
+        for column, key in enumerate(result.constants):
+            value = period if key == "period" else hammer.constants[key].si
+            step = 1e-5 * (abs(value) or 1e-3)
+            moved = [
+                weight * numbers_of(hammer, value + k * step)
+                if key == "period"
+                else weight * numbers_of(hammer.replace(key, value + k * step), period)
+                for k, weight in STEPS
+            ]
+            own = np.concatenate(
+                [result.derivatives[:, rows, column].ravel(), result.run_derivatives[ledger, column]]
+            )
+            scale = np.abs(base) / (abs(value) or 1e-3)
+            assert np.abs((own - sum(moved) / (12.0 * step)) / scale).max() < 1e-6, key
+    assert sticks >= (2 if kind == "free" else 0)
+
+
+def test_an_edge_that_ends_a_rest_on_a_stop_takes_the_motion_along() -> None:
+    """Without friction: the same dot from rest at any time, so that the time between pulses has no effect."""
+    sharp = {"shape": "rectangle", "amplitude": "3 N", "width": 0.5e-3, "rise": 0.0, "decay": 0.0}
+    hammer = ph.Hammer.build(1e-3).replace(
+        {
+            "spring": {"law": "preload", "preload": -0.5, "stiffness": 100.0},
+            "backstop": {"law": "rigid", "position": 0.0, "restitution": 0.3},
+            "pack": {"law": "dashpot", "front": 0.5e-3, "stiffness": 1e6, "damping": 10.0},
+            "waveform": sharp,
+        }
+    )
+    drive = ph.PulseTrain(hammer.waveform, period=20e-3, pulses=3)
+    result = ph.sensitivities(hammer, drive, constants=["period"], tolerance=1e-13)
+    scale = np.abs(result.dots) / 20e-3
+    assert (np.abs(result.derivatives[:, :, 0]) <= 1e-6 * scale).all()
+    moved = ph.sensitivities(hammer, drive, constants=["firing.0", "firing.1"], tolerance=1e-13)
+    assert (np.abs(moved.derivatives) <= 1e-6 * scale[:, :, np.newaxis]).all()
+
+
 def test_what_has_no_derivatives() -> None:
-    hammer = oscillator(0.3).replace("waveform", {"shape": "half-sine", "amplitude": "3 N", "width": 1.5})
+    coil = ph.Hammer.build(1.0).replace(
+        {
+            "force.guide": {"law": "friction", "kinetic": "1 N"},
+            "magnet": {"law": "moving-coil", "constant": "5 N/A"},
+            "coil": {"law": "winding", "resistance": "5 ohm", "inductance": "1 mH"},
+            "waveform": {"shape": "rail", "voltage": "12 V", "width": "10 ms", "decay": "diode"},
+        }
+    )
     with refused("force.guide"):
-        ph.sensitivities(hammer, ph.PulseTrain(hammer.waveform, at=[0.0]))
+        ph.sensitivities(coil, ph.PulseTrain(coil.waveform, at=[0.0]), duration=0.02, state=(0.0, 0.0))

@@ -17,6 +17,7 @@ import numpy as np
 from printhammer.derivatives.flow import Flow, flow, pack_push_changes, pack_push_rate, surface_moves
 from printhammer.derivatives.parameters import Parameter
 from printhammer.hammer.static_force import law_of
+from printhammer.parts.friction import DryFriction
 from printhammer.results import Declared, part, scalar
 from printhammer.run.contacts import Contact
 from printhammer.run.motion import Motion
@@ -272,6 +273,8 @@ class _Look:
             damping, constants = law_of(hammer, hammer.damping, "damping_force")
             viscous, rows = law_of(hammer, hammer.spring, "spring_viscous")
             row[8] = damping(constants, contact.v_in) + viscous(rows, row[0], contact.v_in)
+            if isinstance(hammer.damping, DryFriction):
+                row[8] -= math.copysign(hammer.damping.kinetic, contact.v_in)
         return _acceleration(self.problem, row, *without)
 
     def _in_pack(

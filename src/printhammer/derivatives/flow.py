@@ -18,6 +18,7 @@ import numpy as np
 
 from printhammer.derivatives.parameters import Parameter, as_arrays, rest_changes
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.kernel.compile.specialise import variational
 from printhammer.kernel.model import modes as M
 from printhammer.kernel.model.layout import (
@@ -109,12 +110,12 @@ def carry_columns(
         Whether to orthonormalise the columns at each step and record the growth.
     """
     dry = isinstance(problem.hammer.damping, DryFriction)
-    if dry and (forcing is not None or problem.laws.circuit):
+    if dry and problem.laws.circuit:
         key = next(key for key, law in problem.hammer.laws.items() if law == Friction.law)
         raise InputError(
-            f"{key}: derivatives under dry friction are those with respect to the state, without a circuit",
+            f"{key}: derivatives under dry friction do not include a coil circuit",
             key=key,
-            expected="no dry friction, or a current or force as drive and no sensitivities",
+            expected="no dry friction, or a current or force as drive",
         )
     forced, circuit, count = forcing is not None, problem.laws.circuit, initial.shape[1]
     rows = V.row_count(forced, circuit)
@@ -214,9 +215,23 @@ def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
         value = float(problem.drive.value(0.0))
         static, x = StaticForce(problem.hammer), problem.state[0]
         push = value if problem.drive.quantity == "force" else static.free(x, value) - static.free(x, 0.0)
+        push = _released(problem.hammer, push, static.total(x))
         for k, parameter in enumerate(wanted):
             columns[1, k] = -push / problem.hammer.mass * float(parameter.firings[begun].sum())
     return columns
+
+
+def _released(hammer: Hammer, push: float, before: float) -> float:
+    """Return the force on the armature, N, after a `push` that ends its rest; 0 if the rest does not end.
+
+    `before` is the sum of the forces, N, that stop or friction balance until then.
+    """
+    after, damping = push + before, hammer.damping
+    if isinstance(damping, DryFriction):
+        return 0.0 if abs(after) <= damping.static else after - math.copysign(damping.kinetic, after)
+    if not any(part is not None and part.rigid for part in (hammer.backstop, hammer.pack)):
+        return push
+    return 0.0 if before * after > 0.0 else after
 
 
 def without_current(problem: Problem, wanted: Sequence[Parameter], columns: FloatArray) -> FloatArray:

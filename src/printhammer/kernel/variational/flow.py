@@ -44,7 +44,12 @@ if TYPE_CHECKING:
     from printhammer.kernel.variational.slopes import smooth_bounds
     from printhammer.kernel.variational.steps import begin_step, carry
     from printhammer.kernel.variational.supply import latest_edge, move_edge, rates_at
-    from printhammer.kernel.variational.switches import pass_moving_edges, pass_node
+    from printhammer.kernel.variational.switches import (
+        is_departure,
+        leave_at_edge,
+        pass_moving_edges,
+        pass_node,
+    )
 
 
 @compiled
@@ -247,6 +252,8 @@ def flow(
             if HAS_CIRCUIT and train.replace:
                 pulse, piece = latest_edge(node[0], train, first, last)
                 before = rates_at(node, setting)
+            elif not HAS_CIRCUIT and is_departure(nodes[max(i - 1, 0)], node):
+                pulse, piece = latest_edge(node[0], train, first, last)
             else:
                 pass_moving_edges(node, train, first, last, columns, setting)
         first, last, edge = pass_edges(node[0], train, first, last)
@@ -256,6 +263,8 @@ def flow(
             set_live_moves(first, last, train, forcing)
             if HAS_CIRCUIT and pulse >= 0:
                 move_edge(node, before, pulse, piece, columns, setting)
+            elif pulse >= 0:
+                leave_at_edge(node, pulse, piece, columns, setting)
         begin_step(node, work)
         # A mark at a time shared by several nodes belongs to the last of these nodes.
         while due < marks.size and (marks[due] < t_end or (final and ended and marks[due] == t_end)):

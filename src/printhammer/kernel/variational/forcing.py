@@ -34,11 +34,19 @@ from printhammer.kernel.variational.slopes import BACKWARD, CENTRAL, FORWARD, OF
 
 if TYPE_CHECKING:
     from printhammer.kernel.model.circuit import driven
-    from printhammer.kernel.model.forces import Hammer, pack_force, value_at, viscous_force
+    from printhammer.kernel.model.forces import (
+        Hammer,
+        friction,
+        pack_force,
+        slip,
+        value_at,
+        viscous_force,
+    )
     from printhammer.kernel.model.laws import (
         BACKSTOP_PULLS,
         CHANGING,
         FORCE_DRIVE,
+        FRICTION,
         HAS_BACKSTOP,
         HAS_CIRCUIT,
         HAS_DAMPING,
@@ -53,6 +61,7 @@ if TYPE_CHECKING:
         backstop_switch,
         backstop_viscous,
         damping_force,
+        friction_force,
         magnet_force,
         pack_memory,
         pack_rebound,
@@ -199,6 +208,17 @@ def damping_change(x: float, v: float, k: int, setting: Setting) -> float:
     return float(total / V.SPACING)
 
 
+@inlined
+def friction_change(rests: float, k: int, forcing: Forcing) -> float:
+    """Return the derivative of the kinetic (`rests` = 0) or static (1) friction force with constant k."""
+    total = 0.0
+    if forcing.of_hammer[k] & V.DAMPING_MOVES:
+        for i in range(POINTS[CENTRAL]):
+            c = forcing.varied[k, V.MIDDLE + int(OFFSETS[CENTRAL, i])][DAMPING:SPRING]
+            total += WEIGHTS[CENTRAL, i] * friction_force(c, rests)
+    return float(total / V.SPACING)
+
+
 @compiled
 def note_changed_memories(peak: float, forcing: Forcing) -> None:
     """Compute the memory values of the pack law for shifted constants, at the fixed depth of `peak` [m]."""
@@ -329,8 +349,11 @@ def add_forcing(
         e = j + V.STATE - V.ENERGY
         if HAS_DAMPING:
             drag = damping_change(x, v, k, setting)
-            change += drag
             by_v = damping_slope(x, v, scales, hammer) * v + viscous_force(x, v, hammer)
+            if FRICTION:
+                drag -= slip(mode, memory) * friction_change(0.0, k, forcing)
+                by_v += friction(mode, memory, hammer)
+            change += drag
             rates[e + V.DAMPING_LOSS] = -pace * (drag * v + by_v * dv)
             if VISCOUS:
                 rates[e + V.DAMPING_LOSS] -= pace * drag_x * dx * v

@@ -61,7 +61,13 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.pulses import Drive, drive_value, piece_value
     from printhammer.kernel.single.resample import branch_of, is_held, memory_of
     from printhammer.kernel.variational.circuit import electric_at_node
-    from printhammer.kernel.variational.forcing import rebound_change
+    from printhammer.kernel.variational.forcing import (
+        field_changes,
+        force_with_value,
+        friction_change,
+        pack_change,
+        rebound_change,
+    )
     from printhammer.kernel.variational.layout import Setting
     from printhammer.kernel.variational.slopes import field_at, field_slope, pack_slopes
 
@@ -135,8 +141,8 @@ def pass_rebound(node: Any, after: Any, columns: Any, setting: Setting) -> None:
             columns[0, k] -= forcing.moves[k, surface]
         earlier = columns[0, k] / v_in
         if FORCED:
-            before = powers_at(node, M.FREE, 0.0, v_in, hammer, drive)
-            behind = powers_at(node, M.FREE, 0.0, v_out, hammer, drive)
+            before = powers_at(node, M.FREE, before_it, v_in, hammer, drive)
+            behind = powers_at(node, M.FREE, behind_it, v_out, hammer, drive)
             add_energies(columns, k, -earlier, before, behind)
             columns[loss, k] += v_in * (columns[1, k] - a * earlier) / hammer[INVERSE_MASS]
         columns[0, k] = earlier * v_out
@@ -203,7 +209,8 @@ def pass_level(
 def pass_release(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
     """Propagate the columns through the end of a rest under dry friction; return whether differentiable.
 
-    The rest ends at a time that depends on the place of the armature, or at an edge of the drive.
+    The rest ends at a time that depends on the place of the armature and on constants, or at an edge of the
+    drive, see `leave_at_edge`.
     """
     hammer, drive = setting.hammer, driven(setting.drive, electric_at_node(after))
     mode, t = int(node[3]), after[0]
@@ -222,11 +229,23 @@ def pass_release(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
         return False
     value = value_at(t, after[1], hammer, drive)
     by_x = field_slope(after[1], 0.0, value, setting.scales, setting.bounds, hammer)
+    by_front = 0.0
     if HAS_PACK and mode == M.HELD_LOADING:
-        by_x += pack_slopes(after[1], 0.0, M.LOADING, memory, node[4], setting.scales, hammer)[0]
+        by_front = -pack_slopes(after[1], 0.0, M.LOADING, memory, node[4], setting.scales, hammer)[0]
+        by_x -= by_front
     behind = acceleration_at(after, branch_of(int(after[3])), after[4], 0.0, hammer, drive)
     for k in range(columns.shape[1]):
-        columns[1, k] = behind * by_x * columns[0, k] * hammer[INVERSE_MASS] / rate
+        change = by_x * columns[0, k]
+        if FORCED:
+            forcing = setting.forcing
+            with_value = force_with_value(after[1], value, hammer, drive, forcing)
+            change += field_changes(t, after[1], value, with_value, k, drive, setting)[0]
+            static = friction_change(1.0, k, forcing)
+            change -= static if held > 0.0 else -static
+            if HAS_PACK and mode == M.HELD_LOADING:
+                change += pack_change(after[1], 0.0, M.LOADING, k, forcing)
+                change += by_front * forcing.moves[k, FRONT]
+        columns[1, k] = behind * change * hammer[INVERSE_MASS] / rate
     # On an unloading branch the force depends on the latest maximum, too.
     return mode != M.HELD_UNLOADING
 
@@ -249,7 +268,7 @@ def pass_friction(node: Any, after: Any, columns: Any, setting: Setting) -> tupl
         for k in range(columns.shape[1]):
             columns[1, k] = 0.0
         return True, True
-    if is_held(mode):
+    if is_held(mode) or (FORCED and mode >= M.RESTING > following):
         return True, pass_release(node, after, columns, setting)
     if mode == following and node[4] * after[4] < 0.0 and after[2] == 0.0:
         return True, pass_reversal(node, after, mode, following, columns, setting)
@@ -309,6 +328,25 @@ def pass_edge(
             old_pull = magnet_force(hammer[MAGNET:], x, value)
             columns[COIL, k] -= (magnet_force(hammer[MAGNET:], x, new) - old_pull) * v * later
     return new
+
+
+@inlined
+def is_departure(before: Any, node: Any) -> bool:
+    """Whether a rest on a rigid stop, or under friction, ended at a node; `before` is the preceding node."""
+    mode = int(before[3])
+    return mode >= M.RESTING and (FRICTION or mode != M.HELD) and int(node[3]) < M.RESTING
+
+
+@compiled
+def leave_at_edge(node: Any, pulse: int, piece: int, columns: Any, setting: Setting) -> None:
+    """Propagate the columns through an edge of the drive, just passed, that ended a rest.
+
+    Until the edge, stop or friction balance the other forces: if the edge moves, the motion moves with it.
+    """
+    forcing = setting.forcing
+    a = acceleration_at(node, int(node[3]), node[4], 0.0, setting.hammer, setting.drive)
+    for k in range(columns.shape[1]):
+        columns[1, k] = -a * (forcing.fire_moves[k, pulse] + forcing.piece_moves[k, piece, 0])
 
 
 @compiled
