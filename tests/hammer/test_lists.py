@@ -201,3 +201,11 @@ def test_a_contact_moves_the_armature_as_a_pack_without_losses() -> None:
             assert closing.t_in == pytest.approx(contact.t_in, abs=1e-11)
             assert closing.depth == pytest.approx(contact.depth, abs=1e-11)
             assert closing.peak_force == pytest.approx(contact.peak_force, rel=1e-7)
+
+
+@pytest.mark.parametrize(("law", "tables"), [("rigid", "[backstop] or [pack]"), ("power", "[pack]")])
+def test_a_law_that_is_not_one_of_the_list_is_told_where_it_belongs(law: str, tables: str) -> None:
+    contact = table("[[contact]]", name="stop", law=law, side="front", position=written(0.5, "mm"))
+    with refused("contact.stop.law", law) as caught:
+        ph.Hammer.from_toml(HEAD + contact)
+    assert str(caught.value.expected).endswith(tables)

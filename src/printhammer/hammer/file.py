@@ -330,6 +330,9 @@ def _term(section: str, entry: Mapping[str, Any], constants: dict[str, Constant]
     if law is None:
         raise InputError(f"{key}.law is missing", key=f"{key}.law", expected=expected)
     if not isinstance(law, str) or law not in known:
+        roles = [role for role in ("backstop", "pack") if section == "contact" and (role, law) in PARTS]
+        if roles:
+            expected += f"; a contact with this law is the table {' or '.join(f'[{role}]' for role in roles)}"
         raise InputError.of(f"{key}.law", law, expected, written=shown(law))
     rest = {name: value for name, value in entry.items() if name not in ("name", "law")}
     return _read(known[law], rest, f"{key}.", constants, folder, {}, None)

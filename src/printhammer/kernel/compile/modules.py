@@ -82,7 +82,7 @@ def _versions() -> str:
 
 
 def require_numba(needs: str) -> None:
-    """Raise InputError, which names the extra `laws`, if numba is not installed; `needs` is a clause."""
+    """Raise InputError, which names the extra `laws`, if numba is missing; `needs` says what it is for."""
     try:
         import numba  # noqa: F401
     except ImportError:

@@ -127,7 +127,7 @@ def land_on_level(
     law: ForceLaw,
     control: Control,
 ) -> State:
-    """Locate where sign * x rises through sign * `level` in a step `h`, up to the fraction `upper`."""
+    """Return the state where sign * x rises through sign * `level` in a step `h`, up to fraction `upper`."""
     t, x, v, a = start
     low, high = 0.0, upper
     negligible = 1e-15 * control[0]
@@ -154,7 +154,7 @@ def land_on_level(
 def land_on_reversal(
     start: State, h: float, fraction: float, sign: float, law: ForceLaw, control: Control
 ) -> tuple[float, float, float, float, float]:
-    """Locate where sign * v falls to zero in a step `h`; return the state and the fraction of the step."""
+    """Return the state at which sign * v falls to zero in a step `h`, and the fraction of the step."""
     t, x, v, a = start
     low, high = 0.0, 1.0
     negligible = 1e-8 * control[1]
@@ -227,9 +227,10 @@ def is_cut(v0: float, v1: float, hammer: Hammer) -> bool:
 
 @called
 def land_on_push(start: State, h: float, upper: float, cut: bool, law: ForceLaw, control: Control) -> State:
-    """Locate by bisection where a contact starts or ceases to push in a step `h`, up to fraction `upper`.
+    """Return the state in which a contact starts or ceases to push in a step `h`, up to fraction `upper`.
 
-    With `cut`, a contact of the spring law; otherwise the pack or the backstop.
+    With `cut`, the contact is one of the spring law, otherwise the pack or the backstop. The method is
+    bisection.
     """
     t, x, v, a = start
     low, high = 0.0, upper

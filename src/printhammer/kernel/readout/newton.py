@@ -25,7 +25,7 @@ APPROACHES, GOES_ON, NO_DERIVATIVE = 1, 0, -1
 
 GOAL, ENOUGH, ITERATIONS = 1e-13, 1e-9, 20
 """Residual at which the iteration stops, residual that is accepted if it stops decreasing, and iteration
-limit; as in `printhammer.chaos.orbits.settled`."""
+limit; the same constants as in `printhammer.chaos.orbits.settled`."""
 LONGEST_STEP, LEAST_SHARE = 1.0, 2.0**-7
 """Longest Newton step, in half-widths of the window, and smallest damping factor; as in
 `printhammer.chaos.orbits.newton`."""

@@ -17,7 +17,7 @@ AGREES, DISTINCT = 1e-8, 1e-3
 """Distances, in units of the scales, below which states agree completely and above which they differ by more
 than noise; as in `printhammer.chaos.orbits.settled`."""
 SHRINKS, NOISE = 1e-5, 1e-9
-"""Smallest decreases of a distance that count as shrinking: relative, and absolute in units of the scales."""
+"""Smallest decrease of the distance of states that approach each other: relative, and in scale units."""
 
 
 def write_states(strobes: Any, front: float, states: Any, branches: Any) -> None:

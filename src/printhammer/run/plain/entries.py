@@ -83,15 +83,16 @@ that pack the constants of parts."""
 
 
 Numbers = dict[str, tuple[tuple[str | None, ...], tuple[float, ...]]]
-"""Numbers of a hammer as named arrays: for each array, the dotted keys of the constants that set its numbers
-(None where no constant does), and the numbers, SI (NaN where missing)."""
+"""Constants of a hammer as named arrays: for each array, the dotted keys of the constants that set its
+elements (None where no constant does), and the elements, SI (NaN where missing)."""
 
 
 def numbers_of(hammer: Hammer) -> Numbers:
-    """Return the numbers of a hammer as input arrays of the entry points `constants` and `rest`.
+    """Return the constants of a hammer as input arrays of the entry points `constants` and `rest`.
 
-    The arrays are `body`, those of the parts by role, and `limits`, whose first two numbers `constants`
-    writes. Numbers whose key changes are replaced; positions of backstop and front occur twice.
+    The arrays are `body`, one for each part by role, and `limits`, whose first two elements `constants`
+    writes. The page replaces the elements of the keys that the user changes; the positions of backstop and
+    front occur twice.
     """
     place, front = hammer.position, hammer.front
     missing = math.nan

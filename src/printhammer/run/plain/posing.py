@@ -140,12 +140,12 @@ def linkage_scale(origin: float, current: float, coil: Coil) -> float:
 
 
 def falling_place(low: float, high: float, current: float, coil: Coil) -> tuple[float, float]:
-    """Find a position along the travel at which the flux linkage does not increase with the current.
+    """Find a displacement at which the flux linkage does not increase with the current.
 
     Returns
     -------
     tuple of float
-        Place, m, and slope of the flux linkage, H; NaN and 0 if the linkage increases everywhere.
+        Displacement, m, and derivative of the flux linkage by current, H; NaN and 0 if none is found.
     """
     count = PLACES if high > low else 1
     for k in range(count):

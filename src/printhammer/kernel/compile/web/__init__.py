@@ -1,1 +1,1 @@
-"""WebAssembly: the entry points of a hammer's kernel as a module, and how JavaScript calls it."""
+"""WebAssembly modules with the entry points of a hammer's kernel, and their calls from JavaScript."""
