@@ -31,7 +31,7 @@ PAPER = 0.28e-3
 
 def timed(monkeypatch: pytest.MonkeyPatch, flight: float) -> None:
     """Let every single pulse fly for a time, s, without a run."""
-    monkeypatch.setattr(window, "_window_of", lambda *_: window.Window(20.0 * flight, flight))
+    monkeypatch.setattr(window, "window_of", lambda *_: window.Window(20.0 * flight, flight))
 
 
 @pytest.mark.parametrize("scale", [1.0, 2.0, 5.0, 20.0, 100.0])
@@ -217,3 +217,27 @@ def test_a_burst_needs_a_current() -> None:
     device = ph.load("relay-5v")
     with refused("waveform", file="relay-5v.toml"):
         least_work(device, 20.0, dots=1)
+
+
+@pytest.mark.parametrize("name", ["impact-wire", "dot-peen", "relay-5v"])
+def test_a_record_of_the_current_is_as_long_as_the_pulse(name: str) -> None:
+    """The touch and the end of the pulse are in it, and for a fast device 4 ms."""
+    hammer = ph.load(name)
+    (dot,) = ph.simulate(hammer, ph.PulseTrain(hammer.waveform)).dots
+    times = ph.measure("current", hammer, sensor={"sampling_rate": "100 kHz"}).values["time"]
+    width: float = hammer.waveform.width  # type: ignore[union-attr]
+    assert times[-1] > max(float(dot.flight_time or math.inf), width)
+    assert bool(abs(times[-1] - 4e-3) < 1e-6) is (name == "impact-wire")
+
+
+@pytest.mark.parametrize("verb", ["quality pot-magnet --rate 3Hz --pattern 11", "map pot-magnet --rates 2"])
+def test_a_device_whose_armature_does_not_return_says_so(cli: Callable[..., Any], verb: str) -> None:
+    outcome = cli(*verb.split())
+    assert "is not at rest, but 100 % of the stroke away: a pull-in" in " ".join(outcome.out.split())
+    assert "of the stroke away" not in cli(*verb.replace("pot-magnet", "relay-5v").split()).out
+
+
+def test_whole_parameter_values_are_written_out(cli: Callable[..., Any]) -> None:
+    """Periods from 80 ms to 140 ms, in steps that two digits tell apart."""
+    options = ["--values", "4", "--firings", "30", "--refine", "0", "--no-exponents"]
+    assert not re.search(r"e\+\d", cli("bifurcation", "pot-magnet", *options).out)

@@ -25,7 +25,7 @@ from printhammer.printing.page.pattern import Pattern
 from printhammer.run.effort import Effort
 from printhammer.run.plain.posing import CYCLE
 from printhammer.run.waits import waits_of
-from printhammer.run.window import Single, is_enough, last_wait, least_wait, wait_of
+from printhammer.run.window import Single, is_enough, last_wait, least_wait, stays_away, wait_of
 from printhammer.sweep.members import Base, Maker
 
 
@@ -104,6 +104,7 @@ def test_a_device_that_does_not_strike_or_settle_is_not_waited_for_without_end()
         assert "not at rest" in motion.unsettled
         assert motion.unsettled in json.loads(motion.to_json())["unsettled"]
         assert "at the end" in str(motion.summary())
+        assert "longer run" in str(motion.summary())
         assert not ph.simulate(hammer, ph.PulseTrain(push), duration="1 ms").unsettled
 
 
@@ -306,3 +307,16 @@ def test_an_armature_latched_on_a_rigid_front_is_not_at_rest() -> None:
     motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform))
     assert (motion.x[-1], motion.v[-1]) == (1e-3, 0.0)
     assert "0.001 m from its rest position" in motion.unsettled
+    # No longer run can help.
+    assert "longer run" not in str(motion.summary())
+
+
+@pytest.mark.parametrize("name", ["pot-magnet", "relay-5v", "pinball-flipper", "hendriks-1983"])
+def test_an_armature_that_stays_away_after_a_pulse_is_described(name: str) -> None:
+    """Only the pot magnet has no spring; ten windows later its armature is still at the pole."""
+    hammer = ph.load(name)
+    long = ph.simulate(hammer, ph.PulseTrain(hammer.waveform), duration=10.0 * wait_of(hammer))
+    assert hammer.front is not None
+    away = abs(long.x[-1] - hammer.rest) / (hammer.front - hammer.rest)
+    assert bool(away > 0.99) is (name == "pot-magnet")
+    assert bool(stays_away(hammer)) is bool(away > 0.01)

@@ -365,6 +365,14 @@ def ended_early(statuses: Iterable[object], total: int | None = None) -> list[st
     return [f"{len(failed)} of {total or len(every)} runs ended early: {kinds}"] if failed else []
 
 
+def away_from_rest(hammer: Hammer) -> list[str]:
+    """Return one sentence if a single pulse leaves the armature away from rest; else an empty list."""
+    from printhammer.run.window import stays_away
+
+    said = stays_away(hammer)
+    return ["", f"note: {said}"] if said else []
+
+
 def period_text(hammer: Hammer, period: float) -> str:
     """Scale a period [s] of the paper's hammer to the time scale of a hammer; return text like "1.05 ms"."""
     from printhammer.run.window import time_scale

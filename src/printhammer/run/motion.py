@@ -48,6 +48,7 @@ from printhammer.run.energy import CoilWork, Ledger, coil_work_of, increments_of
 from printhammer.run.problem import Problem, Record, message_of
 from printhammer.run.start import state_to_begin
 from printhammer.run.switching.timings import Timing, timing_facts, timings_of
+from printhammer.run.window import moves_on
 from printhammer.support.arrays import FloatArray
 from printhammer.support.files import write_file
 
@@ -365,7 +366,9 @@ class Motion(Result, fields=False):
             ("dots", f"{len(self.dots) - lost} struck{missing}"),
         ]
         if self.unsettled:
-            rows.append(("at the end", styled("poor", f"{self.unsettled}; a duration sets a longer run")))
+            moves = moves_on(self.hammer, self._record.nodes)
+            advice = "a duration sets a longer run" if moves else "there it stands still"
+            rows.append(("at the end", styled("poor", f"{self.unsettled}; {advice}")))
         times, x = self.maxima
         if len(x):
             top = int(x.argmax())

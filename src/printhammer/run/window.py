@@ -39,6 +39,9 @@ MOST_STEPS: Final = 500_000  # Largest number of steps of a single pulse; arbitr
 _LEAST_REACH: Final = 1e-4
 THRESHOLDS: Final = {"least_reach": _LEAST_REACH, "flights": FLIGHTS, "held": (HELD + 1, HELD_FREE)}
 """Thresholds for a web page: smallest reach, smallest window in flight times, range of the held modes."""
+# Path at the last speed for the length of a run, as a fraction of the distance from rest, below which an
+# armature stands still; arbitrary
+_STILL: Final = 0.01
 _MOST_KEPT: Final = 512  # Number of cached windows at which the cache is emptied; arbitrary
 
 _FLIGHT: Final = 0.28e-3  # Flight time of the paper's hammer, for which default rates and times are stated, s
@@ -204,6 +207,32 @@ def unsettled(problem: Problem, record: Record) -> str:
     return (
         f"the armature is not at rest at the end of the run: {x - rest:.4g} m from its rest position,"
         f" at {v:.4g} m/s"
+    )
+
+
+def moves_on(hammer: Hammer, nodes: FloatArray) -> bool:
+    """Whether an armature away from rest still moves at the end of a record: a longer run may help."""
+    (start, *_), (end, x, v, *_) = nodes[0], nodes[-1]
+    return bool(abs(v) * (end - start) > _STILL * abs(x - hammer.rest))
+
+
+def stays_away(hammer: Hammer, waveform: Waveform | None = None) -> str:
+    """Describe in one sentence an armature that is away from rest after a single pulse; empty if at rest.
+
+    The default is the hammer's waveform. The state is that at the end of the window of the device.
+    """
+    pulse = hammer.waveform if waveform is None else waveform
+    if pulse is None or not has_window(hammer, pulse) or not has_flight(hammer):
+        return ""
+    window, front = window_of(hammer, pulse), hammer.front
+    seen = _single(hammer, PulseTrain(pulse), window.wait)
+    assert front is not None
+    if not seen.ok or is_settled(window, seen.x, seen.v, hammer.rest, front):
+        return ""
+    return (
+        f"{1e3 * window.wait:.4g} ms after a single pulse the armature is not at rest, but"
+        f" {100.0 * abs(seen.x - hammer.rest) / (front - hammer.rest):.3g} % of the stroke away: a dot that"
+        " follows sooner does not start from rest"
     )
 
 

@@ -38,6 +38,7 @@ from printhammer.units import from_si
 SERIES: Final = (2, 4, 8)
 """Orbit periods, in firings, of the windows of a period-doubling cascade: by definition, doublings of 1."""
 
+_WHOLE_DIGITS: Final = 6  # Number of digits up to which whole parameter values are written out; arbitrary
 MOST_UNDECIDED: Final = 32
 """Number of undecided aperiodic trains after which the search for chaos along a route stops; arbitrary."""
 
@@ -230,7 +231,10 @@ class Bifurcation(Result, rows="direction column"):
         unit = {"s": "ms", "m": "um"}.get(si, si)
         steps = np.diff(self.values)
         ratio = float(np.abs(self.values).max() / steps.min()) if steps.size else 1e6
-        digits = 1 + math.ceil(math.log10(max(ratio, 10.0)))
+        largest = from_si(float(np.abs(self.values).max()), si, unit)
+        # Digits before the decimal point, so that 140 is not written as 1.4e+02.
+        whole = 1 + math.floor(math.log10(max(largest, 1.0)))
+        digits = max(1 + math.ceil(math.log10(max(ratio, 10.0))), min(whole, _WHOLE_DIGITS))
         return lambda value: f"{from_si(value, si, unit):.{digits}g}", unit
 
     def _windows_grid(self, direction: str) -> Grid:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
-from printhammer.cli.runner import PICTURES, Answer, Content, Job, verb
+from printhammer.cli.runner import PICTURES, Answer, Content, Job, away_from_rest, verb
 from printhammer.cli.screen import render
 from printhammer.errors import InputError
 
@@ -84,7 +84,7 @@ def map_(
     with job.progress_bar("rates") as tell:
         chart = frequency_map(hammer, grid, times=moments, progress=tell, **passed)
     return Answer(
-        render(summary_of(chart, beside)),
+        [*render(summary_of(chart, beside)), *away_from_rest(hammer)],
         note=f"computed in {job.seconds:.2g} s",
         files={"out": Content(partial(save_dataset, chart), partial(_drawn, hammer, chart, beside, drawn))},
         complaints=_complaints(chart),

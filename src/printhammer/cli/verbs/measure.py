@@ -48,7 +48,9 @@ _bench = partial(opt.text, panel="Bench")
         "currents": _bench("LIST", "Currents in the coil, e.g. '0 A, 1 A'."),
         "peaks": _bench("LIST", "Peak indentations of the load cycles, e.g. '20 um, 60 um'."),
         "speeds": _bench("LIST", "Impact speeds on the backstop, e.g. '0.2 m/s, 1 m/s'."),
-        "duration": _bench("TIME", "Duration of a record after the firing (default: 4 ms)."),
+        "duration": _bench(
+            "TIME", "Duration of a record after the firing (default: 4 ms, longer for a slow device)."
+        ),
         "before": _bench("TIME", "Duration of a record before the firing (default: 100 us)."),
         "locked": _bench(
             "LENGTH", "Displacement at which the armature is locked in a record of the current."

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
 from printhammer.cli.options import Units
-from printhammer.cli.runner import Answer, Content, Job, ended_early, rate_text, verb
+from printhammer.cli.runner import Answer, Content, Job, away_from_rest, ended_early, rate_text, verb
 from printhammer.cli.screen import render
 from printhammer.cli.terminal import warn
 from printhammer.errors import InputError
@@ -201,7 +201,7 @@ def quality(
         with job.progress_bar("materials") as tell:
             result = damping_study(hammer, progress=tell, **opt.given(current=current), **many)
     return Answer(
-        render(result.summary(), units),
+        [*render(result.summary(), units), *away_from_rest(hammer)],
         note=f"computed in {job.seconds:.2g} s",
         files={"out": Content.of(result)},
         complaints=bad,
@@ -369,7 +369,7 @@ def print_(
     save = page.save
     views: dict[str, Any] = {name: Content(save, partial(page.plot, view=name)) for name in ("zoom", "sheet")}
     return Answer(
-        render(page.summary(), units),
+        [*render(page.summary(), units), *away_from_rest(hammer)],
         note=f"{page.status.size} runs, {page.line.size} dots, computed in {job.seconds:.2g} s",
         files={"out": Content(save, page.plot), **views, "save": Content(asked.save)},
         complaints=ended_early(page.status.ravel()),

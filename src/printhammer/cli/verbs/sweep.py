@@ -94,7 +94,7 @@ def ended(result: xr.Dataset, new: float, seconds: float) -> str:
         verb = "is" if unsettled == 1 else "are"
         lines.append(
             f"[yellow]{unsettled}[/] of them {verb} not at rest at the end of the run (column unsettled):"
-            " later contacts are not counted; a duration in the spec sets longer runs"
+            " later contacts are not counted; if they still move, a duration in the spec sets longer runs"
         )
     return "\n".join(lines)
 

@@ -35,7 +35,7 @@ from printhammer.results import Declared, part
 from printhammer.run.plain.posing import CYCLE
 from printhammer.run.simulate import simulate
 from printhammer.run.supply import typical_current
-from printhammer.run.window import wait_of
+from printhammer.run.window import time_scale, wait_of
 from printhammer.support.arrays import FloatArray
 
 DISPLACEMENTS: Final = 31  # Arbitrary
@@ -119,7 +119,7 @@ def magnet(
             expected="displacements and currents within the range of the magnet's law",
         )
     return Bench(
-        "static force of magnet and spring, armature held, pack absent; positive toward the paper",
+        "static force of magnet and spring, armature held, pack absent; positive toward the pack",
         {"displacement": x, "current": current, "force": total},
         "force",
     )
@@ -142,7 +142,7 @@ def spring(
     x = _places(hammer, displacements)
     force = StaticForce(hammer)
     return Bench(
-        "static force of the spring alone, magnet removed; positive toward the paper",
+        "static force of the spring alone, magnet removed; positive toward the pack",
         {"displacement": x, "force": np.array([force.spring(place) for place in x.tolist()])},
         "force",
     )
@@ -189,7 +189,7 @@ def pack(
         force += [-unloading(c, hammer.pack.front + r, 0.0, q) for r in down.tolist()]
         branch += ["loading"] * len(up) + ["unloading"] * len(down)
     return Bench(
-        "force of slow load cycles against the indentation from the front of the pack, each on fresh paper",
+        "force of slow load cycles against the indentation from the front of the pack, each on a fresh pack",
         {"indentation": np.array(indentation), "force": np.array(force)},
         "force",
         {"branch": tuple(branch)},
@@ -269,7 +269,9 @@ def current(
     check_driver(hammer)
     waveform = hammer.waveform
     assert waveform is not None
-    first, last, rate, _length = _record(sensor, duration, before)
+    # Of a fast device, 4 ms show the whole pulse; the pulse of a slow device may last longer.
+    least = CYCLE if duration is not None or time_scale(hammer) == 1.0 else wait_of(hammer)
+    first, last, rate, _length = _record(sensor, duration, before, least)
     t = np.arange(first, last + 1) / rate
     place = None if locked is None else read_number(locked, "m", "locked")
     shown = probe_current(hammer, waveform, t, locked=place, tau=time_constant(sensor.bandwidth))
