@@ -31,7 +31,7 @@ def damping(hammer: ph.Hammer) -> Result:
 
 
 def curve(hammer: ph.Hammer) -> Result:
-    wide = ph.continuation(hammer, "period", (1.2e-3, 1.35e-3), period=1.25e-3, most=60)
+    wide = ph.continuation(hammer, "period", (1.24e-3, 1.26e-3), period=1.25e-3, most=10)
     own = hammer.constants["backstop.damping"].si
     return ph.bifurcation_curve(wide, "backstop.damping", (0.99 * own, 1.01 * own), grid=(2, 3), most=2)
 

@@ -34,7 +34,11 @@ def dots_of(hammer: ph.Hammer) -> np.ndarray:
     return np.array([[getattr(dot, name) for name in QUANTITIES] for dot in motion.dots])
 
 
-@pytest.mark.parametrize("damping", [None, 0.5])
+UNDAMPED = pytest.param(None, marks=pytest.mark.slow)
+"""Kernels without damped contacts, which `tests/truth/test_lists_reference.py` runs as well."""
+
+
+@pytest.mark.parametrize("damping", [UNDAMPED, 0.5])
 @pytest.mark.parametrize(("law", "stiffness", "within"), [("linear", 3e3, 3e-8), ("hertz", 1e5, 3e-6)])
 def test_sensitivities_follow_the_contacts(
     law: str, stiffness: float, within: float, damping: float | None
@@ -79,7 +83,7 @@ def stopped_dots(hammer: ph.Hammer) -> tuple[np.ndarray, np.ndarray]:
     return result.dots[:, rows], np.array([result.run[result.run_quantities.index(name)] for name in LOST])
 
 
-@pytest.mark.parametrize("damping", [None, 0.5])
+@pytest.mark.parametrize("damping", [UNDAMPED, 0.5])
 def test_sensitivities_between_two_rigid_stops(damping: float | None) -> None:
     hammer = between_stops(damping)
     result = ph.sensitivities(hammer, ph.PulseTrain(hammer.waveform, period=3e-3, pulses=2), tolerance=1e-13)
@@ -111,7 +115,7 @@ def test_sensitivities_between_two_rigid_stops(damping: float | None) -> None:
 
 
 def test_quantities_that_a_rigid_front_does_not_have() -> None:
-    hammer = between_stops()
+    hammer = between_stops(0.5)
     result = ph.sensitivities(hammer, ph.PulseTrain(hammer.waveform))
     for name in ("peak_force", "contact_time"):
         assert np.isnan(result.derivatives[:, result.quantities.index(name)]).all()

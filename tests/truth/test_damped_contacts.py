@@ -84,8 +84,7 @@ def test_tangent_maps_through_damped_contacts(law: str, within: float) -> None:
         near = {"law": "linear", "side": "back", "position": 5e-5, "stiffness": 1e3, "damping": 0.6}
         hammer = ph.Hammer.build(MASS, backstop={"law": "rigid", "position": 0.0, "restitution": 0.6})
         hammer = hammer.replace({"contact.far": {**far, "damping": 0.4}, "contact.near": near})
-        if k % 2:
-            hammer = hammer.replace("damping", {"law": "viscous", "coefficient": 0.05})
+        hammer = hammer.replace("damping", {"law": "viscous", "coefficient": 0.05 * (k % 2)})
         drive = ph.SineForce(float(rng.uniform(0.2, 0.8)), float(rng.uniform(50.0, 200.0)))
         state, end = (1e-4, float(rng.uniform(0.2, 0.6))), float(rng.uniform(5e-3, 1.2e-2))
         closings += len(ph.simulate(hammer, drive, duration=end, state=state).closings)

@@ -109,7 +109,7 @@ def test_a_driver_that_saturates_at_the_limit_may_be_on_for_longer(driver: str) 
 
 def test_a_rate_at_which_nothing_prints() -> None:
     with refused("rate"):
-        ph.tune(quick(), rate="6 kHz", history=1)
+        ph.tune(quick(), rate="6 kHz", history=1, reach=1)
 
 
 @pytest.mark.parametrize(
