@@ -56,6 +56,10 @@ def test_a_hammer_file_gives_the_numbers_of_python(ask: Any, name: str) -> None:
         (("value = 0.803171", "value = -0.8"), "magnet.F0"),
         (("[waveform]", "[wave]"), "wave is not known"),
         (('law = "inverse-root"', 'law = "table"\nfile = "forces.csv"'), "magnet.file names a table"),
+        (
+            ("[spring]\n", "[[force]]\nlaw = 'sampled'\nfile = 'a.csv'\n[spring]\n"),
+            "force.file names a table",
+        ),
         (("mass = {", "mass = 3 #{"), "mass has no unit"),
         (("format = 1", "format = 1\n__proto__ = 1"), "not known"),
         (("format = 1", "format = 1\nviews = ['plan']"), "views is expected to be one of"),

@@ -69,6 +69,7 @@ def test_what_is_no_state_file_is_refused_in_one_sentence(tmp_path: Path, conten
         ("name = 'a'", "format"),
         ('name = "a"\n[waveform]\nshape = "sampled"\nfile = "/etc/passwd"\n', "waveform.file"),
         ('format = 1\nname = "a"\n[magnet]\nlaw = "table"\nfile = "t.csv"\n', "magnet.file"),
+        ('name = "a"\n[[force]]\nlaw = "sampled"\nname = "a"\nfile = "/etc/passwd"\n', "force.file"),
         # These would take minutes to read.
         ("a." * 150_000 + "b = 1", "text"),
         ("x = {" + "a." * 150_000 + "b = 1}", "text"),
