@@ -1,6 +1,7 @@
 """Multipliers of histories: in the C header, against two simulated rows, of which one is disturbed."""
 
 import json
+from dataclasses import replace
 from itertools import accumulate, cycle, islice
 from pathlib import Path
 
@@ -107,6 +108,17 @@ def test_the_pattern_of_a_history_contains_it() -> None:
                 for window in windows
             }
             assert pattern == min(pattern[k:] + pattern[:k] for k in range(len(pattern)))
+
+
+def test_the_summary_names_rows_in_which_an_error_grows() -> None:
+    table = by_hand()
+    values = np.full_like(table.multiplier, 0.5)
+    assert "grows" not in str(replace(table, multiplier=values).summary())
+    assert "grows" not in str(replace(table, multiplier=np.full_like(values, np.nan)).summary())
+    values[1, number_of((1, 2), 2)] = -1.001
+    values[:, number_of((1, 1), 2)] = np.nan
+    said = str(replace(table, multiplier=values).summary())
+    assert "the gaps 1-1 at 800 Hz and 1 other rate, 1-2 at 1000 Hz, an error grows" in " ".join(said.split())
 
 
 def test_thousandths_are_on_the_safe_side_of_1() -> None:

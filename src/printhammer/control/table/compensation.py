@@ -17,6 +17,7 @@ from printhammer.control.table.drive import (
     checked_size,
     driven_by,
     entries_of,
+    growing_text,
     histories,
     history_text,
     number_of,
@@ -296,7 +297,10 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         ]
         low, high, count = self.rates[0], self.rates[-1], self.rates.size
         span = f"{low:g} Hz to {high:g} Hz, {count} rates, at " if count > 1 else ""
-        return Summary([Grid(columns, f"Table for {span}{high:g} Hz", most=12)])
+        growing = growing_text(self.multiplier, self.rates, self.gaps, self.reach)
+        return Summary(
+            [Grid(columns, f"Table for {span}{high:g} Hz", most=12), *(["", growing] if growing else [])]
+        )
 
     @property
     def look_ahead(self) -> IntArray:

@@ -110,6 +110,28 @@ def history_text(history: Sequence[int]) -> str:
     return "-".join(map(gap_text, history))
 
 
+def growing_text(multipliers: FloatArray, rates: FloatArray, gaps: int, reach: int) -> str:
+    """Name the histories whose repetition lets an error grow, or has no periodic orbit; empty for none.
+
+    `multipliers` has the shape (rates, entries). All NaN is a table without multipliers.
+    """
+    if np.isnan(multipliers).all():
+        return ""
+    said = []
+    for history in histories(gaps, reach):
+        over = np.flatnonzero(~(np.abs(multipliers[:, number_of(history, reach)]) <= 1.0))
+        if over.size:
+            others = over.size - 1
+            more = f" and {others} other rate{'s' * (others > 1)}" if others else ""
+            said.append(f"{history_text(history)} at {rates[over[0]]:g} Hz{more}")
+    return (
+        f"In long rows that repeat the gaps {', '.join(said)}, an error grows from dot to dot, or the dots do"
+        " not become equal (multiplier beyond 1 or unknown)."
+        if said
+        else ""
+    )
+
+
 def pattern_of(history: Sequence[int], before: Sequence[int] = ()) -> tuple[int, ...]:
     """Return the slots of a pattern whose last dot has a given history.
 
