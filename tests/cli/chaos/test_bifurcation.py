@@ -64,7 +64,7 @@ def test_without_exponents_it_is_said_how_to_tell(cli: Callable) -> None:
     )
     assert done.status == 0
     assert "2 values, 2 trains of 60 firings" in done.out
-    assert "undecided trains: no exponent was computed; use the option `exponents`" in done.out
+    assert "undecided trains: the diagram has no exponent; use the option `exponents`" in done.out
 
 
 def test_a_transient_leaves_points_to_judge(cli: Callable) -> None:

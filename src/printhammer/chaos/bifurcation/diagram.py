@@ -269,7 +269,7 @@ class Bifurcation(Result, rows="direction column"):
             (known & ~settling, "the exponent lies within three standard errors of zero"),
             (
                 undecided & ~known,
-                "no exponent was computed; use the option `exponents` (none exists at a grazing touch)",
+                "the diagram has no exponent; use the option `exponents` (none exists at a grazing touch)",
             ),
         )
         count = int(undecided.sum())
