@@ -304,11 +304,12 @@ def test_an_armature_latched_on_a_rigid_front_is_not_at_rest() -> None:
         backstop={"law": "rigid", "position": 0.0, "restitution": 0.2},
         waveform={"shape": "half-sine", "amplitude": "3 N", "width": 2e-3},
     )
-    motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform))
-    assert (motion.x[-1], motion.v[-1]) == (1e-3, 0.0)
-    assert "0.001 m from its rest position" in motion.unsettled
-    # No longer run can help.
-    assert "longer run" not in str(motion.summary())
+    with hammers.interpreted():
+        motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform))
+        assert (motion.x[-1], motion.v[-1]) == (1e-3, 0.0)
+        assert "0.001 m from its rest position" in motion.unsettled
+        # No longer run can help.
+        assert "longer run" not in str(motion.summary())
 
 
 @pytest.mark.parametrize("name", ["pot-magnet", "relay-5v", "pinball-flipper", "hendriks-1983"])

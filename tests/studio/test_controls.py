@@ -15,7 +15,7 @@ from printhammer.studio import bounds, controls
 from printhammer.units import to_si
 
 HAMMERS = [*shipped(), str(CRUDE)]
-RARE = {"dankowicz-schilder-2013", "pot-magnet"}
+RARE = {"dankowicz-schilder-2013"}
 """Hammers whose combination of laws no other fast test compiles."""
 
 

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.hammers import interpreted
 from tests.tangents import SHARP, deviation
 
 import printhammer as ph
@@ -29,7 +30,9 @@ def quiet(duration: float = 1.0) -> ph.SineForce:
 def test_a_free_mass_flies_from_stop_to_stop() -> None:
     """Every impact multiplies the speed by e: flights last play / (v e^n)."""
     play, speed, e = 2e-3, 0.5, 0.7
-    motion = ph.simulate(between(play, 0.0, e), quiet(), duration=0.2, state=(0.0, speed))
+    with interpreted():
+        motion = ph.simulate(between(play, 0.0, e), quiet(), duration=0.2, state=(0.0, speed))
+        energy = motion.energy
     times = np.cumsum([play / (speed * e**n) for n in range(20)])
     times = times[times < 0.2]
     assert len(times) == 8
@@ -39,8 +42,8 @@ def test_a_free_mass_flies_from_stop_to_stop() -> None:
     ] * (len(times) % 2)
     losses = [0.5e-3 * speed**2 * e ** (2 * n) * (1.0 - e**2) for n in range(len(times))]
     np.testing.assert_allclose([each.loss for each in motion.contacts], losses, rtol=1e-11)
-    assert motion.energy.pack_loss == pytest.approx(sum(losses[::2]), rel=1e-11)
-    assert motion.energy.backstop_loss == pytest.approx(sum(losses[1::2]), rel=1e-11)
+    assert energy.pack_loss == pytest.approx(sum(losses[::2]), rel=1e-11)
+    assert energy.backstop_loss == pytest.approx(sum(losses[1::2]), rel=1e-11)
 
 
 @pytest.mark.parametrize("e", [0.0, 0.4, 0.8])

@@ -57,8 +57,8 @@ def test_a_transient_is_left_out(hammer: "ph.Hammer") -> None:
     np.testing.assert_array_equal(late.v, whole.v[7:])
 
 
-@pytest.mark.parametrize("phase", [0.0, 0.3])
-def test_a_verdict_does_not_change_the_points(hammer: "ph.Hammer", phase: float) -> None:
+def test_a_verdict_does_not_change_the_points(hammer: "ph.Hammer") -> None:
+    phase = 0.3
     plain = ph.strobe(hammer, period="1.3 ms", points=20, phase=phase, verdict=False)
     judged = ph.strobe(hammer, period="1.3 ms", points=20, phase=phase)
     np.testing.assert_array_equal(judged.x, plain.x)
@@ -87,7 +87,7 @@ def test_a_train_that_hangs_up_is_judged_inside_the_pack(hammer: "ph.Hammer") ->
     assert found.verdict.period == 1
 
 
-@pytest.mark.parametrize("phase", [0.0, 0.1, 0.6])
+@pytest.mark.parametrize("phase", [0.0, 0.6])
 def test_forced_oscillation_is_a_fixed_point(phase: float) -> None:
     # m x'' + s x = A sin(w t) has the solution A / (s - m w^2) sin(w t).
     amplitude = AMPLITUDE / (STIFFNESS - MASS * OMEGA**2)
@@ -105,7 +105,7 @@ def test_forced_oscillation_is_a_fixed_point(phase: float) -> None:
     assert found.verdict.name == "period-1"
 
 
-@pytest.mark.parametrize(("turns", "period"), [(1, 3), (2, 5), (3, 2)])
+@pytest.mark.parametrize(("turns", "period"), [(2, 5), (3, 2)])
 def test_a_free_oscillation_on_top_has_its_own_period(turns: int, period: int) -> None:
     # The oscillator turns `turns` times in `period` periods of the drive; it is not damped.
     own = OMEGA * turns / period
