@@ -25,7 +25,7 @@ from printhammer.run.plain.posing import CYCLE
         ({"duration": float("inf")}, "expected a positive number"),
         ({"duration": "3 lbf"}, "lbf"),
         ({"state": (np.nan, 0.0)}, "expected two finite numbers"),
-        ({"state": (-1e-6, 0.0)}, "where the law of the magnet holds"),
+        ({"state": (-1e-6, 0.0)}, "where the laws of magnet and spring hold"),
         ({"times": []}, "times: expected ascending numbers"),
         ({"times": [1e-3, 0.0]}, "times: expected ascending numbers"),
         ({"times": [-1e-3, 0.0]}, "times: expected ascending numbers"),

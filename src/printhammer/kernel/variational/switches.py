@@ -343,8 +343,8 @@ def leave_at_edge(node: Any, pulse: int, piece: int, columns: Any, setting: Sett
 
     Until the edge, stop or friction balance the other forces: if the edge moves, the motion moves with it.
     """
-    forcing = setting.forcing
-    a = acceleration_at(node, int(node[3]), node[4], 0.0, setting.hammer, setting.drive)
+    hammer, drive, forcing = setting.hammer, driven(setting.drive, electric_at_node(node)), setting.forcing
+    a = acceleration_at(node, int(node[3]), node[4], 0.0, hammer, drive)
     for k in range(columns.shape[1]):
         columns[1, k] = -a * (forcing.fire_moves[k, pulse] + forcing.piece_moves[k, piece, 0])
 
