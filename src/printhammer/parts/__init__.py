@@ -15,7 +15,8 @@ coil      none: its circuit is the kernel's, `printhammer.kernel.model.circuit`
 spring    ``spring_force(c, x)``, ``spring_energy(c, x)``; a law whose slope jumps also ``LEVELS`` = True and
           ``spring_level(c, k)``, the position of the k-th jump; one that dissipates energy ``VISCOUS`` =
           True and ``spring_viscous(c, x, v)``, its force at the velocity v, 0 at rest;
-          if its slope jumps also ``spring_switch(c, v)``
+          if its slope jumps also ``spring_switch(c, v)``; for a web page, a law that does not hold
+          everywhere also ``spring_domain(q, ends)``, which narrows the range of displacements
 pack      ``MEMORY``, ``pack_loading(c, x, v)``, ``pack_memory(c, peak)``, ``pack_unloading(c, x, v, q)``,
           ``pack_switch(c, x, v)``; a rigid stop instead ``RIGID_FRONT`` = True and
           ``pack_rebound(c, v_in)``

@@ -26,32 +26,32 @@ from printhammer.parts.spring.forces import spring_packed as rows_packed
 __all__ = ["LEVELS", "spring_domain", "spring_energy", "spring_force", "spring_level", "spring_packed"]
 
 
-def spring_force(c: Any, x: float) -> float:
-    """Return the sum of all forces and contact forces, N, at `x`, m; NaN beyond the samples of a force."""
-    total = force_of_rows(c, x)
+def sum_of_curves(c: Any, x: float, integrated: bool) -> float:
+    """Return the sum of the sampled forces, N, or of the integrals, J, at `x`, m; NaN beyond the samples."""
+    total = 0.0
     at = 1 + WIDTH * int(c[0])
     first = at + 3
     for _ in range(int(c[at])):
         n = int(c[first - 2])
         if not c[first] <= x <= c[first + n - 1]:
             return math.nan
-        total += curve_at(c, first, n, c[first - 1] != 0.0, x)
+        straight = c[first - 1] != 0.0
+        if integrated:
+            total += integral_to(c, first, n, straight, x)
+        else:
+            total += curve_at(c, first, n, straight, x)
         first += 2 * n + 2
     return float(total)
+
+
+def spring_force(c: Any, x: float) -> float:
+    """Return the sum of all forces and contact forces, N, at `x`, m; NaN beyond the samples of a force."""
+    return force_of_rows(c, x) + sum_of_curves(c, x, False)
 
 
 def spring_energy(c: Any, x: float) -> float:
     """Return the sum of the potential energies, J; that of a sampled force is zero at its first sample."""
-    total = energy_of_rows(c, x)
-    at = 1 + WIDTH * int(c[0])
-    first = at + 3
-    for _ in range(int(c[at])):
-        n = int(c[first - 2])
-        if not c[first] <= x <= c[first + n - 1]:
-            return math.nan
-        total -= integral_to(c, first, n, c[first - 1] != 0.0, x)
-        first += 2 * n + 2
-    return float(total)
+    return energy_of_rows(c, x) - sum_of_curves(c, x, True)
 
 
 def spring_level(c: Any, k: float) -> float:
@@ -68,14 +68,14 @@ def spring_level(c: Any, k: float) -> float:
     return level_of_rows(c, float(left))
 
 
-def spring_domain(c: Any, ends: Any) -> None:
-    """Narrow a displacement range, m, to the samples of all sampled forces."""
-    at = 1 + WIDTH * int(c[0])
+def spring_domain(q: Any, ends: Any) -> None:
+    """Narrow a displacement range, m, to the samples of all forces; `q` holds the numbers of the part."""
+    at = 1 + WIDTH * int(q[0])
     first = at + 3
-    for _ in range(int(c[at])):
-        n = int(c[first - 2])
-        ends[0] = max(ends[0], c[first])
-        ends[1] = min(ends[1], c[first + n - 1])
+    for _ in range(int(q[at])):
+        n = int(q[first - 2])
+        ends[0] = max(ends[0], q[first])
+        ends[1] = min(ends[1], q[first + n - 1])
         first += 2 * n + 2
 
 
