@@ -130,8 +130,8 @@ class AxisTables:
     def to_header(self, tick: float | str = NANOSECOND, budget: int | None = None) -> str:
         """Render the tables as a C header with arrays indexed `[value][rate][history]`.
 
-        Values of a gap are in nanometres, values of other axes in millionths of the SI unit. A C function
-        interpolates between them.
+        Axis values that are lengths are in nanometres, other axis values in millionths of the SI unit. A C
+        function interpolates between them.
         """
         unit, first = checked_tick(tick), self.tables[0]
         rounded = self.quantised(unit).tables

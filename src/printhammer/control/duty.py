@@ -65,7 +65,7 @@ class DotHeat:
     on_time: float = 0.0
     """On-time of the driver per dot, s; 0 if unknown."""
     strike: str = "dot"
-    """Noun for a dot of the hammer; see `Hammer.strike`."""
+    """Word for the result of a pulse, such as "dot" or "closing"; see `Hammer.strike`."""
     lasts: float = 0.0
     """Time from the firing until the current has decayed to 1 % of its largest value, s; 0 if unknown."""
 
@@ -179,7 +179,7 @@ class ThermalDuty(Result, rows="ambient burst"):
 
     @property
     def strike(self) -> str:
-        """Noun for a dot of the hammer; see `Hammer.strike`."""
+        """Word for the result of a pulse, such as "dot" or "closing"; see `Hammer.strike`."""
         return self.heat.strike
 
     def summary(self) -> Summary:

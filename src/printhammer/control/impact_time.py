@@ -301,8 +301,8 @@ def errors_of(
 ) -> tuple[FloatArray, BoolArray]:
     """Return the errors of estimated impact times, s, and a mask of the estimates that are not flagged.
 
-    `records` are the signals and flight times from `unit_record`; dot number n uses record n modulo their
-    number.
+    `records` are the signals and flight times from `unit_record`; dot number n uses record n modulo the
+    number of records.
     """
     errors, believed = [], []
     for number in range(dots):

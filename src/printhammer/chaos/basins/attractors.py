@@ -34,7 +34,7 @@ REACH: Final = 0.99
 """Quantile of nearest-neighbour distances that is used as the reach of a strange attractor; arbitrary."""
 
 INSIDE: Final = 0.95  # Arbitrary
-"""Fraction of a train's points that have to lie within reach of a strange attractor for a match."""
+"""Smallest fraction of a train's points within reach of a strange attractor for the train to match."""
 
 ATTEMPTS: Final = 12
 """Maximum number of aperiodic trains followed in the search for strange attractors; arbitrary."""
@@ -66,7 +66,7 @@ class Cloud(NamedTuple):
 
     @classmethod
     def of(cls, points: FloatArray) -> Cloud:
-        """Build a cloud from successive points, shape (n, 2); distances between its halves give the reach."""
+        """Build a cloud of successive points, shape (n, 2); distances between both halves set the reach."""
         half = len(points) // 2
         apart, _ = cKDTree(points[:half]).query(points[half:])
         return cls(cKDTree(points), float(np.quantile(apart, REACH)))
@@ -77,7 +77,7 @@ class Cloud(NamedTuple):
         return np.asarray(np.isfinite(apart).mean(axis=-1) >= INSIDE)
 
     def equals(self, other: Cloud) -> bool:
-        """Whether two clouds, each within reach of the other cloud, represent the same attractor."""
+        """Whether two clouds represent one attractor: the points of each lie within reach of the other."""
         return bool(self.holds(other.tree.data) and other.holds(self.tree.data))
 
 
@@ -103,7 +103,7 @@ class Attractors:
         return other
 
     def judge(self, columns: Columns) -> IntArray:
-        """Return the index in `found` of the attractor of each train, -1 if unknown."""
+        """Return the index of each train's attractor in the list `found`; -1 if unknown."""
         cycles, _ = self._cycles(columns)
         places = np.full(len(columns), -1, np.int64)
         for q in np.unique(cycles[cycles > 0]).tolist():
@@ -189,7 +189,7 @@ class Attractors:
                     break
 
     def _within(self, points: FloatArray, rows: IntArray, place: int, places: IntArray) -> IntArray:
-        """Assign the trains whose points lie on a strange attractor; return the rows of the other trains."""
+        """Assign the trains that lie on a known strange attractor; return the rows of the other trains."""
         if not rows.size:
             return rows
         lies = self._clouds[place].holds(points[rows])

@@ -152,7 +152,7 @@ def uncertainty_exponent(labels: npt.ArrayLike) -> float:
 
 
 _FEWEST_DISTANCES: Final = 3
-"""Smallest number of distances for a fit of the exponent, since a line through two has no residual."""
+"""Smallest number of distances for a fit of the exponent, since a line fits two points exactly."""
 
 SAMPLE: Final = 256  # Arbitrary
 """Maximum number of cells recomputed at a tenth of the tolerance; never more than an eighth of all cells."""

@@ -278,7 +278,7 @@ def quench_map(
 
 
 def two_pulse_drives(first: Waveform, seconds: Sequence[Waveform], last: float) -> list[TwoPulseDrive]:
-    """Build one drive per second pulse, each firing `first` and then that pulse; runs last at most `last` s.
+    """Build one drive per second pulse: `first`, then that second pulse; runs last at most `last` s.
 
     A run begins at the time `begin` of its drive, in the rest state; times, s, count from there. The second
     pulse is fired after half of `last`; `with_firings` sets other times.
@@ -348,8 +348,8 @@ def _piece(
 def _highest(grid: FloatArray, x: FloatArray, after: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Find the largest local maximum of each sampled motion after a given time; return value and time.
 
-    The samples, shape (M, T), are evenly spaced; samples after the end of a run are NaN, and so is a maximum
-    that does not exist.
+    The samples, shape (M, T), are evenly spaced; samples after the end of a run are NaN. The result is NaN
+    for a run without such a maximum.
     """
     before, here, following = x[:, :-2], x[:, 1:-1], x[:, 2:]
     bend = before - 2.0 * here + following

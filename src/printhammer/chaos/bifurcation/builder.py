@@ -88,7 +88,7 @@ class Trains:
 
 
 def strands_of(rows: Sequence[int], first: int) -> list[Strand]:
-    """Divide rows of successive trains into strands of `STRAND` trains; `first` numbers the first strand."""
+    """Divide rows of successive trains into strands of `STRAND` trains, numbered from `first`."""
     cut = [list(rows[k : k + STRAND]) for k in range(0, len(rows), STRAND)]
     return [Strand(part, first + k - 1 if k else -1) for k, part in enumerate(cut)]
 
@@ -207,7 +207,7 @@ class DiagramBuilder:
         return list(range(first, len(self.values)))
 
     def rows(self, places: Sequence[int], way: int) -> list[int]:
-        """Return the table rows of the trains at given value indices, in the direction with index `way`."""
+        """Return the table rows of the trains at parameter values, by index, in direction number `way`."""
         return [len(self.ways) * place + way for place in places]
 
     def base(self, grid: FloatArray) -> None:

@@ -68,7 +68,7 @@ class Columns(Declared):
         return len(self.x)
 
     def handed(self, row: int) -> State:
-        """Return the final state of the train in a row, the initial state of the next train."""
+        """Return the final state of the train in a row, from which the next train starts."""
         return tuple(self.last[row].tolist())
 
 

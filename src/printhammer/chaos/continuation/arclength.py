@@ -34,7 +34,7 @@ _GROWTH: Final = 1.5  # Factor by which the step grows after an accepted step; a
 _LEAST_COSINE: Final = 0.97  # Arbitrary
 """Smallest cosine of the angle between successive tangents, below which the step is halved and repeated."""
 _FARTHEST: Final = 0.4  # Arbitrary
-"""Distance between predicted and corrected point, in steps, above which the step is rejected."""
+"""Distance between predicted and corrected point, relative to the step, above which a step is rejected."""
 _LEAP: Final = 1.0  # Arbitrary
 """Change of a multiplier in one step, relative to 1 + |multiplier|, above which the step is halved."""
 _SAME: Final = 1e-6
@@ -236,7 +236,7 @@ def _half(
 
 
 def _is_joined(follower: Corrector, here: Node, ahead: Node, length: float) -> bool:
-    """Whether a corrected point lies on the same curve as its predecessor: near, aligned, without a leap."""
+    """Whether a corrected point continues the curve: near the prediction, aligned, multipliers close."""
     predicted = follower.point(here) + length * here.tangent
     near = float(np.linalg.norm(follower.point(ahead) - predicted)) <= _FARTHEST * length
     return near and float(here.tangent @ ahead.tangent) >= _LEAST_COSINE and not _has_leap(here, ahead)

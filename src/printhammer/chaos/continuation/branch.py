@@ -120,7 +120,7 @@ def _grazing_of(point: BranchPoint) -> tuple[str, str]:
 
 
 def _is_parted(touches: list[Touch], length: float) -> bool:
-    """Whether two successive contacts are parts of one contact: the gap is shorter than every contact."""
+    """Whether two successive contacts are separated by a gap shorter than every contact, as after a split."""
     durations = [touch.t_out - touch.t_in for touch in touches]
     if len(touches) < 2 or min(durations) == 0.0:
         return False

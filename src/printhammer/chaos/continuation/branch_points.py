@@ -274,7 +274,7 @@ def _change(
     start: tuple[float, Node],
     margin: Callable[[Node], float] | None,
 ) -> tuple[float, tuple[Node, Node], bool]:
-    """Locate the first contact change in a step; return step fraction, nodes on both sides, convergence."""
+    """Locate the first contact change in a step; return step fraction, nodes on both sides, and success."""
     low, inside = start
     high, beyond = 1.0, ahead
     m_low = m_high = math.nan

@@ -29,7 +29,7 @@ _SPACING: Final = 1e-6  # Arbitrary
 _MUCH: Final = 1e3
 """Multiplier above which the parameter step of the finite difference is reduced in proportion; arbitrary."""
 _BESIDE: Final = 1e-7
-"""Finite-difference step of the state at gentle touches, in the scales of the run; arbitrary."""
+"""Finite-difference step of the state at gentle touches, in units of the run's scales; arbitrary."""
 _GENTLE: Final = 3e-4  # Arbitrary
 """Impact speed on the pack, relative to the speed scale, below which finite differences are used."""
 _IN_PACK: Final = f"{IN_PACK} at the section; another phase of the period can be chosen"

@@ -36,7 +36,7 @@ _CURRENT: Final = "with a voltage drive, the current at a touch belongs to the s
 _CLOSE: Final = 0.01  # Arbitrary
 """Time before and after an impact during which the surface is removed, as a fraction of the period."""
 _STILL: Final = 1e-9
-"""Speed at the section, relative to the speed scale, below which the orbit turns there; arbitrary."""
+"""Speed at a section, relative to the speed scale, below which the orbit counts as turning; arbitrary."""
 _SPACING: Final = 1e-6  # Finite-difference step of Newton's method, in scaled variables; arbitrary
 _ROUNDS: Final = 20  # Iteration limit of Newton's method; arbitrary
 _PRECISION: Final = 1e-12  # Scaled correction below which Newton's method has converged; arbitrary
@@ -264,8 +264,8 @@ def grazing_end(
 ) -> tuple[list[Node], float] | None:
     """Compute the last orbits of a branch before a final grazing, and the parameter at the grazing.
 
-    `node` is the last known orbit; if `impacts` is true, its turning points are ignored. None if the orbit is
-    not close to a grazing.
+    `node` is the last known orbit; if `impacts` is true, the orbit's turning points are ignored. None if the
+    orbit is not close to a grazing.
     """
     regime, width = family.regime.with_(family.name, node.parameter), float(scales[-1])
     every = near_touches(regime, node.state, family.firings, family.tolerance)

@@ -202,7 +202,7 @@ def _slope(radius: FloatArray, sums: FloatArray) -> float:
 
 
 def _plateau(slopes: FloatArray, tolerance: float) -> tuple[int, int] | None:
-    """Find the longest run of slopes within a tolerance, the flattest if tied; return its end indices."""
+    """Find the longest run of slopes within a tolerance, the flattest of equal length; return end indices."""
     best: tuple[int, float, int] | None = None
     for first in range(len(slopes)):
         least, most = math.inf, -math.inf

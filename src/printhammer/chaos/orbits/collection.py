@@ -69,7 +69,7 @@ def fewest_missing(sums: Mapping[int, int]) -> int:
 
 
 def indices_add_up(regime: Regime) -> bool:
-    """Whether the fixed-point indices sum to 1 by theory: without a pack, and with damping or a backstop."""
+    """Whether theory requires the fixed-point indices to sum to 1: no pack, and damping or a backstop."""
     hammer = regime.hammer
     return hammer.pack is None and (hammer.is_damped or hammer.backstop is not None)
 
@@ -158,8 +158,8 @@ class Orbits(Result):
         """Estimated lower bound on the number of orbits that the search missed.
 
         The larger of two bounds: f1 (f1 - 1) / (2 (f2 + 1)), with f1 and f2 the numbers of orbits reached
-        from exactly one and exactly two guesses (A. Chao, Scand. J. Statist. 11 (1984) 265); and the least
-        number of orbits that the fixed-point indices lack; see `fewest_missing`.
+        from exactly one and exactly two guesses (A. Chao, Scand. J. Statist. 11 (1984) 265); and the smallest
+        number of missing orbits implied by the fixed-point indices; see `fewest_missing`.
         """
         once, twice = self.hits.count(1), self.hits.count(2)
         return max(0.5 * once * max(once - 1, 0) / (twice + 1), float(fewest_missing(self.indices)))
@@ -168,7 +168,7 @@ class Orbits(Result):
     def indices(self) -> dict[int, int]:
         """Sums of the indices of the fixed points of the strobe map, by number of firings, ascending from 1.
 
-        See `index_sums`. Empty if no theorem states the sum.
+        See `index_sums`. Empty if no theorem gives the sum.
         """
         if not indices_add_up(self.regime) or any(orbit.kind == UNDECIDED for orbit in self.found):
             return {}
@@ -216,7 +216,7 @@ class Orbits(Result):
     def entries(self) -> dict[str, tuple[Column, Any]]:
         """Return the Dataset variables: properties over `orbit`, `firing` and `multiplier`.
 
-        Numbers beyond the last firing of an orbit are NaN, and the mode there is -1.
+        Values beyond the last firing of an orbit are NaN, and the mode there is -1.
         """
         number = Column("1", "number of the orbit", ("orbit",), "coordinate", name="orbit", dtype=np.int32)
         return {"orbit": (number, np.arange(len(self.found))), **stacked(self.found, "orbit", Orbit)}

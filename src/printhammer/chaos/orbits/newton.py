@@ -244,7 +244,7 @@ _PIECE: Final = 30_000
 
 
 class ExactMaps:
-    """Strobe map by single runs in threads, with derivatives from the tangent flow."""
+    """Strobe map evaluated by single runs in threads, with derivatives from the tangent flow."""
 
     def __init__(self, regime: Regime, effort: Effort) -> None:
         self.regime, self.effort = regime, effort.quiet
@@ -263,7 +263,7 @@ class ExactMaps:
 
 
 class FastMaps:
-    """Strobe map by one ensemble, up to `longest` firings, with finite-difference derivatives."""
+    """Strobe map evaluated as one ensemble, up to `longest` firings; finite-difference derivatives."""
 
     def __init__(self, regime: Regime, longest: int, effort: Effort) -> None:
         regime.check_planar()

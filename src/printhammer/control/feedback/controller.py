@@ -341,7 +341,7 @@ class Controller:
         return self.fronts.landing.settled + self.start.flight
 
     def _before_rest(self, loop: Loop, dot: int) -> int:
-        """Return the number of dots between a dot and the next time at rest."""
+        """Return the number of dots that follow a dot before the armature comes to rest again."""
         rests = np.flatnonzero(np.diff(loop.due[dot:]) >= self._rest)
         return int(rests[0]) if rests.size else max(len(loop.due) - dot - 1, 0)
 

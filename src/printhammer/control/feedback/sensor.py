@@ -77,7 +77,7 @@ class PositionSensor(Declared):
         return max(1, round(time / self.interval))
 
     def numbers(self, since: FloatArray, until: FloatArray, most: int) -> IntArray:
-        """Return the indices of the latest samples of each run in its time span, shape (M, most).
+        """Return the indices of each run's latest samples from `since` to `until`, s, shape (M, most).
 
         `until` is the time at which the samples are needed, so the latest sample is one delay older. The
         indices ascend, padded with -1 at the front.

@@ -121,7 +121,7 @@ class Launch:
 
 
 def launch(plant: Plant, forces: ForceMap) -> Launch:
-    """Compute the launch from rest that prints with `_ALMOST` times the single-pulse force.
+    """Compute the launch from rest whose touch, without a push, has 0.9 times the single-pulse force.
 
     A short push into the pack adds the missing force; its length is chosen once the impact speed is known.
     """

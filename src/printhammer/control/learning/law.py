@@ -193,8 +193,9 @@ def _judged_slots() -> tuple[int, ...]:
 
 
 PRINTED: Final = _judged_slots()
-"""Slots of the pattern that tables are tested with: the cycle with its lead-in, and rows of 200 slots, each
-from rest."""
+"""Slots of the pattern on which tables are tested: the cycle with its lead-in, and rows of 200 slots, each
+from rest.
+"""
 
 _BRIEF: Final = 24  # Number of slots of a row of `COMPARED`; arbitrary
 
@@ -267,7 +268,7 @@ class LearningLaw:
 
     @property
     def alone(self) -> float:
-        """Certainty of the open loop before a comparison: 1 if there is only one open loop, else NaN."""
+        """Certainty of the choice of open loop before a comparison: 1 for a single open loop, else NaN."""
         return 1.0 if len(self.entries.loops) == 1 else float("nan")
 
     def update(self, belief: Belief, corrections: FloatArray, unexplained: FloatArray) -> Printing[Update]:

@@ -38,7 +38,7 @@ _LATE: Final = (
 
 
 class Mean(NamedTuple):
-    """Mean normalised readings of dots, and numbers of readings: a row of times, a row of forces if any."""
+    """Mean normalised readings of dots, and counts: a row of times and, if measured, a row of forces."""
 
     value: FloatArray  # Mean readings; NaN where no dot was detected
     seen: FloatArray  # Number of readings in each mean
@@ -50,8 +50,8 @@ class Learner:
     An open loop is used during the first stage. Later stages use an open loop in three cases: no hammer of
     the production explains the readings; more posterior samples than the doubt allows would print fewer dots
     within limits with the table than in open loop, or a row in which errors grow; or the mean gain is below
-    2 % of the dots. The open loop used prints more dots over the production than the other, unless the
-    readings of the unit in both open loops show that the other open loop prints more dots.
+    2 % of the dots. Of the two open loops, the learner uses the loop that prints more dots over the
+    production, unless the readings of the unit in both loops show that the other loop prints more.
 
     Parameters
     ----------

@@ -56,7 +56,7 @@ class Production:
 
     @property
     def size(self) -> int:
-        """Length of a parameter row: number of varying constants and of sensor errors."""
+        """Length of a parameter row: number of varying constants plus number of sensor errors."""
         return self.constants + self.measured + 1
 
     @property

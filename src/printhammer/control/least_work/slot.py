@@ -160,7 +160,7 @@ class Task:
         )
 
     def end(self, begin: SlotState, currents: FloatArray, duration: float) -> SlotState:
-        """Return the state after a slot with the given currents (nodes,), A."""
+        """Return the state at the end of a slot with given nodal currents, A, shape (nodes,)."""
         path = np.concatenate([[begin.current], currents])[np.newaxis]
         ensemble = self._ensemble(begin, path, duration, self.tolerance)
         return end_of(ensemble, duration, float(currents[-1]))

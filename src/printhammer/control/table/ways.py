@@ -169,7 +169,7 @@ class Ways(NamedTuple):
 
 
 def joined(parts: Iterable[Ways]) -> Ways:
-    """Concatenate several sets of candidates into one, which may be empty."""
+    """Concatenate several sets of candidates into a single set, which may be empty."""
     return Ways(*map(np.concatenate, zip(ways_of([]), *parts, strict=True)))
 
 

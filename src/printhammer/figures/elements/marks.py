@@ -113,7 +113,7 @@ def place_lines(ax: Axes, hammer: Hammer, shown: Scale, side: Literal["x", "y"] 
 
 
 def closed(ax: Axes, motion: Motion, time: Scale, way: Scale, colour: str) -> None:
-    """Draw a bar at the position of an additional contact wherever the contact is closed."""
+    """Draw a bar at the position of an additional contact whenever the contact is closed."""
     at = places(motion.hammer)
     for closing in motion.closings:
         end = motion.end if closing.t_out is None else closing.t_out

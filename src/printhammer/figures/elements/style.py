@@ -96,9 +96,9 @@ def in_style() -> AbstractContextManager[None]:
 
 
 def styled(function: Callable[_P, Figure]) -> Callable[_P, Figure]:
-    """Decorate a drawing function: apply the style `RC` and the hammer's noun for a dot to its figure.
+    """Decorate a drawing function: apply the style `RC` and the hammer's word for a dot to its figure.
 
-    The noun is the attribute `strike` of an argument: a hammer, a result or a frequency-time map.
+    The word is the attribute `strike` of an argument: a hammer, a result or a frequency-time map.
     """
 
     @wraps(function)
@@ -115,7 +115,7 @@ def styled(function: Callable[_P, Figure]) -> Callable[_P, Figure]:
 
 
 def _name_strikes(figure: Figure, strike: str) -> None:
-    """Replace the noun "dot" in all texts of a figure by the noun for the impacts of its hammer."""
+    """Replace the word "dot" in all texts of a figure by the hammer's word for the result of a pulse."""
     from matplotlib.text import Text
 
     for text in figure.findobj(Text):

@@ -25,7 +25,7 @@ _CHOICES = {
     "spring": ("LEVELS", "VISCOUS"),
     "damping": ("FRICTION",),
 }
-"""Choices that the module of a part sets, by role."""
+"""Names of the compile-time choices that the module of a part defines, by role."""
 
 
 class Bindings(NamedTuple):

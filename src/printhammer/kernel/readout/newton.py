@@ -189,7 +189,7 @@ def accept(images: Any, scales: Any, orbit: Any, search: Any) -> None:
 
 
 def is_aimed(images: Any, scales: Any, orbit: Any) -> bool:
-    """Write the Newton step of each state, clipped to `LONGEST_STEP`; return False if singular.
+    """Write the Newton step of each state, clipped to `LONGEST_STEP`; return False if the system is singular.
 
     The step of state i + 1 is J_i d_i + e_i with the defect e_i; around the orbit, d_0 = M d_0 + c. Arrays
     as for `improve`.

@@ -54,7 +54,7 @@ def clear_dots(dots: Any) -> None:
 def open_dot(
     dots: Any, extra: int, surface: int, initial: bool, t: float, v: float, firings: Any
 ) -> tuple[int, int]:
-    """Assign a contact that begins at time `t` with velocity `v` to its firing; start its row of dots.
+    """Assign a contact that begins at time `t` with velocity `v` to its firing; start its row of dot data.
 
     Returns
     -------
@@ -82,7 +82,7 @@ def open_dot(
 
 @compiled
 def deepen_dot(dots: Any, row: int, x: float, hammer: Hammer) -> None:
-    """Update depth and force in a row of dots if a reversal at displacement `x` [m] is the deepest so far."""
+    """Update depth and force in a row of dot data if a reversal at `x` [m] is the deepest so far."""
     if not dots[row, D.DEPTH] >= x - hammer[FRONT]:
         dots[row, D.DEPTH] = x - hammer[FRONT]
         dots[row, D.FORCE] = -pack_force(x, 0.0, LOADING, 0.0, hammer)
@@ -108,7 +108,7 @@ def note_dots(
     train: Train,
     hammer: Hammer,
 ) -> int:
-    """Write the pack contacts of one segment of a run to the rows of dots of a member.
+    """Write the pack contacts of one segment of a run to the rows of dot data of a member.
 
     Returns the number of extra contacts of the member including this segment; `extra` is the number before.
     """

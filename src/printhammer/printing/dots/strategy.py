@@ -39,7 +39,7 @@ FIRST_SLOT: Final = 1e-3
 def eight_slot_patterns() -> BoolArray:
     """Return the 255 patterns of eight slots with at least one dot, shape (255, 8), read-only.
 
-    Row n holds the binary digits of n + 1, the most significant one in slot 0.
+    Row n holds the binary digits of n + 1, the most significant digit in slot 0.
     """
     numbers = np.arange(1, 2**SLOTS)
     rows: BoolArray = (numbers[:, np.newaxis] >> np.arange(SLOTS - 1, -1, -1)) & 1 == 1
@@ -51,7 +51,7 @@ def eight_slot_patterns() -> BoolArray:
 def de_bruijn(order: int = SLOTS) -> BoolArray:
     """Return a binary de Bruijn cycle, which contains every word of `order` slots exactly once.
 
-    The cycle is the lexicographically smallest one: the concatenation of the Lyndon words whose length
+    The cycle is the lexicographically smallest such cycle: the concatenation of the Lyndon words whose length
     divides the order (H. Fredricksen and J. Maiorana, Discrete Math. 23 (1978) 207). The order is 1 to 16,
     the shape (2**order,); read-only.
     """

@@ -220,8 +220,8 @@ def fill_supply(constants: Any, limits: Any, about: Any, out: Any) -> int:
     about : float64 array, shape (14,)
         Numbers about the pulse; see `printhammer.drive.tables.pulse`.
     out : float64 array, shape (4,)
-        Of a weak hold: the hold current and the largest current, A, voltage, V, resistance, ohm. Of a falling
-        linkage: inductance of the coil and least inductance, H, place, m.
+        For a weak hold: hold current and largest current, A, voltage, V, resistance, ohm. For a falling
+        linkage: inductance of the coil and least inductance, H, displacement, m.
 
     Returns
     -------
@@ -279,8 +279,8 @@ def fill_scales(
     tolerance : float
         Tolerance of the run.
     out : float64 array, shape (8,)
-        Control: scales, m and m/s, and two allowances. Bounds: range of the law of the magnet, origin, and
-        distance of a runaway, m.
+        Control: scales, m and m/s, and tolerances of the two error estimates. Bounds: range of the law of the
+        magnet, origin, and distance of a runaway, m.
     """
     s = statics_at(constants, limits)
     current, push = largest, 0.0
