@@ -52,23 +52,7 @@ ROOMS = (
     "sweep",
     "units",
 )
-HASHED = (
-    "buzz_losses",
-    "candidates",
-    "cloud_losses",
-    "evaluation",
-    "losses",
-    "map_losses",
-    "panel_losses",
-    "space",
-)
-"""Modules of the search whose text is hashed into its logs: changing a docstring would invalidate these."""
-
-STUDIES = tuple(
-    module
-    for module in sorted((ROOT / "studies").rglob("*.py"))
-    if not (module.parent.name == "search" and module.stem in HASHED)
-)
+STUDIES = tuple(sorted((ROOT / "studies").rglob("*.py")))
 PAGES = (
     "README.md",
     *(str(page.relative_to(ROOT)) for page in sorted((ROOT / "docs").glob("*.md"))),

@@ -1,7 +1,8 @@
-"""How far candidates are from buzz printing, Fig. 7: trains whose pulses follow each leaving of the pack.
+"""Loss of candidates for buzz printing, Fig. 7: trains in which each pulse follows a departure from the pack.
 
-For a row of delays a train of nine pulses is built, all side by side. Of six dots in a row each counts for
-as much as its force is within limits, and a touch of the backstop between two of them takes away half a dot.
+For each of several delays, a train of nine pulses is simulated; all trains form one ensemble. The score of
+six successive dots is the sum of the scores of their forces, 1 for a force within limits, minus half a dot
+for each backstop touch between two dots.
 """
 
 from __future__ import annotations
@@ -28,32 +29,32 @@ if TYPE_CHECKING:
     from studies.reconstruction.search.losses import Score
 
 DELAYS: Final = np.arange(0.0, 240e-6, 6e-6)
-"""Delays tried, s."""
+"""Trial delays from the departure from the pack to the next firing, s."""
 
 PULSES: Final = 9
 _GRID: Final = 8e-6
-"""Step of the times at which a touch of the backstop is looked for, s."""
+"""Sampling interval in the search for backstop touches, s."""
 
 _NEAR: Final = 0.8
-"""What a dot just outside the limits counts."""
+"""Score of a dot just outside the limits."""
 
 _TOO_STRONG: Final = 0.5
-"""How far above the upper limit a dot counts nothing, in units of the single-pulse force."""
+"""Excess over the upper limit at which the score of a dot is 0, in units of the single-pulse force."""
 
 _TOUCH: Final = 0.5
 _RESERVE: Final = 0.005
-"""By how much forces are to be within the limits of the claim."""
+"""Margin of the force limits in the search, inside the limits of the claim."""
 
 
 def buzz(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
-    """Look at trains of nine pulses, each a delay after the leaving of the pack, with touches between."""
+    """Compute the loss of buzz printing from trains with a constant delay after each pack contact."""
     band = claims()["buzz_printing"].band
     fewest: int = band["dots"]["at_least"]
     low = band["least_force_over_single"]["at_least"] + _RESERVE
     high = band["largest_force_over_single"]["at_most"] - _RESERVE
     for score in scores:
         score.losses["buzz_printing"] = 1.0
-    # A dot that does not end has no train that follows it.
+    # No train can follow a pack contact that does not end.
     both = [
         (candidate, score)
         for candidate, score in zip(chosen, scores, strict=True)
@@ -68,7 +69,7 @@ def buzz(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
         def hopeless(
             dots: DotTable, numbers: list[int], forces: FloatArray = forces
         ) -> npt.NDArray[np.bool_]:
-            """Tell which trains have too many dots outside the limits for six in a row to be left."""
+            """Mask of the trains with too many dots outside the limits for six good successive dots."""
             relative = dots.peak_force / forces[numbers][:, np.newaxis]
             inside = (relative >= low) & (relative <= high)
             count = inside.shape[1]
@@ -101,7 +102,7 @@ def _judged(
     forces: FloatArray,
     limits: tuple[float, float],
 ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-    """Return what each dot of each train counts, and whether the backstop is touched before it."""
+    """Score each dot of each train; return scores, and a mask of dots that follow a backstop touch."""
     drives = [
         PulseTrain(some[row // len(DELAYS)].waveform, at=list(times)) for row, times in enumerate(trains)
     ]
@@ -127,7 +128,7 @@ def _judged(
 
 
 def _longest(inside: npt.NDArray[np.bool_]) -> int:
-    """Return the length of the longest run of truth."""
+    """Return the length of the longest run of True values."""
     best = run = 0
     for each in inside.tolist():
         run = run + 1 if each else 0
@@ -136,7 +137,7 @@ def _longest(inside: npt.NDArray[np.bool_]) -> int:
 
 
 def _best(counts: FloatArray, touched: npt.NDArray[np.bool_], fewest: int) -> float:
-    """Return the most that so many dots in a row count, touches between them taken off."""
+    """Return the best score of `fewest` successive dots, less the deduction for backstop touches."""
     sums = [
         float(counts[first : first + fewest].sum() - _TOUCH * touched[first + 1 : first + fewest].sum())
         for first in range(max(len(counts) - fewest, 0) + 1)

@@ -1,4 +1,4 @@
-"""Candidates: points of the search space made into hammers that print the stroke of the paper."""
+"""Candidates: hammers with the stroke of the paper, computed from points of the search space."""
 
 from __future__ import annotations
 
@@ -30,58 +30,59 @@ if TYPE_CHECKING:
     from studies.reconstruction.search.space import Shape
 
 TOLERANCE: Final = 2e-10
-"""Tolerance of the search; what it finds is judged at the default one."""
+"""Integration tolerance of the search; candidates are judged later, at the default tolerance. Arbitrary."""
 
 SINGLE: Final = 2e-3
-"""Time within which a single pulse has printed, s."""
+"""Duration of a run in which a single pulse has printed, s; arbitrary."""
 
 _MASS: Final = 4e-4
 _STIFFNESS: Final = 220.0
-"""First guess of the stiffness of the pack for that mass, N."""
+"""Initial guess of the stiffness of the pack for the mass `_MASS`, N."""
 
 _ROUNDS: Final = 6
 _CLOSE: Final = 0.1e-6
 _LONGEST: Final = math.log(30.0)
-"""Largest change of the logarithm of the stiffness from one round to the next."""
+"""Largest change of the logarithm of the stiffness in one iteration."""
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A hammer of the search space with the printed stroke."""
+    """Candidate: hammer of the search space with the printed stroke."""
 
     point: FloatArray
-    """Shares of the ranges of the variables."""
+    """Values of the variables, as fractions of their ranges."""
     constants: dict[str, float]
-    """Of the hammer file, SI."""
+    """Constants of the hammer file, SI, by key."""
     hammer: Hammer
     rest: float
     """Displacement at rest, m."""
 
     @property
     def waveform(self) -> Waveform:
-        """The current of one firing."""
+        """Current waveform of one firing."""
         waveform = self.hammer.waveform
         assert waveform is not None
         return waveform
 
     @property
     def state(self) -> tuple[float, float]:
-        """Displacement and velocity at rest."""
+        """Displacement, m, and velocity, m/s, at rest."""
         return self.rest, 0.0
 
 
 def candidates(points: Sequence[FloatArray], shape: Shape = "rectangle") -> list[Candidate | None]:
-    """Make hammers of points; None where the armature has no rest, does not print, or not with that stroke.
+    """Compute the hammer of each point; None if the point has no hammer that prints with the stroke.
 
-    The forces are scaled to the mass by the variables, so that the stroke is a matter of the stiffness of the
-    pack over the mass alone; that is solved for, and then everything scaled to the print force.
+    The variables determine the forces relative to the mass, so that the stroke depends only on the ratio of
+    pack stiffness to mass. The ratio is solved for, then mass and forces are scaled to the print force. A
+    point has no hammer if the armature has no rest position, or if no stiffness gives the printed stroke.
 
     Parameters
     ----------
     points : sequence of arrays
-        Shares of the ranges of the variables.
+        Values of the variables, as fractions of their ranges.
     shape : str, optional
-        Of the current of a firing, one of `SHAPES`.
+        Shape of the current waveform, one of `SHAPES`.
     """
     found: list[Candidate | None] = [None] * len(points)
     values = [values_at(point) for point in points]
@@ -102,7 +103,7 @@ def candidates(points: Sequence[FloatArray], shape: Shape = "rectangle") -> list
 def _stiffnesses(
     values: Sequence[dict[str, float]], rests: dict[int, float], shape: Shape
 ) -> dict[int, float]:
-    """Return the stiffnesses of the pack at which hammers of a fixed mass have the printed stroke."""
+    """Solve for the pack stiffnesses, N, with which hammers of the mass `_MASS` have the printed stroke."""
     wanted = math.log(geometry()["top"] - geometry()["xp"])
     guess = dict.fromkeys(rests, math.log(_STIFFNESS))
     before: dict[int, tuple[float, float]] = {}
@@ -129,7 +130,7 @@ def _stiffnesses(
             if abs(miss) < close:
                 found[i] = math.exp(guess.pop(i))
                 continue
-            # Energy alone: the indentation goes with the stiffness to the power -1 / (n + 1).
+            # By the energy balance, the indentation grows as the stiffness to the power -1 / (n + 1).
             slope = -1.0 / (LOADING_EXPONENT + 1.0)
             if i in before:
                 secant = (miss - before[i][1]) / (guess[i] - before[i][0])

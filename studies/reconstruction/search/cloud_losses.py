@@ -1,7 +1,8 @@
-"""How far the panels of Fig. 11 that should be strange are from clouds that fill the single-pulse orbit.
+"""Losses of the strange panels of Fig. 11: depth and extent of the clouds of strobe points.
 
-Two numbers of the first strobe points: how deep behind the backstop the deepest lies, and over what share of
-the orbit of a single pulse, in the phase plane scaled to the window of Fig. 11, the points of a panel spread.
+The depth is that of the deepest of the first strobe points behind the backstop. The extent is the fraction of
+the single-pulse orbit near which the points of a panel lie, in the phase plane scaled to the window of
+Fig. 11.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from studies.reconstruction.search.candidates import Candidate
 
 _FIRST: Final = 100
-"""Points left out of the extent of a cloud, half of those that the paper plots: the transient from rest."""
+"""Number of first points excluded from a cloud, the transient from rest: half of those plotted."""
 
 _ORBIT_TIME: Final = 3e-3
 _ORBIT_POINTS: Final = 1501
@@ -34,14 +35,14 @@ _PIECES: Final = 36
 """Number of pieces of equal length into which the orbit is divided; arbitrary."""
 
 _SHARE: Final = 0.9
-"""Share of the length of the orbit that is looked at; the last tenth winds closely about the rest state."""
+"""Fraction of the orbit's length that counts; the last tenth winds closely about the rest state."""
 
 _WANTED: Final = 0.6
-"""Share of the pieces that a cloud is to meet: arbitrary, about that of the widest clouds known."""
+"""Fraction of the orbit's pieces that a cloud should cover; arbitrary, as for the widest clouds."""
 
 
 def clouds(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
-    """Look at how far the strobe points of the strange panels spread, and how deep they lie."""
+    """Compute the losses for extent and depth of the strobe points of the strange panels."""
     settings = claims()["poincare_window"].settings
     low, high = claims()["behind_the_backstop"].band["depth_m"]
     periods = [period for period, verdict in printed_verdicts().items() if verdict == "strange"]
@@ -64,7 +65,7 @@ def clouds(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
 
 
 def _orbit(candidate: Candidate) -> FloatArray:
-    """Return the orbit after the first touch of a single pulse in half-widths of the window, shape (n, 2)."""
+    """Simulate the single-pulse orbit from its first backstop touch, in window half-widths, shape (n, 2)."""
     motion = simulate(
         candidate.hammer,
         PulseTrain(candidate.waveform),
@@ -79,7 +80,7 @@ def _orbit(candidate: Candidate) -> FloatArray:
 
 
 def _extent(x: FloatArray, v: FloatArray, orbit: FloatArray) -> float:
-    """Return the share of the pieces of an orbit that points, m and m/s, are nearest to."""
+    """Return the fraction of the pieces of an orbit that are nearest to any of the points, m and m/s."""
     from scipy.spatial import cKDTree
 
     _, half = window()

@@ -1,13 +1,15 @@
-"""Scores of many points: the stages one after the other, in as many processes as there are."""
+"""Evaluation of points: the stages of the losses in sequence, in parallel processes."""
 
 from __future__ import annotations
 
+import ast
 import hashlib
 from functools import cache
 from itertools import repeat
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
+from printhammer.kernel.compile.bindings import syntax_text
 from studies.reconstruction.search.buzz_losses import buzz
 from studies.reconstruction.search.candidates import candidates
 from studies.reconstruction.search.cloud_losses import clouds
@@ -24,9 +26,10 @@ if TYPE_CHECKING:
     from studies.reconstruction.search.space import Shape
 
 Aim = Literal["stated", "all", "panels", "buzz", "claims"]
-"""Which claims lead a search: those of kind "stated" alone; those of kind "shape" too; with these, a panel of
-Fig. 11 as much as a claim; with these, buzz printing before all; or all of these and what Figs. 8, 9 and 11
-look like."""
+"""Claims that guide a search: claims of kind "stated" only; also claims of kind "shape"; in addition each
+panel of Fig. 11 with the weight of a claim; in addition buzz printing with a large weight; or all of these
+and the appearance of Figs. 8, 9 and 11.
+"""
 
 AIMS: Final[tuple[Aim, ...]] = get_args(Aim)
 
@@ -66,29 +69,32 @@ WEIGHTS: Final[dict[str, dict[str, float]]] = {
         "clouds": 4.0,
     },
 }
-"""Weights of the losses: first come the stated claims outside Fig. 11, which are conditions of all else; a
-claim of kind "shape" counts for as much as three panels of Fig. 11, or two where the panels lead. Buzz
-printing counts for the two claims that are about it."""
+"""Weights of the losses. The stated claims outside Fig. 11 have the largest weights, since all other claims
+depend on them. A claim of kind "shape" has the weight of three panels of Fig. 11, or of two for the aim
+"panels". Buzz printing has the weight of the two claims that concern it. Arbitrary.
+"""
 
 STEPS: Final[dict[Aim, float]] = {"stated": 0.0, "all": 0.0, "panels": 0.0, "buzz": 0.0, "claims": 0.3}
-"""What a claim that just fails counts, in parts of its weight: where the number of claims is to be large, two
-that nearly hold are worth less than one that does."""
+"""Loss of a claim that just fails, as a fraction of its weight: if the number of claims that hold has to be
+large, two claims that nearly hold are worth less than one that holds."""
 
 PIECE: Final = 64
-"""Points that one process looks at together."""
+"""Number of points that one process evaluates together; arbitrary."""
 
 _WORST_SINGLE: Final = 1.6
 _WORST_PAIRS: Final = 3.0
 _WORST_BUZZ: Final = 4.0
 _FEWEST_PANELS: Final = 5
-"""Panels of Fig. 11 as printed from which on a map is looked at."""
+"""Number of correct panels of Fig. 11 from which the losses of the map are computed."""
 
 
 @cache
 def losses_digest() -> str:
-    """Return a digest of the sources that decide on the losses, so that logs of different ones do not mix."""
-    digest = hashlib.sha256()
-    for name in (
+    """Return a digest of the code that computes the losses; logs of searches with other losses do not mix.
+
+    Docstrings, comments and layout do not affect the digest.
+    """
+    names = (
         "space",
         "candidates",
         "losses",
@@ -97,15 +103,16 @@ def losses_digest() -> str:
         "map_losses",
         "cloud_losses",
         "evaluation",
-    ):
-        digest.update(Path(__file__).with_name(f"{name}.py").read_bytes())
-    return digest.hexdigest()[:16]
+    )
+    modules = (Path(__file__).with_name(f"{name}.py").read_text("utf-8") for name in names)
+    code = "\n".join(syntax_text(ast.parse(module)) for module in modules)
+    return hashlib.sha256(code.encode()).hexdigest()[:16]
 
 
 def evaluate(
     points: Sequence[FloatArray], aim: Aim, shape: Shape = "rectangle"
 ) -> list[tuple[Candidate | None, Score]]:
-    """Score points, shares of the ranges of the variables, by the claims of an aim in this thread."""
+    """Score points, as fractions of the ranges of the variables, by the claims of an aim, in this thread."""
     weights = WEIGHTS[aim]
     found = candidates(points, shape)
     scores = [Score() for _ in points]
@@ -151,7 +158,7 @@ def evaluate(
 
 
 def rows(points: Sequence[FloatArray], aim: Aim, shape: Shape = "rectangle") -> list[dict[str, Any]]:
-    """Score points, each as a row of the log."""
+    """Score points; return one row of the log per point."""
     found = []
     for point, (candidate, score) in zip(points, evaluate(points, aim, shape), strict=True):
         found.append(
@@ -169,7 +176,7 @@ def rows(points: Sequence[FloatArray], aim: Aim, shape: Shape = "rectangle") -> 
 def scored(
     points: Sequence[FloatArray], aim: Aim, pool: Executor | None, shape: Shape = "rectangle"
 ) -> list[dict[str, Any]]:
-    """Score points, each as a row of the log, in the order given, whatever the number of processes."""
+    """Score points; return rows of the log in the order of the points, for any number of processes."""
     pieces = [points[start : start + PIECE] for start in range(0, len(points), PIECE)]
     pieced = map if pool is None else pool.map
     return [row for piece in pieced(rows, pieces, repeat(aim), repeat(shape)) for row in piece]

@@ -1,8 +1,8 @@
-"""How far candidates are from what the paper tells, in numbers without jumps where that is possible.
+"""Losses of candidates: distances from the claims of the paper, continuous where possible.
 
-A loss is 0 where the claim holds and at most 1. They are found in stages, dear ones only for candidates that
-did well in the cheap ones; what was not looked at counts 1. Verdicts are those of the claims alone, at the
-default tolerance: a loss only leads the search.
+A loss is 0 if the claim holds, and at most 1. Losses are computed in stages: expensive losses only for
+candidates with small losses in the cheap stages; a loss that is not computed counts as 1. Losses only guide
+the search: the verdicts are those of the claims, at the default tolerance.
 """
 
 from __future__ import annotations
@@ -38,42 +38,42 @@ _GRID: Final = 1e-6
 _SETTLED: Final = 3.5e-3
 _COARSE: Final = 4e-6
 _RISE: Final = 0.1
-"""Rank correlation of restitution with the order of the touches that is aimed at."""
+"""Rank correlation between restitution and order of the touches above which the loss is 0."""
 
 _STABLE: Final = 2.3
-"""Longest stable step of Runge-Kutta over the time scale of an oscillation, with some reserve."""
+"""Longest stable step of the Runge-Kutta method over the time scale of an oscillation, with a margin."""
 
 _STEP: Final = 10e-6
-"""Step of the times between two pulses, s."""
+"""Step of the trial times between two pulses, s."""
 
 _REACH: Final = 200e-6
-"""How far from its place, in time between pulses, a quench still counts for something, s."""
+"""Distance from the printed time at which a quench no longer reduces the loss, s."""
 
 _CLEAR: Final = 0.06
-"""Part of the way to the pack by which later pulses go beyond its front."""
+"""Smallest overshoot of later pulses beyond the pack front, as a fraction of the way to the pack."""
 
 _CLEARLY: Final = 0.002
-"""Part of the way to the pack by which a quenched pulse stays short of it."""
+"""Smallest distance by which a quenched pulse misses the pack, as a fraction of the way to the pack."""
 
 _LATE: Final = 100e-6
-"""How much too late, for the second current, the armature may rise to be of some use to the search, s."""
+"""Delay of the armature's rise after the second current at which the loss is largest, s."""
 
 _SHORTER: Final = 25e-6
-"""How much less than asked the flight of the second dot may be shorter to be of some use to the search, s."""
+"""Shortfall of the flight-time gain of the second dot at which the loss is largest, s."""
 
 _TAIL: Final = 1e-3
-"""Time after the second of two pulses within which its peak lies, s."""
+"""Time after the second of two pulses within which its displacement peak lies, s."""
 
 CHUNK: Final = 64
 _BURST_RATES: Final = 32
 _SLOW_BURST: Final = 2000.0
-"""Rate of the slowest burst looked at, Hz; what is hung up is looked for from the fastest down."""
+"""Rate of the slowest simulated burst, Hz; hang-up is sought from the fastest burst downward."""
 
 _PULSES: Final = 9
 
 
 def hinge(excess: float, scale: float) -> float:
-    """Return 0 where nothing is in excess, and 1 from one scale on; 1 where it is not known."""
+    """Return the excess over the scale, clipped to the range 0 to 1; 1 for an unknown excess (NaN)."""
     if math.isnan(excess):
         return 1.0
     return min(max(excess / scale, 0.0), 1.0)
@@ -81,15 +81,15 @@ def hinge(excess: float, scale: float) -> float:
 
 @dataclass
 class Score:
-    """What is known of a candidate."""
+    """Losses and measured values of a candidate."""
 
     losses: Losses = field(default_factory=dict)
-    """Loss of each claim looked at so far."""
+    """Loss of each claim evaluated so far, by name."""
     measured: dict[str, Any] = field(default_factory=dict)
-    """Numbers behind them, for the log."""
+    """Values from which the losses were computed, for the log."""
 
     def total(self, weights: dict[str, float], step: float = 0.0) -> float:
-        """Return the weighted sum; what is not known counts in full, what just fails the `step` or more."""
+        """Return the weighted sum of losses; an unknown loss counts as 1, a nonzero loss at least `step`."""
         return sum(
             weight * (step + (1.0 - step) * loss if (loss := self.losses.get(name, 1.0)) > 0.0 else 0.0)
             for name, weight in weights.items()
@@ -99,14 +99,14 @@ class Score:
 def run_all(
     chosen: Sequence[Candidate], drives: Sequence[Drive], ends: Sequence[float], repeat: int, **wanted: Any
 ) -> EnsembleResult:
-    """Run each candidate from rest under so many drives, in this thread."""
+    """Run every candidate from rest under `repeat` drives each, in this thread."""
     hammers = [candidate.hammer for candidate in chosen for _ in range(repeat)]
     states = [candidate.state for candidate in chosen for _ in range(repeat)]
     return Ensemble(hammers, list(drives), ends, states=states, tolerance=TOLERANCE).run(threads=1, **wanted)
 
 
 def statics(candidate: Candidate, score: Score) -> None:
-    """Look at the force of magnet and spring alone: return from everywhere, release margin."""
+    """Compute the losses of the static force: return from everywhere, release margin, 1983 time step."""
     place, hammer = geometry(), candidate.hammer
     held = holding_margin(hammer, np.linspace(place["b"], place["platen"], 48))
     magnet = candidate.constants["magnet.Am"] ** 2 / math.sqrt(place["b"]) - candidate.constants["magnet.F0"]
@@ -117,7 +117,8 @@ def statics(candidate: Candidate, score: Score) -> None:
         share - claims()["release_margin"].band["net_over_magnet_force"]["at_most"], 0.4
     )
     score.measured["margin"] = share
-    # The schedule of 1983 is stable at rest in the backstop only if that is soft enough for its longest step.
+    # The schedule of 1983 is stable at rest in the backstop only if the backstop is soft enough for its
+    # longest step.
     depth = geometry()["b"] - candidate.rest
     frequency = math.sqrt(1.5 * share * magnet / (depth * candidate.constants["mass"]))
     step = frequency * claims()["integrator_comparison"].settings["late_settle_step_s"]
@@ -126,7 +127,7 @@ def statics(candidate: Candidate, score: Score) -> None:
 
 
 def single_pulse(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
-    """Look at the single pulse: contacts with the pack, settle-out."""
+    """Compute the losses of the single pulse: contacts with the pack, and settle-out."""
     for start in range(0, len(chosen), CHUNK):
         some, own = chosen[start : start + CHUNK], scores[start : start + CHUNK]
         drives = [PulseTrain(candidate.waveform) for candidate in some]
@@ -177,7 +178,7 @@ def _settling(x: npt.NDArray[np.float32], score: Score) -> None:
 
 
 def _loudness(x: npt.NDArray[np.float32], touch: int, score: Score) -> None:
-    """Compare the largest acceleration in the backstop with the largest one elsewhere."""
+    """Compute the loss for the ratio of the largest acceleration in the backstop to that elsewhere."""
     size = np.abs(np.diff(x.astype(np.float64), 2))
     inside = x[1:-1] < np.float32(geometry()["b"])
     at_stop = inside & (np.arange(1, len(x) - 1) >= touch)
@@ -188,7 +189,7 @@ def _loudness(x: npt.NDArray[np.float32], touch: int, score: Score) -> None:
 
 
 def _pair_gaps() -> tuple[FloatArray, int, int]:
-    """Return ascending times between two pulses, s, and the places of the quenched and the caught one."""
+    """Return trial times between two pulses, s, ascending, and the indices of the printed 660 and 700 us."""
     quenched = claims()["two_pulses_660us"].settings["interval_s"]
     caught = claims()["two_pulses_700us"].settings["interval_s"]
     slowest = 1.0 / claims()["second_dot_lost"].settings["first_rate_Hz"]
@@ -198,13 +199,13 @@ def _pair_gaps() -> tuple[FloatArray, int, int]:
 
 
 def pairs(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
-    """Look at two pulses: quench, catch on the rise, and no loss of the second dot at longer times."""
+    """Compute the losses of two pulses: quench, catch on the rise, and second dots at longer times."""
     gaps, quenched, caught = _pair_gaps()
     for start in range(0, len(chosen), CHUNK):
         some, own = chosen[start : start + CHUNK], scores[start : start + CHUNK]
         drives = [PulseTrain(candidate.waveform, at=[0.0, gap]) for candidate in some for gap in gaps]
         tails = np.full(len(gaps), _TAIL)
-        # The second excursion of the caught one is to be complete.
+        # The excursion after the caught pulse has to be complete.
         tails[caught] = TAIL
         ends = np.tile(gaps + tails, len(some))
         half = half_times(some)
@@ -238,12 +239,12 @@ def pairs(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
 
 
 def half_times(some: Sequence[Candidate]) -> list[float]:
-    """Return the times after the firing at which the currents first reach half their peaks, s."""
+    """Return the time after the firing, s, at which each current first reaches half of its peak."""
     return [half_rise(candidate.waveform) for candidate in some]
 
 
 def _peak_after(x: npt.NDArray[np.float32], times: FloatArray, gap: float) -> float:
-    """Return the largest local maximum after the second firing, m; NaN where there is none."""
+    """Return the largest local maximum after the second firing, m; NaN without a maximum."""
     later = x[np.searchsorted(times, gap) :]
     later = later[np.isfinite(later)]
     tops = later[1:-1][(later[1:-1] >= later[:-2]) & (later[1:-1] > later[2:])]
@@ -251,7 +252,7 @@ def _peak_after(x: npt.NDArray[np.float32], times: FloatArray, gap: float) -> fl
 
 
 def _judge_quench(score: Score, gaps: FloatArray, peaks: FloatArray, place: int) -> None:
-    """Take as loss how far in time the nearest quenched second pulse is from the printed one."""
+    """Compute the loss of the quench: distance in time of the nearest quenched second pulse."""
     front, way = geometry()["xp"], geometry()["xp"] - geometry()["b"]
     miss = (peaks - front) / way
     score.measured["quench"] = None if math.isnan(miss[place]) else float(miss[place])
@@ -269,16 +270,16 @@ def _judge_quench(score: Score, gaps: FloatArray, peaks: FloatArray, place: int)
 
 
 def _late(x: npt.NDArray[np.float32], times: FloatArray, moment: float) -> float:
-    """Return how long after a moment a falling armature is first on the rise, s; infinite for never."""
+    """Return the delay, s, from a moment until the armature first rises; infinite if it never rises."""
     first = int(np.searchsorted(times, moment))
     up = np.flatnonzero(np.diff(x[first:]) > 0.0)
     return float(times[first + up[0]] - moment) + _COARSE if up.size else math.inf
 
 
 def _judge_later(score: Score, peaks: FloatArray, force: float, flight: FloatArray, late: float) -> None:
-    """Look at the pulse that is caught on the rise, `late` or in time, and at all later ones."""
+    """Compute the losses of the second pulse caught on the rise, and of all later second pulses."""
     front, way = geometry()["xp"], geometry()["xp"] - geometry()["b"]
-    # A second pulse that never turns back is as good as one that stays in the backstop.
+    # A second pulse without a displacement peak counts like a pulse whose armature stays in the backstop.
     miss = np.where(np.isnan(peaks), -1.0, (peaks - front) / way)
     band = claims()["two_pulses_700us"].band
     low, high = band["second_over_first_peak_force"]
@@ -292,7 +293,7 @@ def _judge_later(score: Score, peaks: FloatArray, force: float, flight: FloatArr
         + 0.3 * hinge(wanted - gain, _SHORTER)
         + (0.0 if score.measured["complete"] else 0.3),
     )
-    # With a reserve, since what is lost between the times looked at counts as well.
+    # With a margin, since a dot lost between two trial times counts as well.
     score.losses["second_dot_lost"] = hinge(_CLEAR - float(miss.min()), _CLEAR + 0.5)
     score.measured |= {
         "ratio": ratio,
@@ -303,7 +304,7 @@ def _judge_later(score: Score, peaks: FloatArray, force: float, flight: FloatArr
 
 
 def hung(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
-    """Look at fast bursts: whether the armature stays off the backstop, and how weak the impacts are."""
+    """Compute the losses of fast bursts: hang-up, and weak impacts while hung up."""
     settings = claims()["hang_up_at_high_rate"].settings
     top = claims()["weak_prints_when_hung_up"].band["largest_force_over_single"]["at_most"]
     must = claims()["hang_up_at_high_rate"].band["hang_up_rate_Hz"]["at_most"]
@@ -342,7 +343,7 @@ def hung(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
                 )
                 depth = _deepest_distinct(x, times, drives[row].times) - xp
                 strong.append(max(depth / (geometry()["top"] - xp), 0.0) ** LOADING_EXPONENT)
-            # From the fastest down, as long as all hang up.
+            # From the fastest burst downward, as long as every burst hangs up.
             reach = len(free)
             while reach > 0 and free[reach - 1]:
                 reach -= 1
@@ -355,7 +356,7 @@ def hung(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
 
 
 def _deepest_distinct(x: npt.NDArray[np.float32], times: FloatArray, firings: FloatArray) -> float:
-    """Return how far distinct impacts after the first go, m; 0 where there are none."""
+    """Return the largest displacement of distinct impacts after the first, m; 0 without such an impact."""
     inside = x > geometry()["xp"]
     starts = np.flatnonzero(inside[1:] & ~inside[:-1]) + 1
     if len(starts) < 2:
@@ -366,5 +367,5 @@ def _deepest_distinct(x: npt.NDArray[np.float32], times: FloatArray, firings: Fl
 
 
 def _highest(drive: PulseTrain) -> float:
-    """Return about the largest current of a train, A."""
+    """Return the approximate largest current of a train, A, from 400 samples."""
     return float(np.abs(drive.value(np.linspace(0.0, float(drive.times[-1]) + 1e-3, 400))).max())

@@ -1,4 +1,4 @@
-"""How far candidates are from the frequency-time map of Figs. 8 and 9: erratic between two calm regions."""
+"""Losses for the frequency-time map of Figs. 8 and 9: an erratic band between two regular ranges of rates."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
     from studies.reconstruction.search.losses import Score
 
 _GRID: Final = 10.0
-"""Difference of neighbouring rates, Hz; the claim takes half of it."""
+"""Step of the rates, Hz; twice that of the claim."""
 
 _SPACING: Final = 20e-6
-"""Time between samples of a displacement record, s."""
+"""Sampling interval of a displacement record, s."""
 
 
 def sensitivity(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
-    """Look at how much more the record changes per hertz in the erratic band than in the slow one."""
+    """Compute the loss for the sensitivity of the record to the rate, in the erratic band over low rates."""
     settings = claims()["map_sensitivity"].settings
     wanted = claims()["map_sensitivity"].band["erratic_over_low"]["at_least"]
     onset = claims()["order_of_onset"].settings["flight_time_spread_s"]
@@ -59,7 +59,7 @@ def sensitivity(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
 
 
 def region(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
-    """Look at the share of neighbouring rates between which a late dot changes at once."""
+    """Compute the loss for the fraction of neighbouring rates between which a late dot changes."""
     claim = claims()["chaotic_region"]
     wanted = claim.band["erratic_share"]["at_least"]
     rates = rates_of(claim.settings)

@@ -1,8 +1,8 @@
-"""How far the panels of Fig. 11 are from their printed verdicts, as far as short trains tell.
+"""Losses of the panels of Fig. 11: deviation from the printed classifications, from short trains.
 
-A verdict jumps; what leads the search does not. Where a train settles that should be strange, the sooner it
-settles, the larger the loss. Where a train wanders that should be periodic, the orbit of that period is found
-by Newton's method all the same, and the more it repels, the larger the loss.
+A classification changes abruptly, the loss does not. If a train settles that should be strange, the loss is
+larger the sooner the train settles. If a train does not settle that should be periodic, the orbit of the
+printed period is found by Newton's method, and the loss grows with the multiplier of this orbit.
 """
 
 from __future__ import annotations
@@ -30,39 +30,39 @@ if TYPE_CHECKING:
     from studies.reconstruction.search.candidates import Candidate
 
 FIRINGS: Final = 360
-"""Firings of each panel in the search; the claims themselves are about more."""
+"""Number of firings of each panel in the search; the claims use more."""
 
 HARD: Final = (1.35e-3, 1.2e-3, 1.1e-3, 0.9e-3)
-"""Strobe times of the panels that the fewest hammers have as printed, s: these are looked at first."""
+"""Strobe times, s, of the panels that the fewest hammers reproduce; these panels are evaluated first."""
 
 _WORST_HARD: Final = 2.6
-"""Sum of their losses beyond which the others are not looked at."""
+"""Sum of the losses of the hard panels above which the other panels are not evaluated."""
 
 PATIENT: Final = 2000
-"""Firings after which a panel has settled, as the claim has it."""
+"""Number of firings within which a periodic panel settles, as in the claim."""
 
 _PROMISING: Final = 7
-"""Panels as printed from which on those that wander are looked at patiently: many settle late."""
+"""Number of correct panels from which strange panels are simulated for longer, since many settle late."""
 
 _POINTS: Final = 200
-"""Points of a panel whose successive ones are to be apart."""
+"""Number of points of a panel whose successive distances are compared."""
 
 _AGREE: Final = 1e-8
-"""Distance, in half-widths of the window, from which on a train counts as settled."""
+"""Distance, in half-widths of the window, below which a train counts as settled."""
 
 _LAST: Final = 40
 _LONGEST: Final = 16
 _ROUNDS: Final = 6
 _NUDGE: Final = 1e-6
-"""Difference of states that tells the derivative of the strobe map, in half-widths of the window."""
+"""Finite-difference step of the derivative of the strobe map, in half-widths of the window."""
 
 _FOUND: Final = 1e-6
 _REPELS: Final = 30.0
-"""Multiplier of a periodic orbit from which on its loss is the largest."""
+"""Multiplier of a periodic orbit above which its loss is largest."""
 
 
 def panels(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
-    """Look at the panels of Fig. 11 and their window: at all of them where the hard ones do well."""
+    """Compute the losses of the panels of Fig. 11 and of their window, the hard panels first."""
     printed = printed_verdicts()
     hard = [period for period in printed if round(period, 9) in HARD]
     rest = [period for period in printed if period not in hard]
@@ -98,7 +98,7 @@ def panels(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
 
 
 def _wait(candidate: Candidate, losses: dict[float, float], names: dict[float, str]) -> None:
-    """Look for longer at panels that are strange as printed; what settles after all takes another loss."""
+    """Simulate correctly strange panels for longer; replace the losses of panels that settle late."""
     periods = [
         period for period, wanted in printed_verdicts().items() if names[period] == wanted == "strange"
     ]
@@ -109,7 +109,7 @@ def _wait(candidate: Candidate, losses: dict[float, float], names: dict[float, s
 
 
 def _successive(ratios: dict[float, float]) -> float:
-    """Return how far the panels that should be strange are from points that jump about."""
+    """Compute the loss for the distance of successive points in the panels that should be strange."""
     claim = claims()["successive_points_apart"]
     wanted = claim.settings["least_ratio"]
     strange = sorted(
@@ -119,7 +119,7 @@ def _successive(ratios: dict[float, float]) -> float:
 
 
 def _ratio(states: FloatArray) -> float:
-    """Return the median distance of successive points over that of any two; 0 where all are the same."""
+    """Return the median distance of successive points over that of all pairs; 0 for equal points."""
     from scipy.spatial.distance import pdist
 
     points = states[:_POINTS, :2] / _scales()[:2]
@@ -130,7 +130,7 @@ def _ratio(states: FloatArray) -> float:
 def _looked_at(
     some: Sequence[Candidate], periods: Sequence[float], firings: int = FIRINGS
 ) -> list[tuple[list[float], list[str], list[float], list[float]]]:
-    """Return for each candidate losses and verdicts of panels, shares inside the window, and `_ratio`."""
+    """Simulate panels; return each candidate's losses, classifications, fractions in window, and ratios."""
     printed = printed_verdicts()
     drives = [
         PulseTrain(candidate.waveform, period=period, pulses=firings + 1)
@@ -162,9 +162,9 @@ def _looked_at(
 
 
 def _repelled(multiplier: float) -> float:
-    """Return the loss of a panel in which an orbit with that multiplier should have been reached."""
+    """Return the loss of a panel whose periodic orbit exists, with a given multiplier, but is not reached."""
     if multiplier <= 1.0:
-        # It attracts, but not from rest.
+        # The orbit attracts nearby states, but not the train from rest.
         return 0.3
     return 0.4 + 0.5 * min(math.log(multiplier) / math.log(_REPELS), 1.0)
 
@@ -180,7 +180,7 @@ def _least_share() -> float:
 
 
 def _share(states: FloatArray) -> float:
-    """Return the share of the strobe points that lie inside the window."""
+    """Return the fraction of the strobe points inside the window of Fig. 11."""
     settings = claims()["poincare_window"].settings
     (left, right), (low, high) = settings["window_x_m"], settings["window_v_m_per_s"]
     x, v = states[: settings["points"], 0], states[: settings["points"], 1]
@@ -188,9 +188,9 @@ def _share(states: FloatArray) -> float:
 
 
 def _panel(states: FloatArray, branch: npt.NDArray[np.int64], printed: str) -> tuple[float, str, int]:
-    """Return loss and name of the verdict that a short train suggests, and the period of an orbit to seek.
+    """Classify a short train; return loss, classification, and the period of an orbit to find.
 
-    The last is 0 unless the loss is to be that of an orbit which the train does not settle on.
+    The period is 0 unless the loss depends on an orbit to which the train does not settle.
     """
     scales = _scales()
     late = repeats(states[-_LAST:], branch[-_LAST:], scales, _LONGEST)
@@ -205,13 +205,13 @@ def _panel(states: FloatArray, branch: npt.NDArray[np.int64], printed: str) -> t
         return 0.4 + 0.6 * _haste(states, scales, int(near[0]) + 1), name, 0
     period = int(printed.rpartition("-")[2])
     if name == "period-1" and period == 2:
-        # The sooner it settles, the farther from doubling.
+        # The sooner the train settles, the farther it is from a period doubling.
         return 0.5 + 0.5 * _haste(states, scales, 1), name, 0
     return 1.0, name, period
 
 
 def _haste(states: FloatArray, scales: FloatArray, period: int) -> float:
-    """Return how soon states that far apart agree: 1 for at once, 0 for not before the end."""
+    """Return a measure of how soon states a period apart agree: 1 for at once, 0 for never."""
     apart = np.abs((states[period:] - states[:-period]) / scales).max(axis=1)
     agree = np.flatnonzero(apart < _AGREE)
     count = int(agree[0]) + 1 if agree.size else len(states)
@@ -219,7 +219,7 @@ def _haste(states: FloatArray, scales: FloatArray, period: int) -> float:
 
 
 def _closest(states: FloatArray, period: int) -> FloatArray:
-    """Return displacement and velocity where the train came closest to repeating."""
+    """Return displacement, m, and velocity, m/s, where the train came closest to repeating."""
     apart = np.abs((states[period:, :2] - states[:-period, :2]) / _scales()[:2]).max(axis=1)
     return np.asarray(states[int(np.nanargmin(apart)), :2] if np.isfinite(apart).any() else states[0, :2])
 
@@ -227,10 +227,11 @@ def _closest(states: FloatArray, period: int) -> FloatArray:
 def _multipliers(
     some: Sequence[Candidate], periods: Sequence[float], wandering: Sequence[tuple[int, int, int, FloatArray]]
 ) -> list[float]:
-    """Return the largest multiplier of each orbit, by absolute value; NaN where none is found.
+    """Compute the largest absolute multiplier of each orbit; NaN for an orbit that is not found.
 
-    Newton's method on the strobe map, its derivative by differences, from the states given. What is left of
-    the current at the next firing is left out, which is nothing that could be seen at these periods.
+    Newton's method is applied to the strobe map, with finite-difference derivatives, from the states in
+    `wandering`. The remainder of the current at the next firing is neglected, which has no visible effect at
+    these periods.
     """
     if not wandering:
         return []
@@ -272,7 +273,7 @@ def _after(
     wanted: Sequence[tuple[int, int, int, FloatArray]],
     starts: FloatArray,
 ) -> FloatArray:
-    """Return displacement and velocity after one period of each orbit, three starts for each."""
+    """Compute displacement and velocity after one period of each orbit, from three initial states each."""
     hammers, drives, ends = [], [], []
     for k, j, period, _state in wanted:
         train = PulseTrain(some[k].waveform, period=periods[j], pulses=period)

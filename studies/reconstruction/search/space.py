@@ -1,8 +1,9 @@
-"""The space in which the 1983 hammer is sought: ten numbers that decide on its motion.
+"""Search space of the hammer of 1983: ten variables that determine its motion.
 
-Mass and all forces scale together without a change of the motion, and so do the current and 1 / Bm. Both
-scales are set by what the paper prints of such hammers, "about five pounds per dot", and by the currents of
-its Fig. 2; the stiffness of the pack follows from the first. The mass follows from the stroke.
+Multiplying mass and all forces by one factor does not change the motion, nor does multiplying the current and
+1 / Bm by one factor. The first factor is set by the print force of the paper, "about five pounds per dot",
+which determines the stiffness of the pack; the second by the currents of Fig. 2. The mass follows from the
+stroke.
 """
 
 from __future__ import annotations
@@ -30,48 +31,48 @@ CURRENT: Final = 1.0
 """Largest current of a pulse, which sets the scale of Bm, A: the middle of the range of Fig. 2."""
 
 BEYOND: Final = 1.05
-"""By which factor the current that would undo the magnet's field is at least beyond the range of Fig. 2."""
+"""Smallest ratio of the current that cancels the magnet's field to the largest current of Fig. 2."""
 
 LOADING_EXPONENT: Final = 2.7
 """Exponent of the loading branch of the pack, equation (5)."""
 
 Shape = Literal["rectangle", "trapezoid", "half-sine"]
 SHAPES: Final[tuple[Shape, ...]] = get_args(Shape)
-"""Waveforms among which hammers are sought."""
+"""Waveform shapes of the hammers that are searched for."""
 
 _FALL: Final = 3.0
-"""Duration of the fall of a trapezoid over the time constant that stands for it in the search."""
+"""Ratio of the fall time of a trapezoid to the time constant `decay` that represents it in the search."""
 
 _HALF_SINE: Final = 1.5
-"""Duration of a half sine over the width that stands for it in the search."""
+"""Ratio of the duration of a half sine to the variable `width` that represents it in the search."""
 
 _SOURCE: Final = "found by search for the behaviour that the paper tells"
 
 
 @dataclass(frozen=True)
 class Variable:
-    """One number of the search."""
+    """Variable of the search."""
 
     name: str
-    """What it is called in the log."""
+    """Name of the variable in the log."""
     low: float
     high: float
     """Ends of the range of plausible values, SI."""
     logarithmic: bool
-    """Whether values are spread evenly over the logarithm."""
+    """Whether the values are evenly spaced on a logarithmic scale."""
     unit: str
-    """SI unit, empty for a ratio."""
+    """SI unit; empty for a ratio."""
     meaning: str
-    """What it is."""
+    """Meaning of the variable in one phrase."""
 
     def value(self, share: FloatArray) -> FloatArray:
-        """Return the values at shares of the range, from 0 to 1."""
+        """Return the values at fractions of the range, from 0 to 1."""
         if self.logarithmic:
             return np.asarray(self.low * (self.high / self.low) ** share, dtype=np.float64)
         return np.asarray(self.low + (self.high - self.low) * share, dtype=np.float64)
 
     def share(self, value: float) -> float:
-        """Return the share of the range at which a value lies."""
+        """Return the position of a value within the range, as a fraction."""
         if self.logarithmic:
             return math.log(value / self.low) / math.log(self.high / self.low)
         return (value - self.low) / (self.high - self.low)
@@ -89,16 +90,16 @@ VARIABLES: Final = (
     Variable("depth", 0.05e-6, 10e-6, True, "m", "compression of the backstop at rest"),
     Variable("damping", 0.05, 8.0, True, "s/m", "l / k of the backstop"),
 )
-"""What is varied; ranges are those of hammers of this kind and size, generously."""
+"""Variables of the search, with generous ranges for hammers of this kind and size; arbitrary."""
 
 
 def point_of(values: Mapping[str, float]) -> FloatArray:
-    """Return the point, in shares of the ranges, at which the variables have given values."""
+    """Convert values of the variables to a point: fractions of the ranges."""
     return np.array([variable.share(values[variable.name]) for variable in VARIABLES])
 
 
 def values_at(point: FloatArray) -> dict[str, float]:
-    """Return the values of the variables at a point given in shares of the ranges."""
+    """Convert a point, fractions of the ranges, to values of the variables."""
     return {
         variable.name: float(variable.value(np.asarray(share)))
         for variable, share in zip(VARIABLES, point, strict=True)
@@ -107,7 +108,7 @@ def values_at(point: FloatArray) -> dict[str, float]:
 
 @cache
 def geometry() -> dict[str, float]:
-    """Return what the paper prints of the geometry: b, xp, d, platen and the stroke's top, m."""
+    """Return the printed geometry, m: backstop b, pack front xp, pack thickness d, platen, stroke top."""
     band = claims()["geometry"].band
     low, high = claims()["single_pulse_stroke"].band["max_displacement_m"]
     return {
@@ -120,7 +121,7 @@ def geometry() -> dict[str, float]:
 
 
 def _reached(width: float, rise: float) -> float:
-    """Return the part of its amplitude that a pulse reaches."""
+    """Return the fraction of its amplitude that a rectangular pulse with exponential rise reaches."""
     return -math.expm1(-width / rise)
 
 
@@ -129,11 +130,11 @@ def _variable(name: str) -> Variable:
 
 
 def _waveform(values: Mapping[str, float], current: float, shape: Shape) -> dict[str, float]:
-    """Return the constants of a waveform whose largest current is given, A.
+    """Return the constants of a waveform with a given largest current, A.
 
-    Of a trapezoid the width is the time from the firing to the end of its top, of which the straight rise
-    takes the share that the variable `rise` has of its range; its fall takes three times `decay`. Of a half
-    sine only the width counts, two thirds of its duration.
+    For a trapezoid, `width` is the time from the firing to the end of its top; the straight rise takes the
+    fraction of this time at which the variable `rise` lies in its range, and the fall takes three times
+    `decay`. For a half sine, only `width` counts, which is two thirds of its duration.
     """
     width = values["width"]
     if shape == "half-sine":
@@ -155,7 +156,7 @@ def _waveform(values: Mapping[str, float], current: float, shape: Shape) -> dict
 
 
 def shape_of(constants: Mapping[str, float]) -> Shape:
-    """Return the shape of the waveform that constants of a hammer file describe; the rectangle if none."""
+    """Return the waveform shape of constants of a hammer file; by default a rectangle."""
     if "waveform.fall" in constants:
         return "trapezoid"
     return "half-sine" if "waveform.width" in constants and "waveform.decay" not in constants else "rectangle"
@@ -164,9 +165,9 @@ def shape_of(constants: Mapping[str, float]) -> Shape:
 def constants_at(
     values: Mapping[str, float], mass: float, stiffness: float, shape: Shape = "rectangle"
 ) -> dict[str, float]:
-    """Return the constants of a hammer file, SI, for values of the variables and any scale of mass.
+    """Convert values of the variables to constants of a hammer file, SI, for any scale of the mass.
 
-    The mass of the armature is in kg, the stiffness of the pack in N; `shape` is that of the current.
+    `mass` is the mass of the armature, kg, `stiffness` that of the pack, N, and `shape` the waveform shape.
     """
     b = geometry()["b"]
     current = max(CURRENT, values["release"] * BEYOND * largest_current())
@@ -189,14 +190,14 @@ def constants_at(
 
 
 def _pulse_values(constants: Mapping[str, float]) -> tuple[float, float, float, float]:
-    """Return width, rise and decay as the search has them, s, and the largest current of the pulse, A."""
+    """Return the search variables of a waveform: width, rise and decay, s, and its largest current, A."""
     amplitude, width = constants["waveform.amplitude"], constants["waveform.width"]
     shape = shape_of(constants)
     if shape == "rectangle":
         rise, decay = constants["waveform.rise"], constants["waveform.decay"]
         return width, rise, decay, amplitude * _reached(width, rise)
     if shape == "half-sine":
-        # What does not count for it lies in the middle of its range.
+        # Variables without effect on a half sine are set to the middle of their ranges.
         rise, decay = (float(_variable(name).value(np.asarray(0.5))) for name in ("rise", "decay"))
         return width / _HALF_SINE, rise, decay, amplitude
     whole = width + constants["waveform.rise"]
@@ -205,7 +206,7 @@ def _pulse_values(constants: Mapping[str, float]) -> tuple[float, float, float, 
 
 
 def values_of(constants: Mapping[str, float]) -> dict[str, float]:
-    """Return the values of the variables for the constants of a hammer file, SI."""
+    """Convert the constants of a hammer file, SI, to values of the variables."""
     b = geometry()["b"]
     field = constants["magnet.Am"] ** 2
     magnet_force = field / math.sqrt(b) - constants["magnet.F0"]
@@ -231,7 +232,7 @@ def largest_current() -> float:
 
 
 def printing_stiffness() -> float:
-    """Return the stiffness of a pack that meets the print force at the printed stroke, N.
+    """Return the stiffness of the pack with which the printed stroke gives the print force, N.
 
     Equation (5) at the turning point: force = AiEp ((top - xp) / d)^2.7.
     """
@@ -249,7 +250,7 @@ _UNITS: Final = {
 
 @cache
 def template(shape: Shape = "rectangle") -> Hammer:
-    """Return a hammer with the geometry of the paper, its other constants to be replaced."""
+    """Return a hammer with the geometry of the paper; its other constants are placeholders."""
     wave: dict[str, Any] = {"shape": shape}
     for name, unit in _UNITS[shape].items():
         wave[name] = {"value": 1.0, "unit": unit, "status": "reconstructed", "source": _SOURCE}
@@ -257,6 +258,6 @@ def template(shape: Shape = "rectangle") -> Hammer:
 
 
 def hammer_of(constants: Mapping[str, float], **names: Any) -> Hammer:
-    """Return the hammer with the constants found, SI, and the geometry of the paper."""
+    """Build the hammer with given constants, SI, and the geometry of the paper."""
     kind = template(shape_of(constants))
     return kind.replace({**constants, **names}, status="reconstructed", source=_SOURCE)
