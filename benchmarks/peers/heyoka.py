@@ -184,7 +184,7 @@ class Single:
         self.state, self.parameters = self.integrator.state, self.integrator.pars
 
     def switch(self, which: int, _lane: int) -> bool:
-        """Answer a callback."""
+        """Process an event of the run; return whether the run continues."""
         return self.lane.switch(which, self.state, self.parameters)
 
     def _begin(self, end: float) -> None:
@@ -252,7 +252,7 @@ class Batch:
         self.ends = np.full((len(tasks), 2), np.nan)
 
     def switch(self, which: int, lane: int) -> bool:
-        """Answer a callback."""
+        """Process an event of the run in a lane; return whether any lane still runs."""
         state, parameters = self.views[lane]
         member = self.members[self.at[lane]]
         if member.switch(which, state, parameters):

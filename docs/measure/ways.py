@@ -1,9 +1,9 @@
 """Compare three strategies to drive a hammer: open loop, a compensation table, and feedback.
 
-Run ``.venv/bin/python docs/measure/ways.py [HAMMER] [--rate RATE]``. The script measures the dots
-within limits on a page of several lines at each rate, and the deviations of the second of two dots for
-all distances, which takes a few minutes. With ``--picture FILE``, it only draws one line printed with
-each strategy at the last rate: the figure of the README, ``docs/images/ways.png``.
+Run ``.venv/bin/python docs/measure/ways.py [HAMMER] [--rate RATE]``. The script measures the dots within
+limits on a page of several lines at each rate, and the deviations of the second of two dots for a range of
+gaps, which takes a few minutes. With ``--picture FILE``, it only draws one line printed with each strategy at
+the last rate: the figure of the README, ``docs/images/ways.png``.
 """
 
 import argparse
