@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 _ABSENT = {"magnet": "", "spring": "", "pack": "", "backstop": "", "absent": "printhammer.parts.absent"}
 _MODULES = "PRINTHAMMER_MODULES"
 """Environment variable with a folder of lowered modules, which are then not lowered again."""
+_COMPILED = "PRINTHAMMER_COMPILED"
+"""Environment variable with the shipped hammers whose machine code is compiled; all of them without it."""
 _LOWER = "--lower"
 """Option of this file as a program: write the lowered modules only."""
 _MOST_WORKERS = 8
@@ -109,10 +111,10 @@ def compiled_code() -> Files:
     hammers = [load(name) for name in shipped()]
     # A textbook oscillator has no pulse of its own, and is driven by a force.
     drives = [PulseTrain(each.waveform) if each.waveform else SineForce(1.0, 1.0) for each in hammers]
-    posed = [(problem.laws_of(*pair), pair[1]) for pair in zip(hammers, drives, strict=True)]
+    posed = [(*each, problem.laws_of(*each)) for each in zip(hammers, drives, strict=True)]
     # The longest compilations, those with a circuit, begin first: the processes then end together.
-    posed.sort(key=lambda pair: not pair[0].circuit)
-    yield from (web(entries.page_module(laws)) for laws, _drive in posed)
+    posed.sort(key=lambda each: not each[2].circuit)
+    yield from (web(entries.page_module(laws)) for _hammer, _drive, laws in posed)
     # In a page, a current or a voltage can drive the coil.
     coils = [each for each in hammers if each.magnet is not None and each.magnet.has_linkage]
     for quantity in ("voltage", "current"):
@@ -120,7 +122,10 @@ def compiled_code() -> Files:
     # Processors of the level COMMON share their machine code; that of others runs nowhere else.
     if link.processor()[1] != link.COMMON:
         return
-    for laws, drive in posed:
+    wanted = os.environ.get(_COMPILED, " ".join(shipped())).split()
+    for hammer, drive, laws in posed:
+        if hammer.name not in wanted:
+            continue
         kernel = specialise(laws)
         _rates, kinds = closed_form(drive.kernel_arrays()[2])
         kernels = [variational(kernel, forced=True), variational(kernel, forced=False), kernel]

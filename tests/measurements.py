@@ -1,6 +1,7 @@
 """Tables of measurements for tests, by formulas written down here once more."""
 
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 
 import mpmath
@@ -62,6 +63,7 @@ def pack(
     return {"indentation": np.concatenate(depths), "force": np.concatenate(forces)}, branch
 
 
+@cache
 def rebound(speed: float) -> float:
     """Solve the restitution law by the Lambert function."""
     with mpmath.workdps(40):

@@ -19,7 +19,8 @@ import printhammer as ph
 from printhammer.parts.backstop import hertz
 
 PYTHONS = os.environ.get("PRINTHAMMER_PYTHONS", sys.executable).split(os.pathsep)
-CUBIC = Path(__file__).parents[1] / "examples" / "cubic_spring.py"
+ROOT = Path(__file__).parents[1]
+CUBIC = ROOT / "examples" / "cubic_spring.py"
 
 VERBS = """
 import contextlib, io, sys
@@ -85,6 +86,10 @@ def result_of(python: str, code: str, folder: Path) -> Any:
 @pytest.mark.slow
 @pytest.mark.parametrize("python", PYTHONS)
 def test_shipped_hammers_need_no_numba(python: str, tmp_path: Path) -> None:
+    if python != sys.executable:
+        # The wheel of tests/test_packaging.py holds the machine code of two hammers only.
+        (wheel,) = (ROOT / "build" / "wheel").glob("*.whl")
+        assert wheel.stat().st_size <= 8_000_000
     # In a checkout, the first call lowers the modules.
     calls = [VERBS] if python != sys.executable else [VERBS, VERBS]
     assert [result_of(python, call, tmp_path) for call in calls][-1] == []

@@ -10,11 +10,16 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from hatch_build import compiled_code
 
 import printhammer as ph
+from printhammer.hammer.hammer import shipped
+from printhammer.kernel.compile import link
 from printhammer.kernel.compile.modules import KINDS
+from printhammer.kernel.compile.specialise import specialise
 from printhammer.kernel.model.laws import LAW_FUNCTIONS
-from printhammer.run.plain.entries import entries
+from printhammer.run.plain.entries import entries, page_module
+from printhammer.run.problem import laws_of
 
 ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src"
@@ -103,10 +108,16 @@ except SystemExit as end:
     assert heavy_after(call, tmp_path) == set()
 
 
+COMPILED = ("hendriks-1983", "relay-5v")
+"""Shipped hammers whose machine code the wheel of the tests contains; that of all takes five minutes."""
+
+
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     target = tmp_path_factory.mktemp("dist")
-    output_of(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", target, cwd=ROOT)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PRINTHAMMER_COMPILED", " ".join(COMPILED))
+        output_of(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", target, cwd=ROOT)
     (built,) = target.glob("*.whl")
     return built
 
@@ -145,6 +156,18 @@ def test_the_wheel_holds_every_file_of_the_package_and_no_other(wheel: Path) -> 
 
 
 @pytest.mark.slow
+def test_a_whole_wheel_holds_the_machine_code_of_every_shipped_hammer() -> None:
+    """By the names of its files; `make test-numba` builds and runs a whole wheel."""
+    names = {name for name, _make in compiled_code()}
+    for hammer in map(ph.load, shipped()):
+        drive = ph.PulseTrain(hammer.waveform) if hammer.waveform else ph.SineForce(1.0, 1.0)
+        laws = laws_of(hammer, drive)
+        assert page_module(laws).shipped.name in names
+        if link.processor()[1] == link.COMMON:
+            assert {entry.code.shipped.name for entry in specialise(laws).entries} <= names
+
+
+@pytest.mark.slow
 def test_the_wheel_runs_elsewhere(elsewhere: Path, tmp_path: Path) -> None:
     origin = output_of(
         elsewhere / "python", "-c", "import printhammer; print(printhammer.__file__)", cwd=tmp_path
@@ -158,7 +181,7 @@ def test_the_wheel_runs_elsewhere(elsewhere: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["hendriks-1983", "relay-5v"])
+@pytest.mark.parametrize("name", COMPILED)
 def test_the_wheel_compiles_without_numba_and_shipped_hammers_not_at_all(
     elsewhere: Path, tmp_path: Path, name: str
 ) -> None:

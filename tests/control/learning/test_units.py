@@ -130,9 +130,14 @@ class Hidden(ImpactSensor):
 def test_no_unit_is_below_the_better_open_loop_where_the_readings_decide(
     at_safe_rate: LearningLaw, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """After one run of random units at the safe rate; otherwise the result says that they do not decide."""
+    """After one run of two units at the safe rate; otherwise the result says that they do not decide.
+
+    Of six random units, these are one that prints no dot in the other open loop, and the only one whose
+    readings do not decide: a wrong choice of the loop fails on the first, a false certainty on the second.
+    """
     monkeypatch.setattr("printhammer.control.learning.learn.RUNS", RUNS[:1])
-    units = Variability().draw(nominal(), 6, 4403)
+    drawn = Variability().draw(nominal(), 6, 4403)
+    units = [drawn[2], drawn[5]]
     stages = calibrate(at_safe_rate, units, Hidden(seed=3))[1]
     below = np.array([worse(at_safe_rate, unit, stages, k)[0] for k, unit in enumerate(units)])
     decided = stages[1].learned | (stages[1].loop_certainty >= SURE)
