@@ -121,7 +121,7 @@ class Context:
         return motion
 
     def ensemble(self, drives: Sequence[Drive], ends: Any, **options: Any) -> EnsembleResult:
-        """Run an ensemble of drives, each until its end, s; options are those of `Ensemble.run`.
+        """Run an ensemble of drives, each until its end, s; options are as for `Ensemble.run`.
 
         Raises
         ------

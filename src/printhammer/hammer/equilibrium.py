@@ -266,7 +266,7 @@ def equilibrium_picture(hammer: HammerLike, points: int = 241) -> EquilibriumPic
 
 
 def _work() -> Work:
-    """Allocate the working space of a search; lists, since they are faster than arrays in Python code."""
+    """Allocate the working space of a search as lists, which are faster than arrays in Python code."""
     room = MOST_POINTS * MOST_PLACES
     return Work([0.0] * MOST_PLACES, [0.0] * room, [0.0] * room, np.empty((room, 3)), _ascending)
 

@@ -45,7 +45,7 @@ class Statics(NamedTuple):
     pack_loading: Any
     backstop_elastic: Any
     spring_level: Any
-    """Law functions of the parts; for absent parts, those of `printhammer.parts.absent`."""
+    """Law functions of the parts; for absent parts, the functions of `printhammer.parts.absent`."""
     magnet: Any
     spring: Any
     pack: Any

@@ -42,10 +42,10 @@ _LOCKED: Final = 1e9
 """Mass that stands for a locked armature, kg; 100 N move the mass by only 0.05 um in 1 s. Arbitrary."""
 
 _STEEP: Final = 0.3  # Arbitrary
-"""Voltage change between two rows, as a fraction of the voltage range, that counts as an edge."""
+"""Smallest voltage change between two rows that is an edge, as a fraction of the voltage range."""
 
 _EDGES: Final = 8
-"""Number of edges above which a voltage counts as continuous and is interpolated linearly; arbitrary."""
+"""Number of edges above which a voltage is treated as continuous and interpolated linearly; arbitrary."""
 
 _FLOWS: Final = 0.05
 """Current at switch-on, as a fraction of the largest, above which the coil was already on; arbitrary."""

@@ -27,7 +27,7 @@ _FALSE_OUTLIERS: Final = 0.01
 """Expected number of rows without gross error that a fit excludes, for normal noise; arbitrary."""
 
 _EXACT: Final = 1e-11
-"""RMS residual, as a fraction of the largest datum, below which the data count as exact; arbitrary."""
+"""RMS residual, as a fraction of the largest datum, below which the data are treated as exact; arbitrary."""
 
 _ROUNDS: Final = 30  # Iteration limit of the fit; arbitrary
 
@@ -38,10 +38,10 @@ _HOLDING: Final = 4.0
 """Smallest factor by which omitting essential rows increases the variance of a parameter; arbitrary."""
 
 _AT_BOUND: Final = 1e-6  # Arbitrary
-"""Distance from a bound, as a fraction of the parameter, below which the parameter counts as at the bound."""
+"""Distance from a bound, as a fraction of the parameter, below which the parameter is at the bound."""
 
 _SINGULAR: Final = 1e-12  # Arbitrary
-"""Smallest singular value of the column-normalised Jacobian at which all parameters count as determined."""
+"""Smallest singular value of the column-normalised Jacobian at which all parameters are determined."""
 
 _TIED: Final = 0.5  # Arbitrary
 """Component of the weakest direction, as a fraction of the largest, above which a parameter may be held."""

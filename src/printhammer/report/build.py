@@ -35,7 +35,7 @@ _PICTURE: Final = re.compile(r"figure\d\d\.(svg|pdf|png)")
 
 
 def check_place(out: str | Path) -> None:
-    """Check that a report would overwrite no files of a folder, except those of an earlier report."""
+    """Check that a report would overwrite only files of an earlier report in a folder."""
     folder = Path(out)
     pictures = folder / PICTURES
     drawn = sorted(pictures.iterdir()) if pictures.is_dir() else []

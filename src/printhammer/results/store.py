@@ -49,7 +49,7 @@ class Variable(Declared):
 
 
 class Layout(Declared):
-    """Layout of a store: its arrays, attributes and identity."""
+    """Layout of a store: arrays, attributes and identity."""
 
     chunks: tuple[int, ...] = part("number of members in a block, along each member dimension")
     variables: tuple[Variable, ...] = part("results and coordinates, `MARK` among the results")

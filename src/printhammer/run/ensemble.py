@@ -111,7 +111,7 @@ class EnsembleResult(Result):
         return f"{len(self.status)} runs of an ensemble"
 
     def entries(self) -> Entries:
-        """Return the requested results: dots by name, states as `strobe_t` and so on, extra contacts."""
+        """Return the requested results: dots by name, states as `strobe_t` and so on, and extra contacts."""
         entries = super().entries()
         if self.x is None:
             del entries["x"]

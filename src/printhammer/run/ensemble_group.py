@@ -1,4 +1,4 @@
-"""Groups of ensemble members with the same laws: arrays passed to and filled by the kernel.
+"""Groups of ensemble members with the same laws: the arrays that the kernel reads and fills.
 
 The drives of an ensemble are stored as arrays: a few forms of pulses, and many firing times.
 """
@@ -292,7 +292,7 @@ class Job:
         return True
 
     def share_out(self, threads: int) -> int:
-        """Distribute neighbouring members over different units of work; return the members per unit.
+        """Distribute neighbouring members over units of work; return the number of members per unit.
 
         Neighbouring members have similar computation times, so units of mixed members are balanced.
         """

@@ -237,7 +237,7 @@ def stays_away(hammer: Hammer, waveform: Waveform | None = None) -> str:
 
 
 def is_held(mode: float) -> bool:
-    """Whether a code of `printhammer.kernel.model.modes` is that of an armature held by dry friction."""
+    """Whether a mode, by its code in `printhammer.kernel.model.modes`, is held by dry friction."""
     return HELD < mode <= HELD_FREE
 
 

@@ -105,7 +105,7 @@ OPENINGS: Final[dict[str, dict[str, Any]]] = {
     "pot-magnet": {"rate": 10.0, "pulses": 1, "low": 10.0, "high": 20.0, "line": ""},
     "relay-5v": {"rate": 20.0, "pulses": 3, "low": 10.0, "high": 40.0, "line": ""},
 }
-"""Initial page states of the shipped hammers whose times and forces differ from those of printers."""
+"""Initial page states of the shipped hammers that are slower or stronger than printers."""
 
 
 def describe(hammer: Hammer) -> dict[str, Any]:

@@ -102,7 +102,7 @@ class Maker:
         return Member(hammer, drive, end, self._state(row, hammer))
 
     def members(self, rows: FloatArray, threads: int | None = None) -> tuple[IntArray, Members]:
-        """Return the indices of the rows that yield valid members, and these members."""
+        """Return the indices of the rows that yield valid members, and the members."""
         which: list[int] = []
         hammers: list[Hammer] = []
         states: list[tuple[float, float]] = []

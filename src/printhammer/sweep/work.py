@@ -142,7 +142,7 @@ def _from_ensemble(
 def _unsettled(
     members: Members, windows: Sequence[Window], ends: Sequence[int], runs: EnsembleResult, tolerance: float
 ) -> list[bool]:
-    """Return whether the armature of each member is not at rest at the end of its window.
+    """Return, for each member, whether the armature is still moving at the end of its window.
 
     The criterion is that of `printhammer.run.window.unsettled`; `ends` are the indices of the end states.
     """

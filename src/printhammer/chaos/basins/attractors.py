@@ -18,7 +18,7 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 MATCH: Final = 1e-2  # Arbitrary
-"""Largest distance between two orbits that count as one attractor, in half-widths of the strobe window."""
+"""Largest distance between two orbits of the same attractor, in half-widths of the strobe window."""
 
 CLOUD: Final = 2000
 """Number of points that represent a strange attractor; arbitrary."""

@@ -45,7 +45,7 @@ from printhammer.run.window import time_scale
 from printhammer.support.arrays import BoolArray, FloatArray, TextArray
 
 TAIL: Final = 1e-3
-"""Default time after the second firing within which a pack contact counts as the second dot, s; arbitrary."""
+"""Default time after the second firing within which a pack contact is the second dot, s; arbitrary."""
 
 _PIECE: Final = 8192  # Number of cells integrated in one batch, which bounds the memory; arbitrary
 _SPACING: Final = 5e-6  # Spacing of the samples of the first run at the default tail, s; arbitrary
@@ -131,13 +131,13 @@ class QuenchMap(Result):
     @property
     @derived("1", "ratio of the force of the second dot to that of the first pulse alone", "gap width")
     def force_ratio(self) -> FloatArray:
-        """Ratio of the peak force of the second dot to that of the first pulse alone."""
+        """Ratio of the second dot's peak force to the peak force of the first pulse alone."""
         return self.force / self.single_force
 
     @property
     @derived("s", "flight time of the first pulse alone minus that of the second dot", "gap width")
     def flight_gain(self) -> FloatArray:
-        """Flight time of the first pulse alone minus that of the second dot, s."""
+        """Flight time of the first pulse alone minus the flight time of the second dot, s."""
         return self.single_flight_time - self.flight_time
 
 

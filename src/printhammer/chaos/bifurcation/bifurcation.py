@@ -183,7 +183,7 @@ def _parameter(
     choice: tuple[npt.ArrayLike | None, npt.ArrayLike | None, str | None, npt.ArrayLike | None],
     firing: Firing,
 ) -> tuple[str, FloatArray, Regime]:
-    """Validate the choice of parameter; return its name, its values, and the regime to vary."""
+    """Validate the choice of parameter; return name, values, and the regime to vary."""
     periods, rates, parameter, values = choice
     if sum(entry is not None for entry in (periods, rates, parameter)) != 1:
         raise InputError("periods, rates and parameter: expected one of them", key="parameter")

@@ -283,7 +283,7 @@ def _bound_stop(node: Node, bound: float) -> Stop:
 
 
 def _at_parameter(follower: Corrector, here: Node, ahead: Node, parameter: float) -> Node | None:
-    """Correct a point between two nodes at a fixed parameter; its tangent is in the direction of travel."""
+    """Correct a point between two nodes at a fixed parameter; the tangent is in the direction of travel."""
     share = (parameter - here.parameter) / (ahead.parameter - here.parameter)
     begin = follower.point(here)
     z = begin + share * (follower.point(ahead) - begin)

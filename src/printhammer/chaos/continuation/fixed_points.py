@@ -21,7 +21,7 @@ from printhammer.support.arrays import FloatArray
 
 _MOST_CORRECTIONS: Final = 12  # Iteration limit of Newton's method; arbitrary
 _STAGNANT: Final = 1e3  # Arbitrary
-"""Multiple of the precision below which a correction that no longer shrinks counts as converged."""
+"""Multiple of the precision below which a correction that stops shrinking is accepted as converged."""
 
 
 class MapValue(Declared):

@@ -36,7 +36,7 @@ _CURRENT: Final = "with a voltage drive, the current at a touch belongs to the s
 _CLOSE: Final = 0.01  # Arbitrary
 """Time before and after an impact during which the surface is removed, as a fraction of the period."""
 _STILL: Final = 1e-9
-"""Speed at a section, relative to the speed scale, below which the orbit counts as turning; arbitrary."""
+"""Speed at a section, relative to the speed scale, below which the orbit turns there; arbitrary."""
 _SPACING: Final = 1e-6  # Finite-difference step of Newton's method, in scaled variables; arbitrary
 _ROUNDS: Final = 20  # Iteration limit of Newton's method; arbitrary
 _PRECISION: Final = 1e-12  # Scaled correction below which Newton's method has converged; arbitrary
@@ -254,7 +254,7 @@ _NEAR: Final = 1e-2  # Arbitrary
 _STEEP: Final = 10.0  # Arbitrary
 """Multiplier above which an orbit is so close to its grazing that no bifurcation lies in between."""
 _CLOSER: Final = 0.7
-"""Ratio of the impact speed to that of the last attempt, below which a grazing is sought again; arbitrary."""
+"""Ratio of the impact speed to that at the last attempt, below which a grazing is sought again; arbitrary."""
 _ON_CURVE: Final = 1e-5
 """Largest scaled closing error of an orbit that is appended to a branch before its grazing; arbitrary."""
 

@@ -38,7 +38,7 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 SAME: Final = 1e-3
-"""Distance from the unit circle within which a multiplier counts as critical; arbitrary."""
+"""Distance from the unit circle within which a multiplier is treated as critical; arbitrary."""
 
 
 class BifurcationCurve(Result, rows="point"):

@@ -103,7 +103,7 @@ class StabilityChart(Result):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Provenance of the chart; the tolerance is that of the trains from rest."""
+        """Provenance of the chart, with the tolerance of the trains from rest."""
         regime, waveform = self.regime, self.regime.fired
         return provenance(
             hammer=regime.hammer,

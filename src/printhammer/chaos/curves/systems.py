@@ -91,7 +91,7 @@ class Plane:
 
 
 def check_two(first: str, second: str) -> None:
-    """Raise InputError if two parameters are the same; rate and period count as one parameter."""
+    """Raise InputError if two parameters are the same, or are the rate and the period."""
     if second == first or {first, second} == {PERIOD, RATE}:
         raise InputError.of("second", second, f"another constant than that of the branch, {first}")
 

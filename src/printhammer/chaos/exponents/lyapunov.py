@@ -227,7 +227,7 @@ class Lyapunov(Result, rows="firing exponent"):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Provenance of the strobe points, which is that of the exponents."""
+        """Provenance of the strobe points, which also applies to the exponents."""
         return self.points.provenance
 
     def notes(self) -> dict[str, Any]:

@@ -56,7 +56,7 @@ LONGEST_CYCLE: Final = 64
 """Largest cycle length of a series that is tested; at most a quarter of its length. Arbitrary."""
 
 CYCLES: Final = 5  # Arbitrary
-"""Number of cycles over which a path has to grow to count as chaos; within one cycle, any path may grow."""
+"""Number of cycles over which a path has to grow to indicate chaos; within one cycle, any path may grow."""
 
 FOLLOWS: Final = 0.7  # Arbitrary
 """Distance of the images of neighbours, relative to random pairs, below which a series is deterministic."""

@@ -33,7 +33,7 @@ _EARLY_ALIKE: Final = 0.1  # Arbitrary
 _LOOKED_AT: Final = 4000
 """Maximum number of close returns, closest first, that are tested for duplicates; arbitrary."""
 _EARLY: Final = 2
-"""Number of firings from the start of a motion within which close returns count as early; arbitrary."""
+"""Number of firings from the start of a motion within which a close return is early; arbitrary."""
 _LEAST: Final = 16
 """Smallest number of firings over which a motion is recorded; arbitrary."""
 _ROOM: Final = 1.2

@@ -334,7 +334,7 @@ def _stable(own: Scaled, saddle: FloatArray, side: float, firings: int, limits: 
 
 @dataclass
 class _Inward:
-    """Known section of a stable manifold; its parameter grows by 1 from each point to its preimage.
+    """Known section of a stable manifold, whose parameter grows by 1 from each point to its preimage.
 
     From 0 to 1 the curve is treated as straight.
     """

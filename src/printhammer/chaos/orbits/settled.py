@@ -40,9 +40,9 @@ NEAR: Final = 0.1
 """Distance from the states, in half-widths, within which an orbit of fewer firings is sought; arbitrary."""
 
 _SHRINKS: Final = 1e-5
-"""Smallest relative decrease of a distance that counts as shrinking; arbitrary."""
+"""Smallest relative decrease at which a distance is considered to shrink; arbitrary."""
 _NOISE: Final = 1e-9  # Arbitrary
-"""Smallest decrease of a distance that counts as shrinking, in half-widths of the strobe window."""
+"""Smallest decrease at which a distance is considered to shrink, in half-widths of the strobe window."""
 _GOAL: Final = 1e-13
 """Residual at which Newton's method stops, in half-widths of the strobe window; arbitrary."""
 _ENOUGH: Final = 1e-9  # Arbitrary

@@ -118,7 +118,7 @@ def shortest(closing: Closing, scales: FloatArray) -> Closing:
 
 @dataclass
 class _Known:
-    """Orbit found by a search, with its number of hits and the (block, batch) stages that found it."""
+    """Orbit found by a search: number of hits, and the stages (block, batch) that found the orbit."""
 
     closing: Closing
     stages: list[tuple[int, int]]

@@ -62,7 +62,7 @@ _TURN_STEPS: Final = 60  # Iteration limit of the root search for an extremum; a
 _STILL: Final = 1e-9  # Arbitrary
 """Relative speed at which the root search for an extremum stops; the displacement error is quadratic."""
 STILL_COIL: Final = 1e-9  # Arbitrary
-"""Current or flux linkage, relative to a typical value, below which the coil counts as currentless."""
+"""Current or flux linkage, relative to a typical value, below which the coil is treated as currentless."""
 
 
 class Image(Declared):

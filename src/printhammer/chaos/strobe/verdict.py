@@ -93,7 +93,7 @@ class Verdict(Declared):
 
     @property
     def hangs_on_rounding(self) -> bool:
-        """Whether the period differs at finer tolerances: rounding decides the length of the cycle."""
+        """Whether the period differs at finer tolerances, so that rounding decides the cycle length."""
         return any(name != self.name for _tolerance, name in self.elsewhere)
 
     @property

@@ -155,7 +155,7 @@ def continue_(
 
 
 def both(low: str | None, high: str | None, first: str, last: str, parameter: str) -> tuple[str, str]:
-    """Check that both ends of a range are set, and return them; `first` and `last` are their flags."""
+    """Check that both ends of a range are set; return both ends. `first` and `last` are their flags."""
     if low is None or high is None:
         raise InputError(
             f"{first if low is None else last} is missing",

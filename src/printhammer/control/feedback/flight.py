@@ -325,7 +325,7 @@ class Contacts:
         return whole
 
     def _with_front(self, place: int) -> Hammer:
-        """Return the nominal hammer with its pack moved away by `place` grid steps; cached."""
+        """Return the nominal hammer, cached, with its pack moved away by `place` grid steps."""
         if place not in self._shifted:
             self._shifted[place] = self._plant.moved(place * _GRID).hammer
         return self._shifted[place]

@@ -34,7 +34,7 @@ _FALL: Final = 1.0 / 3.0
 # Times after the touch at which the residual motion is evaluated, in single-pulse flight times; arbitrary
 _WATCHED: Final = np.linspace(2.2, 3.4, 16)
 _SETTLED: Final = 0.65
-"""Time after the brake pulse until the armature counts as at rest, in flight times; arbitrary."""
+"""Time after the brake pulse until the armature is considered at rest, in flight times; arbitrary."""
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     Search: TypeAlias = Work[FloatArray, FloatArray, T]
 
 LEVELS: Final = (1.0, 0.3, 0.1, 0.03, 0.0)
-"""Fraction of the surrogate's residual that counts as noise; arbitrary."""
+"""Fraction of the surrogate's residual that is treated as noise; arbitrary."""
 _NEAR: Final = (0.1, 0.0)  # Levels of a search that begins at a mode of the stage before; arbitrary
 _MODES: Final = 4  # Maximum number of modes of a belief; arbitrary
 _SHARE: Final = 0.01  # Smallest probability of a mode, relative to the most probable mode; arbitrary

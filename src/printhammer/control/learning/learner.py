@@ -24,7 +24,7 @@ _FLOOR: Final = 0.01
 _STARTS: Final = 6  # Number of simulated hammers from which searches begin; arbitrary
 _OUTLIER: Final = 6.0  # Readings farther from the median are rejected, in standard deviations; arbitrary
 _FEWEST: Final = 3
-"""Smallest number of readings whose median exposes an outlier, since of two either may be the outlier."""
+"""Smallest number of readings whose median exposes an outlier, since either of two readings may be wrong."""
 MISFIT: Final = 2.0
 """Largest misfit with which a table is used: RMS of the residuals, in standard deviations of the noise.
 

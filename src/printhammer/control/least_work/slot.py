@@ -36,7 +36,7 @@ _IN_PACK: Final = {
 _MANY: Final = 64  # Smallest number of simulations that is distributed over threads; arbitrary
 _LEAST_SPEED: Final = 0.03  # Least speed at which the armature should leave the pack, m/s; arbitrary
 _CLEAR: Final = 2e-6
-"""Distance from the turning point beyond which the armature counts as leaving, m; arbitrary."""
+"""Distance from the turning point beyond which the armature is leaving the pack, m; arbitrary."""
 # Weight of the squared current relative to the positive work, a regularisation; arbitrary
 _SMOOTHING: Final = 1e-3
 RELOADING: Final = 1e-6  # Lag in the pack that costs as much as the loading work, m; arbitrary

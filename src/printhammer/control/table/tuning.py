@@ -312,7 +312,7 @@ def _bridge(draft: Draft) -> None:
 
 
 def _tune_again(draft: Draft, poor: IntArray) -> None:
-    """Retune the rates with the indices `poor`, in place, with additional candidates from nearby periods."""
+    """Retune the rates with the indices `poor`, in place, adding candidates from nearby periods."""
     if not poor.size:
         return
     task = draft.task

@@ -40,7 +40,7 @@ def solve(
     bounded: Bounded,
     longest: float = LONGEST_STEP,
 ) -> FloatArray:
-    """Minimise each dot's deviation over firing time and width; return these values, s, shape (dots, 2).
+    """Minimise each dot's deviation; return the firing times and widths, s, shape (dots, 2).
 
     The method is Levenberg-Marquardt (J. Nocedal and S. J. Wright, *Numerical Optimization*, ch. 10).
 
@@ -126,8 +126,8 @@ _RIGHT: Final = 0.02
 _WRONG: Final = 1.0
 """Cost added to a candidate that is not a solution, so that solutions rank first; arbitrary."""
 STABLE: Final = 0.97
-"""Largest absolute multiplier, from dot to dot, of an admissible row of dots: inside the unit circle,
-with a margin for interpolation and timer ticks. Arbitrary."""
+"""Largest absolute multiplier, from dot to dot, of an admissible row of dots. Arbitrary: below 1, with a
+margin for interpolation and timer ticks."""
 
 _FAR_OFF: Final = 5.0  # Deviation, as a fraction of the limits, at which an RMS term is cut off; arbitrary
 _ROUNDING: Final = 1e-12

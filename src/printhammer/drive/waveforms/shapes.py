@@ -47,7 +47,7 @@ class Chain(Waveform):
     @model_validator(mode="before")
     @classmethod
     def _read_parts(cls, data: Any) -> Any:
-        """Validate the waveforms one by one; the driven quantity of the chain is that of its waveforms."""
+        """Validate the waveforms one by one; the chain has the driven quantity of its waveforms."""
         if not isinstance(data, dict) or "parts" not in data:
             return data
         parts = _validate(data["parts"])

@@ -68,7 +68,7 @@ def drawable(chart: xr.Dataset) -> xr.Dataset:
 
 
 def edges(centres: FloatArray) -> FloatArray:
-    """Compute the borders of the cells around ascending centres, one more border than centres."""
+    """Compute the n + 1 borders of the cells around n ascending centres."""
     if len(centres) == 1:
         return np.asarray([0.98 * centres[0], 1.02 * centres[0]], dtype=np.float64)
     middle = 0.5 * (centres[1:] + centres[:-1])

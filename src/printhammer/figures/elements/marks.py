@@ -217,7 +217,7 @@ def legend_in_columns(ax: Axes, handles: Sequence[Artist], columns: int, size: f
 
 
 def legend_below(ax: Axes, *entries: Any, **options: Any) -> None:
-    """Draw a legend below a panel and its axis label; options are those of `Axes.legend`.
+    """Draw a legend below a panel and its axis label; options are as for `Axes.legend`.
 
     Unlike a legend of the figure, a legend of the panel leaves room for the text at the foot of the figure.
     """

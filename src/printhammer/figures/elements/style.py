@@ -84,7 +84,7 @@ RC: Final[dict[str, Any]] = {
     "ytick.major.size": 3.5,
     "ytick.major.width": HAIR,
 }
-"""Matplotlib settings for building and saving figures, which replace those of the user."""
+"""Matplotlib settings for building and saving figures, used instead of the user's settings."""
 
 
 def in_style() -> AbstractContextManager[None]:

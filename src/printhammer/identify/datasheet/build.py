@@ -42,7 +42,7 @@ INDUCTANCE_ERROR: Final = 0.05
 """Relative standard error of a printed inductance; assumed."""
 
 DERIVED: Final = 0.5
-"""Ratio of posterior to prior standard deviation below which a constant counts as derived; arbitrary."""
+"""Ratio of posterior to prior standard deviation below which a constant is marked as derived; arbitrary."""
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from printhammer.results import Declared, part
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 _WIDE: Final = 10.0  # Arbitrary
-"""Initial width of the gap penalty, relative to the largest gap; a gap as wide weighs as much as all data."""
+"""Initial width of the gap penalty, relative to the largest gap, which then weighs as much as all data."""
 _NARROW: Final = 0.001
 """Width of the gap penalty, normalised by stroke and typical speed, at which the approach ends; arbitrary."""
 _RISE: Final = 0.3  # Factor on the width of the gap penalty after a successful step; arbitrary

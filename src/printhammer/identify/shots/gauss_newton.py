@@ -104,7 +104,7 @@ def weak(values: FloatArray, covariance: FloatArray) -> list[int]:
 def changes_if_fitted(
     design: FloatArray, columns: FloatArray, names: Sequence[str], residuals: FloatArray
 ) -> list[tuple[str, float, float]]:
-    """Estimate, for each held constant, its change if that constant alone were fitted in addition.
+    """Estimate, for each held constant, how it would change if it alone were fitted in addition.
 
     `design`, shape (m, p), `residuals`, shape (m,), and `columns`, shape (m, q), the derivatives per relative
     change of each held constant, are whitened by the standard errors of the data. The result lists the name,

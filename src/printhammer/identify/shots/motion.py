@@ -43,7 +43,7 @@ _LARGER: Final = 1.1  # Arbitrary
 _DEGREES: Final = 0.22
 """Degrees of freedom per sample of the noise estimate (median of third differences), from simulated noise."""
 _TOLD: Final = 0.05
-"""Relative standard error below which a held constant is reported as one that could be fitted; arbitrary."""
+"""Relative standard error below which the report says that a held constant could be fitted; arbitrary."""
 _OFF: Final = 5.0  # Number of standard errors above which a deviation is reported; arbitrary
 
 
@@ -81,7 +81,7 @@ def tested(shots: Sequence[Shot], solution: Solution, count: int) -> tuple[float
 
 
 def rests(shots: Sequence[Shot], solution: Solution) -> list[str]:
-    """Return remarks on records whose rest position deviates from that of the hammer."""
+    """Return remarks on records whose rest position deviates from the rest position of the hammer."""
     sentences = []
     for shot, shown, scale in zip(shots, solution.shown, solution.scales, strict=True):
         before = shot.t < 0.0

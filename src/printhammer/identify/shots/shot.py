@@ -251,7 +251,7 @@ def _um(metres: float) -> str:
 
 
 _FLOOR: Final = 1e-9
-"""Noise, as a fraction of the amplitude, below which a record counts as exact; arbitrary."""
+"""Noise, as a fraction of the amplitude, below which a record is treated as exact; arbitrary."""
 _POOR: Final = 1e-3  # Arbitrary
 """RMS residual of the fitted waveform, as a fraction of the peak current, that is always accepted."""
 _LARGER: Final = 1.2  # Arbitrary

@@ -34,7 +34,7 @@ LEVEL: Final = 0.01
 
 _RUNS: Final = "residuals of neighbours are correlated: the data deviate from the law, or the sensor is slow"
 _COPY: Final = 1e-6  # Arbitrary
-"""Singular value of the normalised Jacobian below which a term counts as collinear with its columns."""
+"""Singular value of the normalised Jacobian below which a term is collinear with its columns."""
 
 _TOGETHER: Final = "the excluded rows are consecutive: there the data deviate from the law"
 

@@ -57,7 +57,7 @@ _inline_all = False
 
 @contextmanager
 def all_inlined() -> Iterator[None]:
-    """Make `compiled` and `called` inline as well: a loop is vectorised only if it contains no calls."""
+    """Make `compiled` and `called` inline as well, since only a loop without calls is vectorised."""
     global _inline_all  # noqa: PLW0603
     _inline_all = True
     try:

@@ -102,7 +102,7 @@ def link(template: bytes, laws: Iterable[bytes], choices: Mapping[str, int], cal
 
 
 def is_readable(bitcode: bytes) -> bool:
-    """Whether the installed LLVM can read a module; it may not read bitcode of a later version."""
+    """Whether the installed LLVM can read a module; bitcode of a later version may be unreadable."""
     try:
         llvm.parse_bitcode(bitcode)
     except RuntimeError:

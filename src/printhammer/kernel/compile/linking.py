@@ -28,7 +28,7 @@ class _Part(JITCodeLibrary):
         self._finalized = True
 
     def own_module(self) -> Any:
-        """Return the module of the helper alone; its functions may occur in several linked modules."""
+        """Return the module of the helper alone, whose functions may occur in several linked modules."""
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == Linkage.external:
                 function.linkage = "linkonce_odr"
@@ -185,7 +185,7 @@ class PartCompiler(_Lowered):
 
 
 class KeptCompiler(_Lowered):
-    """Compiler of long helpers that are not inlined: their machine code is generated once for all callers."""
+    """Compiler of long helpers that are not inlined; all callers share their machine code."""
 
     lowering = _LowerKept
 

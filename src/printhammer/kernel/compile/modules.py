@@ -60,7 +60,7 @@ one_at_a_time: Final = threading.RLock()
 
 @cache
 def _digest_of(places: tuple[str, ...]) -> str:
-    """Return a digest of the kernel's source files and folders in `places`, and of sources common to all."""
+    """Return a digest of the kernel's files and folders `places`, and of sources common to all modules."""
     paths = [
         KERNEL / place
         for place in (*places, "compile/opening.py", "compile/signatures.py", "compile/templates.py")
@@ -82,7 +82,7 @@ def _versions() -> str:
 
 
 def require_numba(needs: str) -> None:
-    """Raise InputError, which names the extra `laws`, if numba is missing; `needs` says what it is for."""
+    """Raise InputError if numba is missing; the message names the extra `laws` and the purpose `needs`."""
     try:
         import numba  # noqa: F401
     except ImportError:

@@ -87,4 +87,4 @@ class Plain(NamedTuple):
     laws: bool = False
     """Whether the function uses names of the kernel."""
     packing: bool = False
-    """Whether the function uses functions that pack the constants of parts."""
+    """Whether the function calls functions that pack the constants of parts."""

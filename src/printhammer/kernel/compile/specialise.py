@@ -72,7 +72,7 @@ class Kernel:
 
     @property
     def entries(self) -> tuple[Entry, ...]:
-        """Entry points of the kernel; empty if they are interpreted."""
+        """Compiled entry points of the kernel; empty if the kernel is interpreted."""
         return tuple(self._entries.values())
 
     def is_ready(self, name: str) -> bool:

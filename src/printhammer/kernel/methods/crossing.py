@@ -29,11 +29,10 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.pulses import Drive
 
 STILL = 1e-12
-"""Largest velocity change in one characteristic time that counts as rest, as a fraction of the velocity
-scale."""
+"""Largest velocity change in one characteristic time at rest, as a fraction of the velocity scale."""
 
 BEGUN = 1e-9
-"""Largest event-function value that counts as zero at the start of a step, as on a new current path."""
+"""Largest event-function value treated as zero at the start of a step, as on a new current path."""
 
 SHARE = 1e-5
 """Finite-difference step for the time derivative of an event function, as a fraction of the step."""

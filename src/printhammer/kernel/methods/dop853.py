@@ -280,7 +280,7 @@ def time_step(
 def whole_contact_step(
     t0: float, w0: float, v0: float, kv0: float, h: float, hammer: Hammer, drive: Drive, scales: Any
 ) -> tuple[float, float, float, float, float, Electric]:
-    """Compute the step of `contact_step` together with the electric state, which counts in the error."""
+    """Compute the step of `contact_step` and of the electric state; the error includes both."""
     y = point(t0, w0, v0, drive)
     k1 = contact_slope_at(y, kv0, hammer, drive)
     k2 = contact_slope(along(y, h, _sum1(T.A02, k1)), hammer, drive)

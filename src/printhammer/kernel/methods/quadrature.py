@@ -137,7 +137,7 @@ def energy_behind(x: float, hammer: Hammer) -> float:
 
 @compiled
 def kink_side(node: Any, after: Any, hammer: Hammer) -> float:
-    """Return 1 if a step off the backstop begins on a kink of the spring law, -1 if it ends on one, else 0.
+    """Return 1 if a step off the backstop begins on a kink of the spring law, -1 if it ends there, else 0.
 
     Beyond the kink, the dissipative force of a contact may be a fractional power of the distance, hence of
     the time. The square root of the time since, or until, the kink makes the power smooth.

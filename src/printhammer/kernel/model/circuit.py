@@ -77,7 +77,7 @@ UNTIL = 2
 """Indices in `live`, counted from its end: path of the coil current, and end of the chopper's off-time."""
 
 STILL_SHARE = 1e-12
-"""Largest change of the electric state in one characteristic time that counts as zero, as a fraction of the
+"""Largest change of the electric state in one characteristic time that is treated as zero, relative to the
 scales."""
 
 

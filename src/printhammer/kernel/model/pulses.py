@@ -56,7 +56,7 @@ def piece_rate(row: Any, i: int, s: float) -> float:
 
 @compiled
 def piece_change(row: Any, i: int, s: float, changes: Any, j: int) -> float:
-    """Return the change of a waveform piece's value for changes of p0 to p3, at index `j` of `changes`.
+    """Return the change of a waveform piece's value for changes of p0 to p3, stored from `changes[j]`.
 
     The other arguments are as in `piece_value`.
     """

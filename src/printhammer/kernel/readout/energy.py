@@ -139,7 +139,7 @@ def linkage_at(x: float, current: float, hammer: Any) -> float:
 
 
 def field_at(node: Any, row: Any, hammer: Any) -> float:
-    """Return the magnetic field energy due to the current at a node, plus that of a reservoir capacitor, J.
+    """Return the magnetic field energy due to the current at a node, plus the energy of a reservoir, J.
 
     With the flux linkage lambda(i), the field energy is i lambda minus the integral of lambda over the
     current from 0 to i. `row` is the row of the table of `resample` at the time of the node.

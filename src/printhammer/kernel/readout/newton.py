@@ -33,7 +33,7 @@ NEAR, LIES_ON = 0.1, 1e-6
 """Distances from an orbit, in half-widths, within which the orbit is sought, and within which a state lies on
 the orbit; as in `printhammer.chaos.orbits.settled`."""
 STILL_COIL = 1e-9
-"""Current, relative to a typical current, below which the coil counts as currentless; as in
+"""Current, relative to a typical current, below which the coil is treated as currentless; as in
 `printhammer.chaos.strobe.map`."""
 
 TRIED, SHARE, RESIDUAL, SMOOTH = range(4)

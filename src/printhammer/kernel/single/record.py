@@ -85,7 +85,7 @@ def close_contact(contacts: Rows, used: int, t: float, v: float) -> None:
 
 @compiled
 def carry_contact(contacts: Rows, mode: int) -> int:
-    """Continue after a pause: keep a contact that is still open in row 0; return the number of contacts."""
+    """Resume after a pause: keep an open contact as row 0 of `contacts`; return the number of contacts."""
     if mode == FREE:
         return 0
     contacts[0, 5] = -1.0

@@ -143,7 +143,7 @@ def changing(forced: bool, damped: bool = True, circuit: bool = False) -> int:
 
 
 def work_width(columns: int, forced: bool, circuit: bool = False) -> int:
-    """Return the length of a row of the working space, at least the five elements that `MEMORIES` needs.
+    """Return the length of a row of the working space, at least 5: one row stores five pack memories.
 
     The electric state is stored in the last elements of a row.
     """

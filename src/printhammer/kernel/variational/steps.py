@@ -283,7 +283,7 @@ def carry(t_to: float, node: Any, after: Any, columns: Any, work: Any, setting: 
 
 @compiled
 def carry_state(t_to: float, node: Any, after: Any, columns: Any, work: Any, setting: Setting) -> float:
-    """Propagate state and tangent columns to `t_to` [s]; without current, their flux linkage is not set yet.
+    """Propagate state and tangent columns to `t_to` [s]; without current, linkage rows are not set yet.
 
     Returns the logarithm of a factor that has been divided out of the columns.
     """

@@ -50,7 +50,7 @@ def spring_force(c: Any, x: float) -> float:
 
 
 def spring_energy(c: Any, x: float) -> float:
-    """Return the sum of the potential energies, J; that of a sampled force is zero at its first sample."""
+    """Return the sum of the potential energies, J; the energy of a sampled force is 0 at its first sample."""
     return energy_of_rows(c, x) - sum_of_curves(c, x, True)
 
 

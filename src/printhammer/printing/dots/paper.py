@@ -136,7 +136,7 @@ _LATER: Final = 5e-6  # Step by which a segment is extended while the armature i
 
 
 class PiecewiseMotion:
-    """Motion simulated in segments; contacts, dots and energy are those of `Motion`."""
+    """Motion simulated in segments, with the contacts, dots and energy of a `Motion`."""
 
     def __init__(self, hammer: Hammer, drive: Drive, pieces: Sequence[Motion]) -> None:
         self.hammer = hammer

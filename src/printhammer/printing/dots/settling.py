@@ -24,7 +24,7 @@ from printhammer.run.window import wait_of
 from printhammer.support.arrays import BoolArray
 
 SETTLED: Final = 0.01
-"""Distance from rest, as a fraction of the stroke, within which the armature counts as settled; arbitrary."""
+"""Distance from rest, as a fraction of the stroke, within which the armature has settled; arbitrary."""
 
 CYCLE: Final = 20e-3  # Shortest duration of the simulation, s; arbitrary
 

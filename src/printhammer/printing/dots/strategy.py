@@ -181,7 +181,7 @@ KINDS: Final = get_args(Kind)
 
 
 class LongPattern(NamedTuple):
-    """Long test pattern: its kind, the slots with a dot, and the first slot that is evaluated."""
+    """Long test pattern: its kind, the slots with a dot, and the first evaluated slot."""
 
     kind: Kind
     slots: tuple[int, ...]

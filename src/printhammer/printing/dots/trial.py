@@ -117,7 +117,7 @@ def attempt(
 
 
 def fired_of(strategy: Strategy, hammer: Hammer, drive: Drive) -> Waveform:
-    """Return the pulse whose width sets the simulation time: that of the strategy, hammer or drive."""
+    """Return the pulse whose width sets the simulation time: from the strategy, the hammer or the drive."""
     own = getattr(strategy, "waveform", None)
     return own if isinstance(own, Waveform) else hammer.waveform or longest_of(drive)
 

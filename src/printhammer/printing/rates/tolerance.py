@@ -148,7 +148,7 @@ class ToleranceYield(Result):
     @property
     @derived("1", "fraction of hammers that pass")
     def share(self) -> float:
-        """Fraction of hammers that pass; invalid hammers and hammers without a dot count as failures."""
+        """Fraction of hammers that pass; invalid hammers and hammers without a dot are failures."""
         return float(self.passed.mean())
 
     @property

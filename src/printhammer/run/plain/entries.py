@@ -78,8 +78,7 @@ _ENTRIES: Final[dict[str, tuple[Any, ...]]] = {
     "has_settled": (newton.has_settled, ("f2", "f1", "f2", "f1", "i", "f1"), 1),
 }
 """Functions by name, with the types of their arguments (as in `printhammer.kernel.compile.calls.Signature`),
-the number of integers that they return, whether they use names of the kernel, and whether they use functions
-that pack the constants of parts."""
+the number of integers returned, and whether they use names of the kernel or pack constants of parts."""
 
 
 Numbers = dict[str, tuple[tuple[str | None, ...], tuple[float, ...]]]

@@ -13,7 +13,7 @@ from printhammer.hammer.statics import Statics, free_force, nearest_level, origi
 from printhammer.kernel.model.modes import PACK_SURFACE
 
 FAR: Final = 1e4
-"""Distance from the origin, in strokes, beyond which the motion counts as a runaway; arbitrary."""
+"""Distance from the origin, in strokes, beyond which the motion is a runaway; arbitrary."""
 
 PLACES: Final = 33
 """Number of positions along the travel of the armature at which the inductance is checked; arbitrary."""
@@ -53,7 +53,7 @@ PAPER_FRONT: Final = 203.2e-6
 """Position of the pack front in Hendriks (1983), m (0.008 inch)."""
 
 SAME: Final = 1e-3
-"""Relative tolerance within which positions count as the positions of the paper."""
+"""Relative tolerance within which positions are equal to the positions of the paper."""
 
 PART: Final = 1.0 / 6.0
 """Half-width of the strobe window of Fig. 11, as a fraction of the distance from backstop to pack."""

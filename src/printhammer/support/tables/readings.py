@@ -32,7 +32,7 @@ LARGEST: Final = 1e9  # Arbitrary
 """Largest magnitude accepted for a value in SI; instruments write numbers such as 9.9e37 for no reading."""
 
 BEFORE: Final = 0.1
-"""Largest drive value before time 0, as a fraction of the peak, that counts as noise; arbitrary."""
+"""Largest drive value before time 0 that is treated as noise, as a fraction of the peak; arbitrary."""
 
 _TINY: Final = float(np.finfo(np.float64).tiny)
 _CAPITALS: Final = frozenset({"MA", "MV", "MN", "MW", "MJ"})
