@@ -4,7 +4,6 @@ import itertools
 
 import pytest
 from studies.reconstruction.family.choice import at_gauge
-from studies.reconstruction.family.conclusions import conclude
 from studies.reconstruction.family.family import _judge, family_hammers
 from studies.reconstruction.family.robustness import robustness
 from studies.reconstruction.judging.judged import STATED
@@ -70,7 +69,7 @@ def test_a_member_judged_again_is_one() -> None:
         judged = _judge(hammer)
         assert judged["member"]
         assert judged["panels"] == member.panels
-        for name, value in conclude(hammer).as_dict().items():
+        for name, value in judged["conclusions"].items():
             if value is None:
                 assert member.conclusions[name] is None
             else:
