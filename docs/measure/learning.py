@@ -4,9 +4,11 @@ Run ``.venv/bin/python docs/measure/learning.py``. The script draws hammers from
 of a production, and counts the dots of the de Bruijn cycle of order 8 and of rows of 200 slots within
 limits, at multiples of the nominal hammer's open-loop safe rate. The strategies are open loop, table and
 robust table, each with the hammer's own pulse and with a fast switch, and tables learned after some dots
-from impact times with 5 us of noise, without and with forces to 3 %. All units are evaluated at 1.5 times
-the safe rate, half of them at the other rates. The sensor of each unit has an offset that the learner does
-not know, with a standard deviation of 25 us.
+from impact times with 5 us of noise, without and with forces to 3 %. All units learn from times with the
+fast switch, the default of ``printhammer learn``, a quarter of them from forces too or with the hammer's own
+pulse. The sensor of each unit has an offset that the learner does not know, with a standard deviation of
+25 us. It takes two hours on one core: ``--keep FOLDER`` stores what units learn, and reuses it; ``--at X
+[X ...]`` measures only these multiples of the safe rate, for ``--keep``, and writes no table.
 
 ``--units N`` sets the number of units, ``--feedback N`` the number of units on which feedback prints a
 cycle of order 6. ``--sensors`` measures other sensors instead, ``--tolerance`` other variabilities,
@@ -17,7 +19,9 @@ production, ``--parts FILE`` the contributions of driver, table, learning and fe
 """
 
 import argparse
+import json
 import time
+from collections.abc import Callable
 from importlib import import_module
 from io import BytesIO
 from pathlib import Path
@@ -67,6 +71,8 @@ SHOWN = 2
 FAMILY = ("02", "06")
 """Numbers of two hammers of the family."""
 AFTER = (50, 200, 1000)
+USUAL = "switch", "time"
+"""Driver and sensor that `printhammer learn` takes by default, with which all units learn."""
 FEEDBACK = 10
 """Largest number of units on which feedback prints beside other drives, a shorter cycle."""
 ROOMS = (
@@ -118,8 +124,25 @@ def learned(
     return stages
 
 
-def measure(hammer: ph.Hammer, units: list[ph.Hammer], share: float) -> list[list[Cell]]:
-    """Return one row of the table for each strategy at a rate."""
+def kept(
+    folder: Path | None, name: str, stages: Callable[[], dict[int, tuple[np.ndarray, np.ndarray]]]
+) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+    """Return the result of `learned` from a file of the folder, or compute it and write the file."""
+    path = None if folder is None else folder / f"{name.replace(' ', '-')}.json"
+    if path is not None and path.exists():
+        return {int(dots): tuple(map(np.array, pair)) for dots, pair in json.loads(path.read_text()).items()}
+    found = stages()
+    if path is not None:
+        text = {dots: [good.tolist(), lost.tolist()] for dots, (good, lost) in found.items()}
+        path.write_text(json.dumps(text))
+    return found
+
+
+def measure(hammer: ph.Hammer, units: list[ph.Hammer], share: float, folder: Path | None) -> list[list[Cell]]:
+    """Return one row of the table for each strategy at a rate.
+
+    All units learn with the fast switch from times alone, a quarter of them with the other combinations.
+    """
     rate, single, rows = share * open_loop_rate(hammer), nominal(hammer, tolerance=DISPLAY_TOLERANCE), []
 
     def add(way: str, good: np.ndarray, lost: np.ndarray | None = None) -> None:
@@ -137,12 +160,18 @@ def measure(hammer: ph.Hammer, units: list[ph.Hammer], share: float) -> list[lis
             table = ph.tune(hammer, rate=rate, driver=driver, **options)
             good = shares(units, single, rate, table.strategy(hammer))
             add(f"{name}, {driver}", good, good < plain - 1e-12)
-    for driver in ("own", "switch"):
+    for driver in ("switch", "own"):
         for name, sensor in SENSORS.items():
-            law, _base = law_for(hammer, rate, driver=driver, sensor=sensor)
-            stages = learned(law, units, sensor)
+            some = units if (driver, name) == USUAL else units[: len(units) // 4]
+
+            def stages(
+                driver: str = driver, sensor: ImpactSensor = sensor, some: list[ph.Hammer] = some
+            ) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+                return learned(law_for(hammer, rate, driver=driver, sensor=sensor)[0], some, sensor)
+
+            seen = kept(folder, f"{share:g} {driver} {name}", stages)
             for dots in AFTER:
-                add(f"learned from {name}, {driver}, {dots} dots", *stages[dots])
+                add(f"learned from {name}, {driver}, {dots} dots", *seen[dots])
     return rows
 
 
@@ -350,9 +379,7 @@ def curves(path: Path) -> None:
         ax.set_xlabel("Rate / open-loop safe rate of the nominal hammer")
         ax.set_ylabel("Units that print all dots  [%]")
         ax.legend(fontsize=style.SMALL, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
-        sizes = (
-            f"{learned.settings['units']} units at {ASKED:g}, {min(row[2] for row in learned.rows)} elsewhere"
-        )
+        sizes = f"{learned.settings['units']} units, {min(row[2] for row in learned.rows)} of some strategies"
         style.foot(figure, f"{', '.join(learned.hammers)} · {sizes}, feedback {seen.settings['units']}")
         drawn = BytesIO()
         figure.savefig(drawn, dpi=110)
@@ -391,7 +418,7 @@ def tolerance(hammer: ph.Hammer, count: int, seed: int) -> list[list[Cell]]:
 def main() -> None:
     """Measure the requested tables, or draw the requested picture."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--units", type=int, default=100)
+    parser.add_argument("--units", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--feedback", type=int)
     parser.add_argument("--sensors", action="store_true")
@@ -402,6 +429,8 @@ def main() -> None:
     parser.add_argument("--curves", type=Path)
     parser.add_argument("--tolerance-curves", type=Path)
     parser.add_argument("--parts", type=Path)
+    parser.add_argument("--keep", type=Path)
+    parser.add_argument("--at", type=float, nargs="+", choices=SHARES)
     asked = parser.parse_args()
     hammer = ph.load("hendriks-1983")
     drawings = ((asked.curves, curves), (asked.tolerance_curves, tolerance_curves), (asked.parts, parts))
@@ -446,9 +475,9 @@ def main() -> None:
         write("learning-feedback", [RATE, DRIVE, *GOOD], rows, settings, (*ROOMS, "control/feedback"))
     else:
         heads = [RATE, DRIVE, Column(name="units", format="d"), *GOOD, FEWER]
-        sizes = {share: len(units) // (1 if share == ASKED else 2) for share in SHARES}
-        rows = [row for share in SHARES for row in measure(hammer, units[: sizes[share]], share)]
-        write("learning", heads, rows, settings, ROOMS)
+        rows = [row for share in asked.at or SHARES for row in measure(hammer, units, share, asked.keep)]
+        if asked.at is None:
+            write("learning", heads, rows, settings, ROOMS)
 
 
 if __name__ == "__main__":
