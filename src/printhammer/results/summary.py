@@ -35,6 +35,12 @@ SHOWN: Final[dict[str, dict[str, tuple[str, str]]]] = {
     "A": {"si": ("A", ".3f"), "inch": ("A", ".3f")},
 }
 """Displayed unit and number format in either unit system, by SI unit."""
+LARGE: Final[dict[str, tuple[tuple[float, str, str], ...]]] = {
+    "s": ((10.0, "s", ".3f"), (0.01, "ms", ".2f")),
+    "m": ((1.0, "m", ".4f"), (0.01, "mm", ".3f")),
+    "J": ((1.0, "J", ".4f"),),
+}
+"""SI units and formats of large quantities, by SI unit: from which magnitude, largest first; arbitrary."""
 _SIGNS: Final = {"us": "µs", "um": "µm", "in lbf": "in·lbf"}
 
 _DOT: Final = re.compile(r"(?<![-\w])([Dd])ot(?=s?(?![-\w]| matrix))")
@@ -75,17 +81,21 @@ def multiplier(value: complex) -> str:
     return real if value.imag == 0.0 else f"{real}{value.imag:+.4g}i"
 
 
-def sign(unit: str, system: System) -> str:
-    """Return the symbol of the display unit for quantities with a given SI unit."""
-    name = SHOWN[unit][system][0]
+def display(unit: str, system: System, largest: float = 0.0) -> tuple[str, str]:
+    """Return display unit and number format for SI quantities up to a magnitude; inches have one unit."""
+    ladder = LARGE.get(unit, ()) if system == "si" else ()
+    return next(((name, digits) for least, name, digits in ladder if largest >= least), SHOWN[unit][system])
+
+
+def sign(name: str) -> str:
+    """Return the symbol of a display unit."""
     return _SIGNS.get(name, name)
 
 
-def shown(value: float, unit: str, system: System) -> str:
-    """Format a quantity, SI, as a number in its display unit, without the unit symbol."""
+def shown(value: float, unit: str, name: str, digits: str) -> str:
+    """Format a quantity, SI, as a number in a display unit, without the unit symbol."""
     from printhammer.units import from_si
 
-    name, digits = SHOWN[unit][system]
     text = format(from_si(value, unit, name), digits)
     # Avoid a minus sign in front of a number rounded to zero.
     return text if any(digit in text for digit in "123456789") else text.removeprefix("-")
@@ -93,12 +103,13 @@ def shown(value: float, unit: str, system: System) -> str:
 
 def rendered(text: str, system: System = "si", style: Callable[[str, str], str] | None = None) -> str:
     """Replace the marks of a text by formatted quantities; `style` renders styled words."""
-    with_units = _QUANTITY.sub(
-        lambda mark: (
-            shown(float(mark[1]), mark[2], system) + ("" if mark[3] else f" {sign(mark[2], system)}")
-        ),
-        text,
-    )
+
+    def converted(mark: re.Match[str]) -> str:
+        value, unit, bare = float(mark[1]), mark[2], mark[3]
+        name, digits = display(unit, system, 0.0 if bare else abs(value))
+        return shown(value, unit, name, digits) + ("" if bare else f" {sign(name)}")
+
+    with_units = _QUANTITY.sub(converted, text)
     return _STYLED.sub(lambda mark: style(mark[1], mark[2]) if style else mark[2], with_units)
 
 
@@ -121,21 +132,31 @@ class Cells:
     def _is_converted(self) -> bool:
         return not self.format and self.unit in SHOWN
 
+    @property
+    def _numbers(self) -> Sequence[Any]:
+        values = self.values.tolist() if isinstance(self.values, np.ndarray) else self.values
+        return [None if isinstance(each, float) and isnan(each) else each for each in values]
+
+    def _display(self, system: System) -> tuple[str, str]:
+        """Return the display unit and number format of all numbers of the column."""
+        numbers = [abs(each) for each in self._numbers if each is not None and not isinstance(each, str)]
+        return display(self.unit, system, max(numbers, default=0.0))
+
     def unit_sign(self, system: System) -> str:
         """Return the unit for the heading; empty for a pure number or text."""
-        return sign(self.unit, system) if self._is_converted else self.unit
+        return sign(self._display(system)[0]) if self._is_converted else self.unit
 
     def texts(self, system: System) -> list[str]:
         """Return the texts of the cells, including style marks."""
-        values = self.values.tolist() if isinstance(self.values, np.ndarray) else self.values
-        return [self._text(value, system) for value in values]
+        units = self._display(system) if self._is_converted else ("", "")
+        return [self._text(value, *units) for value in self._numbers]
 
-    def _text(self, value: Any, system: System) -> str:
-        if value is None or (isinstance(value, float) and isnan(value)):
+    def _text(self, value: Any, name: str, digits: str) -> str:
+        if value is None:
             return NONE
         if isinstance(value, str):
             return value
-        return shown(value, self.unit, system) if self._is_converted else format(value, self.format)
+        return shown(value, self.unit, name, digits) if self._is_converted else format(value, self.format)
 
 
 @dataclass(frozen=True)
