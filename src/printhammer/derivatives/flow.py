@@ -156,7 +156,7 @@ def carry_columns(
 
 
 def forcing_of(problem: Problem, changes: dict[str, FloatArray]) -> tuple[Any, ...]:
-    """Pack derivatives with respect to n constants, from `parameters.as_arrays`, into kernel arguments."""
+    """Convert derivatives with respect to n constants, from `parameters.as_arrays`, to kernel arguments."""
     moves = changes["hammer"]
     count = len(moves)
     away = V.SPACING * (np.arange(V.VARIED) - V.MIDDLE)

@@ -1,9 +1,9 @@
 """Constants with respect to which a motion can be differentiated, and their effect on the kernel's arrays.
 
 A constant is named as in a hammer file, such as "pack.stiffness"; constants of the pulse, such as
-"waveform.width", are those of the drive. Further constants are "period" and "rate" of an even train or a
-sinusoidal force, and the time of a single firing, such as "firing.3", counted from 0. A sampled waveform has
-a single constant, "waveform.amplitude", its largest value.
+"waveform.width", are those of the drive. Further constants are "period" and "rate" of a train at a constant
+rate or a sinusoidal force, and the time of a single firing, such as "firing.3", counted from 0. A sampled
+waveform has a single constant, "waveform.amplitude", its largest value.
 
 Derivatives of the packed arrays are finite differences of fourth order, one-sided if a constant is at an end
 of its range, so that the hammer components need no analytic derivatives.
@@ -39,7 +39,7 @@ _STENCILS: Final = (
 )
 """Central, forward, backward stencils: offsets, and weights times 12 (Abramowitz and Stegun 1964, 25.2)."""
 _MOST_SINGLE: Final = 20
-"""Largest number of firings of an uneven train whose times are listed as constants; arbitrary."""
+"""Largest number of firings of a train without a period whose times are listed as constants; arbitrary."""
 
 
 class Parameter(Declared):
@@ -65,8 +65,9 @@ class Parameter(Declared):
 def parameter_names(hammer: Hammer, drive: Drive) -> list[str]:
     """List the differentiable constants of a hammer and a drive: hammer, pulse and firing times.
 
-    An even train has the constant "period"; any other train of up to 20 firings has a constant for the time
-    of each firing except the first. A drive with different waveforms has no constants of the pulse.
+    A train at a constant rate has the constant "period"; any other train of up to 20 firings has a constant
+    for the time of each firing except the first. A drive with different waveforms has no constants of the
+    pulse.
     """
     names = [key for key in hammer.constants if not key.startswith("waveform.")]
     if drive.uniform:
@@ -150,7 +151,7 @@ def _parameter(hammer: Hammer, drive: Drive, name: str) -> Parameter:
 
 
 def _spacing(drive: Drive, name: str, packed: FloatArray) -> Parameter:
-    """Build the constant "period" or "rate" of an even train, with its first firing fixed, or of a sine."""
+    """Build the constant "period" or "rate" of a train, with its first firing fixed, or of a sine."""
     period, count = drive.period, len(drive.times)
     if period is None or (count == 1 and not isinstance(drive.waveform, Sine)):
         raise InputError.of("constant", name, "a drive with a single period and several firings")

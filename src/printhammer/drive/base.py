@@ -66,7 +66,7 @@ class Drive:
 
     @property
     def period(self) -> float | None:
-        """Time between firings, or period of the force, s; None for uneven firings."""
+        """Time between firings, or period of the force, s; None if the times between firings differ."""
         return self._period
 
     @property

@@ -30,7 +30,7 @@ from printhammer.support.arrays import FloatArray
 def waits_of(
     hammers: Sequence[Hammer], waveforms: Sequence[Waveform], threads: int | None = None
 ) -> FloatArray:
-    """Compute the time from the last firing to the end of each run, s, like `wait_of`, by ensembles."""
+    """Compute the time from the last firing to the end of each run, s, as `wait_of` does for a single run."""
     return windows_of(hammers, waveforms, threads)[0]
 
 

@@ -46,7 +46,7 @@ _SLOWER: Final = (0.98, 0.9, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.02, 0.005)
 
 
 class Flight(Declared):
-    """Motion between two impacts on a surface; the model omits the surface close to either impact."""
+    """Flight between two impacts on a surface, without a force of this surface close to the two impacts."""
 
     end: FloatArray = part("displacement, m, and velocity, m/s, at the end, shape (2,)")
     jacobian: FloatArray = part("derivative with respect to the state at the start, shape (2, 2)")
@@ -254,7 +254,7 @@ _NEAR: Final = 1e-2  # Arbitrary
 _STEEP: Final = 10.0  # Arbitrary
 """Multiplier above which an orbit is so close to its grazing that no bifurcation lies in between."""
 _CLOSER: Final = 0.7
-"""Ratio of the impact speed to that at the last attempt, below which a grazing is sought again; arbitrary."""
+"""Factor on the impact speed of the last attempt, below which a grazing is sought again; arbitrary."""
 _ON_CURVE: Final = 1e-5
 """Largest scaled closing error of an orbit that is appended to a branch before its grazing; arbitrary."""
 

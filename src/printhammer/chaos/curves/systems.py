@@ -190,7 +190,7 @@ def _flight(
 
 
 class GrazingSystem:
-    """Extended map of an orbit that grazes a surface; unknowns are touch phase and first parameter."""
+    """Extended system for an orbit that grazes a surface; unknowns: touch phase, first parameter."""
 
     def __init__(self, plane: Plane, surface: Surface) -> None:
         self.plane, self.kind, self.surface = plane, GRAZING, surface

@@ -36,10 +36,11 @@ SUPERSTABLE: Final = "superstable"
 FORGETS: Final = "no exponent: the motion comes to rest and forgets its past"
 
 FIRST: Final = 1001
-"""Default first firing used for the classification; the very first firing is number 1. Arbitrary."""
+"""Default number of the first firing used for the classification; the very first firing is number 1.
+Arbitrary."""
 
 LAST: Final = 2000
-"""Default last firing used for the classification; arbitrary."""
+"""Default number of the last firing used for the classification; arbitrary."""
 
 _STOPPED: Final = "the run ended before firing"
 

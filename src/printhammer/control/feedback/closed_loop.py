@@ -92,7 +92,7 @@ class FeedbackStrategy(Declared):
         return loops
 
     def _legs(self, hammer: Hammer, now: Sequence[tuple[Loop, int]], ends: FloatArray) -> list[Leg]:
-        """Split runs up to `ends`, s, into stages with one pack each; firing a dot changes the pack."""
+        """Split runs up to `ends`, s, into stages with one pack each; the pack changes at a firing."""
         if self.places is None:
             return [Leg([hammer] * len(now), ends)]
         before = [self.places[loop.slots[max(dot - 1, 0)]] for loop, dot in now]

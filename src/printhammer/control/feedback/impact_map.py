@@ -80,7 +80,7 @@ class ForceMap:
         return releases
 
     def force_at(self, row: int, release: float, back: float) -> float:
-        """Interpolate the peak force of a touch, as a fraction of the single-pulse force."""
+        """Interpolate the peak force after a touch of the pack, as a fraction of the single-pulse force."""
         number = int(np.argmin(np.abs(self.back - back)))
         return float(np.interp(release, self.release, self.force[row, number]))
 

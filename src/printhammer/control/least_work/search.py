@@ -212,7 +212,8 @@ _TRIES, _MOST_TRIES = 3, 12  # Number of starts, and maximum number while no sta
 _LEGS: Final = 2
 """Maximum number of consecutive SLSQP runs, each restarted from the previous result; arbitrary."""
 _ROUNDS, _ROUNDS_AGAIN = 30, 20
-"""SLSQP iteration limits, from a profile and from the preceding current; arbitrary."""
+"""SLSQP iteration limits for a start from a profile, and for a start from the preceding current;
+arbitrary."""
 _SEARCH_TOLERANCE: Final = 5e-7  # Integration tolerance of the comparison of profiles; arbitrary
 _INSIDE: Final = 1.0 - 1e-9  # Factor on current and slope limits: rounding errors stay within the limits
 

@@ -36,7 +36,7 @@ class Samples:
 
 
 def checked(times: npt.ArrayLike, values: npt.ArrayLike, quantity: QuantityName, what: str) -> Samples:
-    """Validate samples; return a record.
+    """Validate the times and values of a sampled waveform; return them as `Samples`.
 
     Raises
     ------

@@ -68,7 +68,7 @@ class Chain(Waveform):
         return offset + last.support
 
     def supply(self) -> Supply:
-        """Return the supply of the first waveform of the chain."""
+        """Return the supply of the first waveform in the sequence."""
         return self.parts[0][1].supply()
 
     def segments(self) -> FloatArray:

@@ -131,7 +131,7 @@ def least_at_rest(mode: int, held: float) -> float:
 
 @inlined
 def most_at_rest(mode: int, held: float) -> float:
-    """Return the highest acceleration [m/s^2] with which an armature stays at rest, as `least_at_rest`."""
+    """Return the highest acceleration [m/s^2] with which an armature stays at rest; see `least_at_rest`."""
     if RIGID_FRONT and mode == RESTING_FRONT:
         return math.inf
     return held

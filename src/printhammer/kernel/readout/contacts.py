@@ -52,7 +52,7 @@ def nodes_before(t: float, nodes: Any, included: bool) -> int:
 
 
 def write_steps(nodes: Any, steps: Any, starts: Any, ends: Any) -> None:
-    """Write the arguments of `quadratures` that integrate over each of the steps of a run."""
+    """Write the arguments with which `quadratures` integrates over each single step of a run."""
     for i in range(nodes.shape[0] - 1):
         steps[i], starts[i], ends[i] = i, nodes[i, 0], nodes[i + 1, 0]
 

@@ -78,7 +78,7 @@ NEAR = 1e-9
 reversal is differentiable."""
 
 RELEASED = 1e-9
-"""Largest relative distance of the force from the static friction at a release that no edge caused."""
+"""Largest relative difference of force and static friction at a release that no edge of the drive caused."""
 RELEASE_SPACING = 1e-3
 """Step size of the time for the rate of the force at a release, as a fraction of the rest."""
 

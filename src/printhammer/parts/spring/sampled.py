@@ -91,7 +91,7 @@ Curve = tuple[bool, tuple[tuple[float, float], ...]]
 
 
 class SampledSum(ForceSum):
-    """Sum of the spring of a hammer and of its forces and contacts, of which any number are sampled."""
+    """Sum of a hammer's spring, forces and contacts, some or all of which are sampled."""
 
     law: ClassVar[str] = "sampled sum"
 

@@ -2,11 +2,11 @@
 
 F. Hendriks (1983), Fig. 7: "Instead of allowing the armature to return fully to the backstop, current pulses
 can be issued that are synchronized with the return of the armature from the paper." `find_buzz_train`
-searches for such a train of the hammer's own pulses in two families: even trains, at a constant period, and
-delayed trains, in which each pulse follows the armature's departure from the pack by a constant delay.
-A delayed train needs a sensor, and can stabilise a motion that is unstable at a constant period. Each train
-starts from rest; if the first excursions are too large for a steady buzz, the armature may touch the backstop
-once before the dots that count.
+searches for such a train of the hammer's own pulses in two families: trains at a constant rate, and delayed
+trains, in which each pulse follows the armature's departure from the pack by a constant delay. A delayed
+train needs a sensor, and can stabilise a motion that is unstable at a constant period. Each train starts from
+rest; if the first excursions are too large for a steady buzz, the armature may touch the backstop once before
+the dots that count.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ FEWEST: Final = 6
 """Smallest number of consecutive dots, without a backstop touch, that is buzz printing; arbitrary."""
 
 _PULSES: Final = 9  # Number of pulses of a train, as in the paper
-_PERIODS: Final = 96  # Number of trial periods of even trains; arbitrary
+_PERIODS: Final = 96  # Number of trial periods of trains at a constant rate; arbitrary
 _DELAY_STEP: Final = 2e-6
 """Spacing of the grid of trial delays, s; arbitrary."""
 

@@ -45,7 +45,7 @@ DAMPINGS: Final = (0.25, 0.5, 2.0, 4.0, 16.0)
 """Factors on stiffness and damping of a hard backstop; arbitrary."""
 
 ELASTOMERS: Final = (8e7, 8e8)
-"""Stiffness of the elastomers, N/m^1.5: 10 N at 25 um, about the paper's value, and ten times as much."""
+"""Stiffnesses of the elastomers, N/m^1.5: about as in the paper (10 N at 25 um), and ten times as much."""
 
 RELAXATIONS: Final = (0.0, 10e-6, 30e-6, 100e-6, 300e-6)  # Relaxation times of the elastomers, s; arbitrary
 

@@ -273,7 +273,7 @@ def fill_scales(
         See `statics_at`.
     quantity, largest, period : float
         Code of the driven quantity (current 0, force 1, voltage 2), largest value of a pulse, and time
-        between firings, s, NaN for uneven firings.
+        between firings, s, NaN if the times between firings differ.
     start : float64 array, shape (2,)
         Displacement, m, and velocity, m/s, at the start.
     tolerance : float

@@ -299,7 +299,7 @@ def _width(data: list[Row], above: list[Row]) -> int:
 
 
 def _is_clock_entry(cell: str) -> bool:
-    """Whether a cell states the sampling, such as "t0 = -1 ms"; "Ix(u1:out)" is the name of a column."""
+    """Whether a cell states the sampling, such as "t0 = -1 ms"."""
     match = _ASSIGNED.fullmatch(cell)
     return match is not None and _key(match[1]) in _CLOCK
 

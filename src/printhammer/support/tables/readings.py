@@ -54,7 +54,7 @@ class Readings:
     lines: IntArray
     """Line number in the file of each row, counted from 1, shape (rows,)."""
     comments: dict[str, str]
-    """Comments of the form ``# key: value``; for a repeated key, the last."""
+    """Comments of the form ``# key: value``; the last comment with a key replaces earlier comments."""
     levels: frozenset[str] = frozenset()
     """Names of columns of logic levels, 0 or 1, from a logic analyser; a level holds until the next row."""
 

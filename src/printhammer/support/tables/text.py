@@ -33,7 +33,7 @@ class Cells:
     rows: list[tuple[int, list[str]]]
     """Rows: line number in the file, counted from 1, and cells."""
     comments: dict[str, str]
-    """Comments of the form ``# key: value``; for a repeated key, the last."""
+    """Comments of the form ``# key: value``; the last comment with a key replaces earlier comments."""
     notes: list[tuple[int, str]]
     """Line number and text of every comment."""
 
