@@ -109,7 +109,7 @@ def read_temperature(value: float | str, name: str) -> float:
 
 
 def _share(feed: str, temperature: float) -> float:
-    """Return the ratio of the coil heat per dot at a temperature, degC, to that at 20 degC."""
+    """Return the coil heat per dot at a temperature, degC, divided by the heat per dot at 20 degC."""
     warm = 1.0 + COPPER * (temperature - REFERENCE)
     return {"voltage": 1.0 / warm, "current": warm, "energy": 1.0}[feed]
 

@@ -77,7 +77,7 @@ class Cloud(NamedTuple):
         return np.asarray(np.isfinite(apart).mean(axis=-1) >= INSIDE)
 
     def equals(self, other: Cloud) -> bool:
-        """Whether two clouds represent one attractor: the points of each lie within reach of the other."""
+        """Whether the points of each of two clouds lie within reach of the other cloud: one attractor."""
         return bool(self.holds(other.tree.data) and other.holds(self.tree.data))
 
 

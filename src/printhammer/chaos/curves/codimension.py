@@ -40,7 +40,7 @@ RESONANCES: Final = 3  # Arbitrary
 _LEVEL: Final = 1e-3  # Arbitrary
 """Component of a unit tangent along a parameter below which a curve is stationary in this parameter."""
 _VANISHES: Final = 0.1  # Arbitrary
-"""Largest tangent component that is treated as zero at a cusp, relative to that of the next nodes."""
+"""Largest tangent component, relative to the tangents of neighbouring nodes, treated as zero at a cusp."""
 _ROUNDS: Final = 20  # Iteration limit of Newton's method; arbitrary
 _MOVE: Final = 1e-6  # Finite-difference step of Newton's method, in scaled variables; arbitrary
 _PRECISION: Final = 1e-11  # Scaled residual below which Newton's method has converged; arbitrary

@@ -16,7 +16,8 @@ from printhammer.run.motion import Motion
 from printhammer.support.arrays import FloatArray
 
 SETTLED: Final = 0.01
-"""Distance from the final position, relative to the range of motion, that counts as settled; arbitrary."""
+"""Distance from the final position, as a fraction of the range of motion, within which a motion is settled;
+arbitrary."""
 
 _POINTS: Final = 2400  # Uniform points of a curve: more than a picture resolves; arbitrary
 _PER_PIECE: Final = 60  # Points of a smooth segment; arbitrary

@@ -341,7 +341,7 @@ def profile(law: Law, data: FloatArray, solution: Solution, index: int) -> Profi
 
 
 def _crossing(values: FloatArray, increase: FloatArray, level: float, never: float) -> float:
-    """Locate where a profile likelihood first reaches a level, by linear interpolation of its square root."""
+    """Locate the first crossing of a level by a profile likelihood, by linear interpolation of its root."""
     above = np.flatnonzero(increase >= level)
     if not above.size:
         return never

@@ -199,7 +199,7 @@ def slope_at(y: Point, place_rate: float, rate: float, law: ForceLaw) -> Point:
 
 @inlined
 def contact_slope_at(y: Point, rate: float, hammer: Hammer, drive: Drive) -> Point:
-    """Return the s-derivative of the state at the start of a backstop step, from the known dv/ds (`rate`)."""
+    """Return the derivative d/ds of the state at the start of a backstop step; `rate` is dv/ds."""
     pace = 2.0 * y[1]
     if HAS_CIRCUIT:
         x = hammer[POSITION] - y[1] * y[1]

@@ -255,7 +255,7 @@ def land_on_push(start: State, h: float, upper: float, cut: bool, law: ForceLaw,
 def level_switch(
     start: State, end: State, h: float, level: float, sign: float, law: ForceLaw, control: Control
 ) -> tuple[int, float, float]:
-    """Detect where sign * x rises through sign * `level` in a step; return code, step fraction, upper bound.
+    """Detect a rise of sign * x through sign * `level` in a step; return code, step fraction, upper bound.
 
     The code is REACHED_FRONT for a crossing of any level, NO_SWITCH, or UNRESOLVED if the step is too long.
     """
