@@ -40,7 +40,7 @@ LARGE: Final[dict[str, tuple[tuple[float, str, str], ...]]] = {
     "m": ((1.0, "m", ".4f"), (0.01, "mm", ".3f")),
     "J": ((1.0, "J", ".4f"),),
 }
-"""SI units and formats of large quantities, by SI unit: from which magnitude, largest first; arbitrary."""
+"""Display units and number formats of large SI quantities: smallest magnitude, unit, format; arbitrary."""
 _SIGNS: Final = {"us": "µs", "um": "µm", "in lbf": "in·lbf"}
 
 _DOT: Final = re.compile(r"(?<![-\w])([Dd])ot(?=s?(?![-\w]| matrix))")
@@ -82,7 +82,7 @@ def multiplier(value: complex) -> str:
 
 
 def display(unit: str, system: System, largest: float = 0.0) -> tuple[str, str]:
-    """Return display unit and number format for SI quantities up to a magnitude; inches have one unit."""
+    """Return display unit and number format, in a unit system, for quantities up to `largest`, SI."""
     ladder = LARGE.get(unit, ()) if system == "si" else ()
     return next(((name, digits) for least, name, digits in ladder if largest >= least), SHOWN[unit][system])
 
