@@ -25,7 +25,7 @@ export function buildControls(holder, studio) {
   const add = (place, options) => put(place, sliderRow(options, studio));
 
   const rate = {
-    id: "rate", name: "rate", hint: "Firings per second; a time between them is written 1/660us.", unit: "Hz", low: Math.min(50, start.low), high: 5000, log: true,
+    id: "rate", name: "rate", hint: "Firings per second; a time between them is written 1/660us.", unit: "Hz", low: Math.min(50, start.low), high: Math.min(5000, 5 * start.high), log: true,
     get: (state) => state.rate, set: (value) => ({ rate: value }), reset: () => ({ rate: start.rate }),
   };
   add(front, rate);
@@ -74,7 +74,7 @@ export function buildControls(holder, studio) {
   const overlap = put(section("train"), choiceRow("overlap", "What overlapping pulses do: add up, or the latest replaces the others, as that of a driver always does.", ["add", "replace"], (state) => state.overlap, (value) => ({ overlap: value }), studio));
   for (const end of ["low", "high"]) {
     add(section("map"), {
-      id: end, name: `${end === "low" ? "lowest" : "highest"} rate`, hint: "End of the map's axis of firing rates.", unit: "Hz", low: Math.min(50, start.low), high: 10000, log: true,
+      id: end, name: `${end === "low" ? "lowest" : "highest"} rate`, hint: "End of the map's axis of firing rates.", unit: "Hz", low: Math.min(50, start.low), high: Math.min(10000, 10 * start.high), log: true,
       get: (state) => state[end], set: (value) => ({ [end]: value }), reset: () => ({ [end]: start[end] }),
     });
   }

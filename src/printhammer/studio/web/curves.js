@@ -9,6 +9,7 @@ const FORCES = ["total", "drive", "magnet", "spring", "damping", "drag", "backst
 const SPACE = { 1: 14, 2: 60, 3: 30 }; // pixels between ticks, by side
 const LEAST = 1e-6; // N
 const KEY = 0.2; // of the height, for the key of forces
+const DENSE = 16; // points per pixel of the screen above which only the extremes of each pixel are drawn
 const DASHES = { damping: [2, 2], drag: [6, 2] };
 
 /** Displacement against time, with backstop, pack and platen, firings, and the drive on the right axis. */
@@ -176,6 +177,18 @@ function remarks(pen, plane, box, studio) {
   }
 }
 
+/** Return the path of a curve through all its points: extremes of whole pixels look like stairs on a steep curve. */
+function segments(u, series, from, to) {
+  const [t, values] = [u.data[0], u.data[series]];
+  if (to - from > DENSE * u.bbox.width) return extremes(u, series, from, to);
+  const { scale } = u.series[series];
+  const stroke = new Path2D();
+  for (let k = from; k <= to; k++) stroke.lineTo(u.valToPos(t[k], "t", true), u.valToPos(values[k], scale, true));
+  return { stroke, fill: null, clip: null, band: null, gaps: null, flags: 1 };
+}
+
+const extremes = uPlot.paths.linear();
+
 function curveView(body, studio, kind) {
   let plot = null;
   let made = "";
@@ -221,7 +234,7 @@ function curveView(body, studio, kind) {
       cursor: { sync: { key: "time", setSeries: false, scales: ["t", null] }, drag: { x: true, y: false, setScale: true }, points: { show: false }, bind: { dblclick: () => () => { studio.zoom(null); return null; } } },
       scales: { t: { time: false, auto: false }, x: { auto: false }, drive: { auto: false }, volts: { auto: false } },
       axes: [axis("t", "s", (u) => `time, ${shownIn(u, "s").name}`, 2), axis("x", main.si, `${right ? main.name : "force"}, ${unitOf(main.si).name}`, 3), ...rights.map((entry) => axis(entry.scale, entry.si, `${entry.name}, ${unitOf(entry.si).name}`, 1, entry.colour))],
-      series: [{ scale: "t" }, ...series.map((entry) => ({ scale: entry.scale, stroke: entry.colour, width: widthOf(entry), dash: entry.dash, points: { show: false } }))],
+      series: [{ scale: "t" }, ...series.map((entry) => ({ scale: entry.scale, stroke: entry.colour, width: widthOf(entry), dash: entry.dash, paths: segments, points: { show: false } }))],
       hooks: {
         drawAxes: [(u) => { if (studio.frames.motion) scaled(u, kind.under); }],
         draw: [(u) => { if (studio.frames.motion) scaled(u, (pen, plane, box) => { if (right) kind.over(pen, plane, box); else key(pen, box, series); }); }],
