@@ -1,3 +1,5 @@
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -117,3 +119,33 @@ def test_no_image_has_a_status(hammer: ph.Hammer) -> None:
     assert not inside.ok
     assert np.isnan(inside.state).all()
     assert np.isnan(inside.jacobian).all()
+
+
+@pytest.mark.parametrize("way", [0.6, 0.9])
+@pytest.mark.parametrize("beyond", [1e-4, 1e-6])
+def test_the_derivative_holds_where_the_pack_is_touched_gently(
+    hammer: ph.Hammer, way: float, beyond: float
+) -> None:
+    """At a start velocity `beyond`, m/s, that at which the armature turns at the front."""
+    regime = Regime.of(hammer, rate=600.0)
+    x = hammer.position + way * (hammer.front - hammer.position)
+
+    def touches(v: float) -> bool:
+        return "pack" in [surface for surface, _time in strobe_map(regime, (x, v)).contacts]
+
+    speeds = np.linspace(-4.0, 2.0, 81)
+    struck = [touches(v) for v in speeds]
+    place = struck.index(not struck[0])
+    inside, outside = sorted(speeds[place - 1 : place + 1], key=touches, reverse=True)
+    while abs(inside - outside) > 1e-12:
+        middle = 0.5 * (inside + outside)
+        inside, outside = (middle, outside) if touches(middle) else (inside, middle)
+    state = np.array([x, inside + math.copysign(beyond, inside - outside)])
+    image = strobe_map(regime, state)
+    assert image.ok
+    assert touches(state[1])
+    for k, scale in enumerate(regime.window.half_widths):
+        side = 1e-7 * scale * np.eye(2)[k]
+        ends = [strobe_map(regime, state + m * side, contacts=False).state for m in (-1.0, 1.0)]
+        slope = (ends[1] - ends[0]) / (2.0 * side[k])
+        assert np.abs(image.jacobian[:, k] - slope).max() < 1e-6 * np.abs(slope).max()

@@ -28,10 +28,6 @@ _SPACING: Final = 1e-6  # Arbitrary
 """Relative step of the finite-difference derivative in the parameter, which only steers Newton's method."""
 _MUCH: Final = 1e3
 """Multiplier above which the parameter step of the finite difference is reduced in proportion; arbitrary."""
-_BESIDE: Final = 1e-7
-"""Finite-difference step of the state at gentle touches, in units of the run's scales; arbitrary."""
-_GENTLE: Final = 3e-4  # Arbitrary
-"""Impact speed on the pack, relative to the speed scale, below which finite differences are used."""
 _IN_PACK: Final = f"{IN_PACK} at the section; another phase of the period can be chosen"
 _MOST_TOUCHES: Final = 100  # Number of contacts in a period above which the map has no value; arbitrary
 _MANY: Final = f"more than {_MOST_TOUCHES} contacts"
@@ -127,47 +123,22 @@ class RegimeFamily:
         period = (end - problem.start) / self.firings
         touches = _touches(hammer, record, problem.start - self.regime.phase * period, end - problem.start)
         passage = Passage(touches, period, self.firings)
-        if any(touch.v_in < _GENTLE * problem.scales[1] for touch in passage.of("pack")):
-            image = np.array(record.nodes[-1, 1:3])
-            jacobian = self._differences(problem, end, state)
-            if not is_usable(hammer, *image.tolist()):
-                return MapValue.none(2, _IN_PACK)
-        else:
-            reached = image_of(regime, state, self.firings, self.tolerance, contacts=False)
-            if not reached.ok:
-                return MapValue.none(2, _IN_PACK if reached.status == IN_PACK else reached.status)
-            image, jacobian = reached.state, reached.jacobian
-        if jacobian is None or not np.isfinite(jacobian).all():
-            slope = None
-        else:
+        reached = image_of(regime, state, self.firings, self.tolerance, contacts=False)
+        if not reached.ok:
+            return MapValue.none(2, _IN_PACK if reached.status == IN_PACK else reached.status)
+        image, jacobian = reached.state, reached.jacobian
+        slope = None
+        if np.isfinite(jacobian).all():
             growth = float(np.abs(np.linalg.eigvals(jacobian)).max())
             slope = self._slope(state, parameter, image, growth)
-        if slope is None or jacobian is None:
-            return MapValue.none(2, "runs with a slightly different parameter or state ended early")
+        if slope is None:
+            return MapValue.none(2, "runs with a slightly different parameter ended early")
         return MapValue(image, jacobian, slope, passage.sequence, extra=passage)
 
     def margin(self, state: FloatArray, parameter: float) -> float:
         """Compute the signed distance from a grazing; see `printhammer.chaos.strobe.map.Image`."""
         problem, end = self._problem(self.regime.with_(self.name, parameter), state)
         return margin_of(problem, problem.run(end))
-
-    def _differences(self, problem: Problem, end: float, state: FloatArray) -> FloatArray | None:
-        """Compute the derivative of the strobe map, shape (2, 2), by finite differences of runs.
-
-        The tangent flow differentiates the contact law by finite differences, which fail at a gentle touch.
-        """
-        columns = []
-        for move in np.diag(_BESIDE * np.array(problem.scales)):
-            ends = [
-                self._state_after(
-                    Problem(problem.hammer, problem.drive, tuple(moved), problem.start, self.tolerance), end
-                )
-                for moved in (state - move, state + move)
-            ]
-            if ends[0] is None or ends[1] is None:
-                return None
-            columns.append((ends[1] - ends[0]) / (2.0 * move.sum()))
-        return np.column_stack(columns)
 
     def _slope(
         self, state: FloatArray, parameter: float, image: FloatArray, growth: float
@@ -187,10 +158,6 @@ class RegimeFamily:
             problem, end = self._problem(self.regime.with_(self.name, parameter), state)
         except InputError:
             return None
-        return self._state_after(problem, end)
-
-    @staticmethod
-    def _state_after(problem: Problem, end: float) -> FloatArray | None:
         record = problem.run(end)
         return None if record.status_name != "ok" else np.asarray(record.nodes[-1, 1:3])
 
