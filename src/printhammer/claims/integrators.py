@@ -80,7 +80,7 @@ def _completes(context: Context, motion: Motion, reference: Motion) -> bool:
 
 
 def _failing_scale(context: Context, reference: Motion, name: str) -> float:
-    """Find the smallest of the tested factors on all step sizes at which a scheme fails."""
+    """Find the smallest tested scale factor of the step sizes at which a scheme fails."""
     scale = 1.0
     while scale < _LARGEST and _completes(context, _scheme(context, name, scale), reference):
         scale *= _RATIO

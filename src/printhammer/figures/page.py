@@ -31,7 +31,7 @@ INK: Final = (24, 24, 38)
 """RGB colours of the paper (`PAPER`) and of fully opaque ink; arbitrary."""
 
 MOST_PIXELS: Final = 24_000_000
-"""Number of pixels above which a sheet is rendered more coarsely; arbitrary."""
+"""Number of pixels above which a sheet of paper is rendered more coarsely; arbitrary."""
 
 _SOFT: Final = 0.1  # Width of the soft rim of a dot, as a fraction of its diameter; arbitrary
 _PIXELS: Final = 1.5  # Smallest width of the soft rim, pixels; arbitrary
@@ -67,7 +67,7 @@ class Sheet:
 def inked(
     sheet: Sheet, across: FloatArray, down: FloatArray, density: FloatArray, diameter: float, finest: float
 ) -> FloatArray:
-    """Render dots; return the optical densities of a sheet's pixels from the top left, shape (rows, columns).
+    """Render dots; return optical densities of the paper's pixels from the top left, shape (rows, columns).
 
     The dots are given by centres, m, densities and a common diameter, m, and are clipped at the edges of the
     sheet. The pixel size is at least `finest`, m.
@@ -127,7 +127,7 @@ _INCH: Final = 25.4e-3  # An inch, m
 _FINENESS: Final = 10  # Pixels per slot of a page; arbitrary
 _ACROSS: Final = 2000  # Largest number of pixels across; arbitrary
 _ZOOM_FINENESS: Final = 50  # Pixels per slot of the region of largest error; arbitrary
-_SHEET_FINENESS: Final = 16  # Pixels per slot of a sheet at true size; arbitrary
+_SHEET_FINENESS: Final = 16  # Pixels per slot of a sheet of paper at true size; arbitrary
 _MICRONS: Final = Scale("Placement error", "m", "um")
 
 
@@ -215,7 +215,7 @@ def zoomed_sheet(page: Page) -> Sheet:
 
 
 def _panel(figure: Figure, sheet: Sheet, top: float, height: float, title: str, left: float = _SIDE) -> Axes:
-    """Add titled axes for a sheet to a figure; height, top and left edge in inches."""
+    """Add titled axes for a sheet of paper to a figure; height, top and left edge in inches."""
     width, whole = figure.get_size_inches()
     wide = height * sheet.width / sheet.height
     ax = figure.add_axes((left / width, (top - height) / whole, wide / width, height / whole))

@@ -132,7 +132,7 @@ def integrate(
     scale : float
         Factor that multiplies all step sizes.
     reading : str
-        Rule for the short step, one of `READINGS`.
+        Rule that decides when a short step is taken, one of `READINGS`.
     moments : array, optional
         Ascending output times, s (default: the ends of the steps). The state is interpolated by the cubic
         Hermite polynomial of the step.

@@ -23,7 +23,7 @@ from printhammer.run.problem import Problem, Record
 from printhammer.support.arrays import FloatArray, IntArray
 
 READINGS = schemes_1983.READINGS
-"""Rules for the short step; see `printhammer.kernel.schemes_1983`."""
+"""Rules that decide when the schemes of 1983 take a short step; see `printhammer.kernel.schemes_1983`."""
 
 Reading = schemes_1983.Reading
 Scheme = schemes_1983.Scheme
@@ -34,9 +34,9 @@ _GAUSS = np.polynomial.legendre.leggauss(4)  # Nodes and weights of the quadratu
 class SchemeProblem(Problem):
     """Hammer under a drive, integrated with a scheme of 1983.
 
-    Arguments as for `Problem`, with the tolerance ignored; `scale` is a factor on all steps of the paper's
-    schedule, and `reading`, one of `READINGS`, the rule for its short steps. InputError if the factor is not
-    positive, or the hammer has damping.
+    Arguments as for `Problem`, with the tolerance ignored; `scale` multiplies all step sizes of the
+    paper's schedule, and `reading`, one of `READINGS`, decides when a short step is taken. InputError if the
+    factor is not positive, or the hammer has damping.
     """
 
     def __init__(

@@ -9,10 +9,10 @@ the strobe map
 doubling is supercritical: the orbits of twice the period are stable where the orbit of the single period is
 not. B and C are differences of J along q, in half-widths of the strobe window.
 
-*Grazing of a rigid backstop.* A touch of depth h adds the velocity (1 + e) sqrt(2 a h), with the acceleration
-a at the touch, so that the strobe map has a square root (A. B. Nordmark, J. Sound Vib. 145 (1991) 279). To
-first order, orbits with the touch exist where the square root of the depth is positive, and orbits without
-the touch where they stay off the surface.
+*Grazing of a rigid backstop.* A touch of depth h adds (1 + e) sqrt(2 a h) to the velocity, with the
+acceleration a at the touch, so that the strobe map has a square root (A. B. Nordmark, J. Sound Vib. 145
+(1991) 279). To first order, orbits with the touch exist where the square root of the depth is positive, and
+orbits without the touch where they stay off the surface.
 """
 
 from __future__ import annotations

@@ -199,9 +199,9 @@ def _chart(
 
 
 LENGTHS: Final = (1, 2, 5, 10, 20, 50)
-"""Default lengths of the stretches of finite-time exponents, in firings; arbitrary."""
+"""Default numbers of successive firings over which a finite-time exponent is averaged; arbitrary."""
 FEWEST: Final = 10
-"""Smallest number of stretches from which a distribution of exponents is computed; arbitrary."""
+"""Smallest number of finite-time exponents from which a distribution is computed; arbitrary."""
 LEVELS: Final = (0.05, 0.25, 0.5, 0.75, 0.95)  # Quantile levels of the distribution; conventional
 
 
@@ -238,7 +238,7 @@ def finite_time(
     train : Lyapunov or Regime
         Exponents of a train, from `printhammer.lyapunov`; or a regime, whose train from rest is computed.
     lengths : sequence of int, optional
-        Lengths of the stretches, in firings, ascending.
+        Numbers of firings in a stretch, ascending.
     firings : int, optional
         For a regime: number of firings over which growth is averaged.
 

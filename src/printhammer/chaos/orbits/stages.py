@@ -396,9 +396,9 @@ class Search:
             self._describe(described, [(every[0].regime, known) for known in different])
 
     def _mirror(self, described: list[tuple[Orbit, int]]) -> None:
-        """Append mirror images of orbits, x -> -x half a period later, unless a surface breaks the symmetry.
+        """Append mirror images of orbits, x -> -x half a period later, if contacts and drive are symmetric.
 
-        If the forces are not odd, Newton's method finds no orbit, or a different orbit.
+        If the other forces are not odd, Newton's method finds no orbit, or a different orbit.
         """
         for orbit, hits in list(described):
             regime = orbit.regime

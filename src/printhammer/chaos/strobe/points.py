@@ -303,7 +303,7 @@ def scheme_strobes(
     scheme : str
         "runge-kutta-4" or "trapezoid".
     reading : str, optional
-        Rule for choosing the short step of the paper's schedule; see `printhammer.run.scheme_runs.READINGS`.
+        Rule that decides when a short step is taken; see `printhammer.run.scheme_runs.READINGS`.
     points, firings, progress
         As for `printhammer.chaos.strobes`; the points begin at the first firing.
 

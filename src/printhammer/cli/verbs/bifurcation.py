@@ -28,7 +28,7 @@ _of = partial(opt.text, panel=_PARAMETER)
     " --direction both --out bifurcation.png",
     {
         "transient": opt.whole(
-            "Number of firings to discard at each value (default: a third, or all but the last 200 if more)."
+            "Number of firings to discard at each value (default: all but the last 200, at least a third)."
         ),
         "refine": opt.whole(
             "Number of times to halve the step where the classification of neighbouring motions differs.",

@@ -40,7 +40,10 @@ def dead_time(
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:
-    """Tabulate the dead time, from switch-on to impact, and the pulse width for a constant impact speed."""
+    """Tabulate dead time (switch-on to impact) and pulse width against rail voltage and coil temperature.
+
+    With the tabulated pulse widths, the impact speed is constant.
+    """
     from printhammer.control.dead_time import dead_time as timed
 
     grid: dict[str, Any] = {

@@ -30,7 +30,7 @@ def figure(
     ),
     reading: str = opt.choice(
         "firings|look-ahead|inside|grid|no-late-step",
-        "Rule for the short steps of a 1983 scheme at the backstop (only with --scheme).",
+        "Rule that decides when a 1983 scheme takes short steps at the backstop (only with --scheme).",
         default="firings",
     ),
 ) -> Answer:

@@ -136,7 +136,7 @@ _KEPT: Final = 16  # Number of profiles refined; arbitrary
 _CLOUD: Final = 32  # Number of trial points of the local search (the cloud); arbitrary
 _MOVES: Final = 8  # Number of steps of the local search; arbitrary
 _REACH, _SHRINKS = 0.25, 0.7
-"""Half-width of the first cloud, and factor on the half-width per move; arbitrary."""
+"""Half-width of the first cloud, and factor by which each move reduces the half-width; arbitrary."""
 
 
 def printing_profile(

@@ -2,7 +2,7 @@
 
 `plot_correlation` draws correlation sums and their local slopes against the distance, with the plateau.
 
-`plot_finite_time` draws histograms of finite-time exponents over stretches of several lengths.
+`plot_finite_time` draws histograms of the finite-time exponents of a train, one per averaging length.
 
 `plot_recurrence` draws a recurrence plot and lists its quantities.
 """

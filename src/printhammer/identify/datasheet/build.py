@@ -106,7 +106,7 @@ class SheetMagnet:
     misfit: float
     """Largest relative deviation of the fitted forces from the forces in the data sheet."""
     inductance: float
-    """Inductance of the fitted law at small currents, at the sheet's inductance gap or the full gap, H."""
+    """Small-current inductance of the fitted law, at the data sheet's inductance gap or the full gap, H."""
 
 
 def fit_magnet(sheet: Sheet) -> SheetMagnet:
@@ -165,7 +165,7 @@ def forces_of(part: ReluctanceMagnet, sheet: Sheet) -> FloatArray:
 
 
 def inductance_of(part: ReluctanceMagnet, sheet: Sheet) -> float:
-    """Compute the inductance at small currents, H, at the sheet's inductance gap or the widest gap."""
+    """Compute the small-current inductance, H, at the data sheet's inductance gap or the widest gap."""
     gap = float(sheet.gaps.max()) if sheet.inductance is None else sheet.inductance[1]
     return law.magnet_inductance(part.packed(0.0), sheet.closed_at - gap, 0.0)
 
@@ -361,7 +361,7 @@ def _spring(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, 
 
 
 def _contacts(sheet: DataSheet) -> dict[str, Any]:
-    """Return the tables of the contacts of the sheet, by key of the hammer file."""
+    """Build the contact tables of a hammer file from a data sheet; return the tables by name."""
     tables: dict[str, Any] = {}
     for name, side, place in CONTACTS:
         if f"{name}.force" in sheet.entries:

@@ -30,8 +30,8 @@ def implausible(sheet: DataSheet, part: ReluctanceMagnet) -> list[str]:
     - Size: the circle must fit into the smallest side or diameter of the device, `size`.
     - Saturation: a pole of area A holds at most B^2 A / (2 mu0), with the saturation flux density B of iron.
     - Energy: the driver must be able to supply the field energy at full gap, L I^2 / 2, within one pulse. I
-      is the current at which the sheet specifies the forces, and a pulse supplies at most rail voltage times
-      I times on-time.
+      is the current at which the data sheet specifies the forces, and a pulse supplies at most rail voltage
+      times I times on-time.
     """
     found = []
     diameter = 2.0 * math.sqrt(part.pole_area / math.pi)

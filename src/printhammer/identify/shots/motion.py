@@ -1,7 +1,7 @@
 """Fit constants to displacement records of single shots, by multiple shooting between contacts.
 
 With the static forces known, the records determine the mass and the contact laws. Since a motion depends only
-on forces over mass, a common factor on mass and all forces leaves every record unchanged.
+on forces over mass, multiplying mass and all forces by a common factor leaves every record unchanged.
 
 The result includes a test of the model and remarks on records and constants.
 """

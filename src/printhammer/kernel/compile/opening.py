@@ -51,12 +51,12 @@ class _ChoiceType(types.Type):
         super().__init__(f"choice({base})")
 
     def can_convert_to(self, typingctx: Any, other: Any) -> Any:
-        """Return the conversion of a choice to another numba type, as for its base type."""
+        """Return the conversion from the choice's base type to another type, ranked no better than safe."""
         conversion = typingctx.can_convert(self.base, other)
         return None if conversion is None else max(conversion, Conversion.safe)
 
     def unify(self, typingctx: Any, other: Any) -> Any:
-        """Return the common type of a choice and another numba type, as for its base type."""
+        """Return the common numba type of the choice's base type and another type."""
         return typingctx.unify_pairs(self.base, other)
 
 

@@ -69,7 +69,7 @@ def spring_level(c: Any, k: float) -> float:
 
 
 def spring_domain(q: Any, ends: Any) -> None:
-    """Narrow a displacement range, m, to the samples of all forces; `q` holds the numbers of the part."""
+    """Narrow a displacement range, m, to the samples of all forces; `q` holds the values of the part."""
     at = 1 + WIDTH * int(q[0])
     first = at + 3
     for _ in range(int(q[at])):

@@ -47,7 +47,7 @@ _DELAYS: Final = 400
 PATIENCE: Final = 3.0  # Arbitrary
 """Time limit for a dot, as a multiple of the single pulse's time from firing to the end of contact."""
 
-_ZOOMS, _PER_ZOOM = 2, 4  # Number of refinements, and factor on the spacing of each; arbitrary
+_ZOOMS, _PER_ZOOM = 2, 4  # Number of refinements, and divisor of the spacing per refinement; arbitrary
 
 
 class Run(Declared):

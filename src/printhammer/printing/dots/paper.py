@@ -1,7 +1,8 @@
-"""Paper that varies along the line: stiffness and front of the pack are random functions of position.
+"""Paper that varies along the line: pack stiffness and pack front are random functions of position.
 
-Stiffness and front are normal and mutually independent, with the correlation exp(-d / length) between two
-positions d apart: a first-order autoregressive process. Draws are clipped at three standard deviations.
+Pack stiffness and the position of the pack front are normal and mutually independent, with the correlation
+exp(-d / length) between two positions d apart: a first-order autoregressive process. Draws are clipped at
+three standard deviations.
 
 A paper file is TOML with the keys ``stiffness``, ``front``, ``length`` and ``seed``, each of them optional::
 
@@ -98,7 +99,10 @@ class Paper(Declared):
         )
 
     def deviations(self, slots: int, pitch: float) -> FloatArray:
-        """Draw deviations of stiffness and front, in standard deviations, shape (2, slots); `pitch` in m."""
+        """Draw deviations of pack stiffness and pack front, in standard deviations, shape (2, slots).
+
+        `pitch` is the distance between neighbouring slots, m.
+        """
         rng = np.random.default_rng(self.seed)
         white = rng.standard_normal((2, slots))
         kept = math.exp(-pitch / self.length) if self.length else 0.0

@@ -295,7 +295,7 @@ def spreads_of(hammer: Hammer, asked: float | Mapping[str, float]) -> dict[str, 
 
 
 def draw(spreads: Mapping[str, float], number: int, seed: int) -> FloatArray:
-    """Draw factors on the constants, shape (number, constants), uniform within the relative spreads.
+    """Draw factors that multiply the constants, shape (number, constants), uniform within relative spreads.
 
     The points are a scrambled Sobol sequence (A. B. Owen, J. Complexity 14 (1998) 466).
     """
@@ -309,7 +309,7 @@ def draw(spreads: Mapping[str, float], number: int, seed: int) -> FloatArray:
 
 
 def _changes(hammer: Hammer, spreads: Iterable[str], factors: FloatArray) -> list[dict[str, float]]:
-    """Compute the constants of each drawn hammer, SI, from factors on the constants of the design."""
+    """Multiply the constants of the design by drawn factors; return the constants of each hammer, SI."""
     zero = {key: hammer.origin if key == GAP else 0.0 for key in spreads}
     values = {key: hammer.constants[key].si for key in zero}
     return [

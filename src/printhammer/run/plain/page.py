@@ -98,7 +98,7 @@ def fill_constants(
     body : float64 array, shape (3,)
         Mass, kg; position of the backstop and front of the pack, m, NaN if missing.
     damping, spring, pack, backstop, coil, magnet : float64 arrays
-        Numbers of the parts (`printhammer.parts.base.Part.numbers`), empty for an absent part.
+        Values of the parts (`printhammer.parts.base.Part.numbers`), empty for an absent part.
     constants : float64 array
         Array of zeros, to which the constants are written.
     ends : float64 array, shape (2,)
