@@ -22,7 +22,10 @@ BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
 SHOWN = r"(single_pulse|printed_line)\.py$"
 EXTERNAL = re.compile(r"(?:https?:)?//")
 # Pages whose code computes what another test computes.
-ELSEWHERE = {"family": "studies/reconstruction/tests/family/test_conclusions.py"}
+ELSEWHERE = {
+    "family": "studies/reconstruction/tests/family/test_conclusions.py",
+    "energy": "the example in the help of the verb, in tests/cli/test_registry.py; tests/control/least_work",
+}
 # Code of pages that takes up to a minute as printed runs on fewer values.
 FEWER = {
     "basins": {
@@ -33,13 +36,12 @@ FEWER = {
         "longest=1)": "longest=1, starts=20)",
         "length=2.0": "length=0.5",
     },
-    "bifurcation": {"1.35e-3, 60)": "1.35e-3, 8)", "5e10, 20)": "5e10, 4)"},
+    "bifurcation": {"1.35e-3, 60)": "1.35e-3, 4)", "5e10, 20)": "5e10, 3)"},
     "continuation": {
         '("1.23 ms", "1.36 ms")': '("1.24 ms", "1.26 ms")',
         "most=60": "most=10",
         "grid=(8, 4), most=10": "grid=(3, 2), most=4",
     },
-    "energy": {"dots=2": "dots=1"},
     "orbits": {"longest=2": "longest=1, follow=0", "longest=1, starts=60": "longest=1, starts=20, follow=0"},
     "quality": {"safe_rate(hammer)": "safe_rate(hammer, first=700.0, step=50.0)"},
     "strobe": {"arange(1400, 1300, -5)": "arange(1400, 1385, -5)"},

@@ -11,16 +11,19 @@ PARTS = {"cubic_spring"}
 SCRIPTS = sorted(path for path in EXAMPLES.glob("*.py") if path.stem not in PARTS)
 # Scripts that compute what another test computes; `make docs` runs them.
 ELSEWHERE = {
-    "feedback": "the example in the help of the verb, in tests/cli/test_registry.py",
+    "feedback": "the example in the help of the verb, in tests/control/feedback/test_comparison.py",
     "least_work": "a burst of as many dots in tests/truth/test_least_work.py",
+    "orbits": "the code on the page on orbits, in tests/test_docs.py",
+    "strobe": "the code on the page on strobes, in tests/test_docs.py",
 }
 # What takes a minute as printed runs on fewer values; `make docs` runs all.
 FEWER = {
     "continuation": {'("1.23 ms", "1.36 ms")': '("1.24 ms", "1.26 ms")'},
-    "damping_materials": {"first=300, step=100": "first=300, step=400"},
-    "orbits": {
-        "longest=2, starts=100": "longest=1, starts=30",
-        "longest=6, starts=100": "longest=2, starts=10, follow=0",
+    "damping_materials": {
+        "first=300, step=100": "first=300, step=400",
+        '    ph.Material("hard", "half the damping", {"backstop.damping": 0.5 * damping}),\n': "",
+        '    ph.Material("hard", "twice the damping", {"backstop.damping": 2 * damping}),\n': "",
+        '    ph.Material("elastomer", "soft elastomer", elastomer(8e7, 100e-6)),\n': "",
     },
     "print_quality": {"step=25": "step=100"},
     "sensitivities": {"2e-3, 161)": "2e-3, 9)"},

@@ -32,12 +32,11 @@ NEEDED = {
 # Examples that take more than a few seconds, with options that shorten those whose length tells nothing.
 LONG = {
     "basins": "",
-    "bifurcation": "--values 8",
+    "bifurcation": "--values 4",
     "continue": "",
     "curve": "",
     "orbits": "--longest 1 --starts 20",
     "energy": "--dots 1",
-    "feedback": "",
     "tune": "--history 1",
     "sweep": "",
 }
@@ -47,6 +46,7 @@ ELSEWHERE = {
     "studio": "opens a browser; test_studio.py",
     "fit coil": "reads a hammer on a voltage that no other verb writes; test_fit_coil.py",
     "warm": "test_warm.py runs it",
+    "feedback": "control/feedback/test_comparison.py runs it, with a controller that another test needs",
     "learn": "chooses among 400 hammers; test_learn.py, and its page, with fewer",
 }
 

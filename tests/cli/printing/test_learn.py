@@ -10,7 +10,7 @@ from printhammer.control.learning.law import RUNS
 
 
 def test_a_unit_learns_its_table(cli: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """After two stages; the commands of docs/howto/learning.md have all."""
+    """After two stages; two units in control/learning/test_units.py have all."""
     monkeypatch.setattr("printhammer.control.learning.learn.RUNS", RUNS[:2])
     unit, table, picture = tmp_path / "unit.toml", tmp_path / "learned.csv", tmp_path / "lines.png"
     ph.load("hendriks-1983-1").replace("magnet.Am", 0.282).save(unit)

@@ -1,5 +1,6 @@
 """Feedback on a hammer: the drives of the closed loop, the comparison, pictures, and what is refused."""
 
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from tests import hammers
 from tests.errors import refused
 
 import printhammer as ph
-from printhammer.cli.main import main
+from printhammer.cli.main import VERBS, main
 from printhammer.control.feedback.closed_loop import FeedbackStrategy
 from printhammer.control.feedback.comparison import Feedback
 from printhammer.control.feedback.controller import Controller
@@ -35,6 +36,12 @@ PERFECT = PositionSensor(noise=0.0, step=0.0)
 def controller() -> Controller:
     hammer = ph.load(HAMMER)
     return Controller(hammer, driver_of(hammer, CURRENT))
+
+
+@pytest.fixture(scope="module")
+def shipped() -> Controller:
+    hammer = ph.load("hendriks-1983")
+    return Controller(hammer, driver_of(hammer))
 
 
 @pytest.mark.slow
@@ -214,6 +221,31 @@ def test_feedback_and_a_table_at_once_are_refused(
 
 
 @pytest.mark.slow
+def test_the_example_in_the_help_runs(
+    shipped: Controller,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Of the shipped hammer, whose controller takes most of the time; `test_the_comparison` makes another."""
+    made: list[tuple[object, ...]] = []
+
+    def controller(*arguments: object, **_options: object) -> Controller:
+        made.append(arguments[:2])
+        return shipped
+
+    monkeypatch.setattr("printhammer.control.feedback.comparison.Controller", controller)
+    monkeypatch.chdir(tmp_path)
+    (example,) = [verb.example for verb in VERBS if verb.name == "feedback"]
+    with pytest.raises(SystemExit) as end:
+        main(shlex.split(example)[1:])
+    assert end.value.code == 0
+    assert made == [(shipped.hammer, shipped.driver)]
+    assert "feedback" in capsys.readouterr().out
+    assert [path.name for path in tmp_path.iterdir()] == ["feedback.png"]
+
+
+@pytest.mark.slow
 def test_feedback_drives_a_page_and_a_report(
     controller: Controller, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -247,11 +279,9 @@ def test_bad_gaps_are_refused(gaps: list[float]) -> None:
 
 
 @pytest.mark.slow
-def test_dots_that_follow_a_landing_are_within_limits() -> None:
+def test_dots_that_follow_a_landing_are_within_limits(shipped: Controller) -> None:
     """The backstop of the shipped hammer is soft: pressed against it, the armature is thrown when let go."""
-    hammer = ph.load("hendriks-1983")
-    controller = Controller(hammer, driver_of(hammer))
-    single, way = controller.single, FeedbackStrategy(controller)
+    hammer, single, way = shipped.hammer, shipped.single, FeedbackStrategy(shipped)
     for gap in (0.88e-3, 1.05e-3, 1.3e-3):
         dots = ph.simulate(hammer, way(hammer, [(0, 1, 2, 3)], 1.0 / gap)[0]).dots
         force = np.array([dot.peak_force for dot in dots], dtype=float) / single.force - 1.0

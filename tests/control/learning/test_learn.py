@@ -285,7 +285,7 @@ def test_no_rung_is_fired_while_the_armature_is_in_the_pack(by_time: LearningLaw
 
 @pytest.mark.slow
 def test_the_table_is_for_its_unit_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """After two stages; `test_units.py` and the commands of docs/howto/learning.md have all."""
+    """After two stages; two units in `test_units.py` have all."""
     monkeypatch.setattr("printhammer.control.learning.learn.RUNS", RUNS[:2])
     result = ph.learn(nominal(), rate=RATE, sensor=SENSOR, members=150, serial="A17")
     assert result.table.serial == "A17"
