@@ -11,11 +11,11 @@ pulse. The sensor of each unit has an offset that the learner does not know, wit
 [X ...]`` measures only these multiples of the safe rate, for ``--keep``, and writes no table.
 
 ``--units N`` sets the number of units, ``--feedback N`` the number of units on which feedback prints a
-cycle of order 6. ``--sensors`` measures other sensors instead, ``--tolerance`` other variabilities,
-``--drivers`` other drivers at 1.5 times the safe rate, and ``--family`` units of two other hammers of the
-family. ``--picture FILE`` only draws the dots of one unit while it learns, ``--curves FILE`` the fraction
-of units that print all dots, ``--tolerance-curves FILE`` the dots within limits against the spread of the
-production, ``--parts FILE`` the contributions of driver, table, learning and feedback.
+cycle of order 6. ``--sensors`` measures other sensors instead, ``--tolerance`` other variabilities, and
+``--family`` units of two other hammers of the family. ``--picture FILE`` only draws the dots of one unit
+while it learns, ``--curves FILE`` the fraction of units that print all dots, ``--tolerance-curves FILE`` the
+dots within limits against the spread of the production, ``--parts FILE`` the contributions of driver, table,
+learning and feedback.
 """
 
 import argparse
@@ -25,6 +25,7 @@ from collections.abc import Callable
 from importlib import import_module
 from io import BytesIO
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from measured import MOTION, Cell, Column, Measured, open_loop_rate, read, write
@@ -39,7 +40,7 @@ from printhammer.control.learning.lines import printed
 from printhammer.control.learning.preparation import law_for
 from printhammer.control.learning.production import OFFSET
 from printhammer.control.learning.sensor import ImpactSensor
-from printhammer.control.table.drive import DRIVERS, driven_by, with_pulse
+from printhammer.control.table.drive import driven_by, with_pulse
 from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import nominal
 from printhammer.printing.dots.strategy import LEAD_IN, Strategy, cycle_with_lead_in, open_loop, slots_of
@@ -65,7 +66,10 @@ UNKNOWN = {"mass": 0.02, "backstop.stiffness": 0.1}
 RATE = Column(name="rate / open-loop safe rate", format="g")
 DRIVE = Column(name="drive")
 GOOD = (Column(name="dots within limits", unit="%", format=".1f"), Column(name="units that print all"))
-FEWER = Column(name="units that printed fewer than in the better open loop, up to this stage")
+FEWER = (
+    Column(name="units with a table that printed fewer dots than in the better open loop, up to this stage"),
+    Column(name="units in the worse of two open loops"),
+)
 SHOWN = 2
 """Number of the unit in the picture: one of the many that an open loop does not print well."""
 FAMILY = ("02", "06")
@@ -100,41 +104,56 @@ def shares(units: list[ph.Hammer], single: object, rate: float, way: Strategy) -
     return trial.judgement.good.sum(axis=1) / trial.judgement.wanted.sum(axis=1)
 
 
-def cells(good: np.ndarray, lost: np.ndarray | None = None) -> list[Cell]:
-    """Return the percentage of good dots, the number of units that print all, and the number of losers."""
-    return [100.0 * float(good.mean()), int((good == 1.0).sum()), None if lost is None else int(lost.sum())]
+def cells(good: np.ndarray) -> list[Cell]:
+    """Return the percentage of good dots, and the number of units that print all."""
+    return [100.0 * float(good.mean()), int((good == 1.0).sum())]
 
 
-def learned(
-    law: LearningLaw, units: list[ph.Hammer], sensor: ImpactSensor
-) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-    """Return fractions of dots within limits and the mask of losers, per unit, by number of test dots.
+class Learned(NamedTuple):
+    """Fractions of dots within limits, per unit: after some numbers of test dots, and in two open loops."""
 
-    A loser prints fewer dots than in the better open loop, after this or a smaller number of test dots.
-    """
+    stages: dict[int, list[float]]
+    loops: list[list[float]]
+
+    def last(self) -> np.ndarray:
+        """Return the fractions after all test dots."""
+        return np.array(self.stages[AFTER[-1]])
+
+    def cells(self, dots: int) -> list[Cell]:
+        """Return the cells of a row: dots, units that print all, and the two counts of `FEWER`.
+
+        A unit that prints as many dots as in one of the open loops counts as driven in open loop.
+        """
+        loops = np.array(self.loops)
+        below, in_loop = (
+            {n: test(np.array(good)) for n, good in self.stages.items() if 0 < n <= dots}
+            for test in (
+                lambda good: good < loops.max(axis=0) - 1e-12,
+                lambda good: (np.abs(good - loops) < 1e-12).any(axis=0),
+            )
+        )
+        losers = np.any([below[n] & ~in_loop[n] for n in below], axis=0)
+        worse = int((below[dots] & in_loop[dots]).sum())
+        return [*cells(np.array(self.stages[dots])), int(losers.sum()), worse]
+
+
+def learned(law: LearningLaw, units: list[ph.Hammer], sensor: ImpactSensor) -> Learned:
+    """Return the fractions of dots within limits of each unit, at all stages and in two open loops."""
     press = law.production.press([with_pulse(unit, law.entries.task.pulse) for unit in units])
     loops = printed(order_loops(press, law.entries), law.entries.task)
-    plain = np.max([good.mean(axis=1) for good in loops], axis=0)
-    stages, lost = {}, np.zeros(len(units), bool)
-    for stage in calibrate(law, units, sensor)[1]:
-        good = stage.good.mean(axis=1)
-        if stage.dots:
-            lost = lost | (good < plain - 1e-12)
-        stages[stage.dots] = good, lost
-    return stages
+    stages = {stage.dots: stage.good.mean(axis=1).tolist() for stage in calibrate(law, units, sensor)[1]}
+    return Learned(stages, [good.mean(axis=1).tolist() for good in loops])
 
 
-def kept(
-    folder: Path | None, name: str, stages: Callable[[], dict[int, tuple[np.ndarray, np.ndarray]]]
-) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-    """Return the result of `learned` from a file of the folder, or compute it and write the file."""
+def kept(folder: Path | None, name: str, measured: Callable[[], Learned]) -> Learned:
+    """Return what units learned from a file of the folder, or measure it and write the file."""
     path = None if folder is None else folder / f"{name.replace(' ', '-')}.json"
     if path is not None and path.exists():
-        return {int(dots): tuple(map(np.array, pair)) for dots, pair in json.loads(path.read_text()).items()}
-    found = stages()
+        stages, loops = json.loads(path.read_text())
+        return Learned({int(dots): good for dots, good in stages.items()}, loops)
+    found = measured()
     if path is not None:
-        text = {dots: [good.tolist(), lost.tolist()] for dots, (good, lost) in found.items()}
-        path.write_text(json.dumps(text))
+        path.write_text(json.dumps(found))
     return found
 
 
@@ -145,8 +164,8 @@ def measure(hammer: ph.Hammer, units: list[ph.Hammer], share: float, folder: Pat
     """
     rate, single, rows = share * open_loop_rate(hammer), nominal(hammer, tolerance=DISPLAY_TOLERANCE), []
 
-    def add(way: str, good: np.ndarray, lost: np.ndarray | None = None) -> None:
-        rows.append([share, way, len(good), *cells(good, lost)])
+    def add(way: str, count: int, found: list[Cell]) -> None:
+        rows.append([share, way, count, *found])
         print(*rows[-1], time.strftime("%H:%M:%S"), flush=True)
 
     plain = np.zeros(len(units))
@@ -154,24 +173,25 @@ def measure(hammer: ph.Hammer, units: list[ph.Hammer], share: float, folder: Pat
         driven = driven_by(hammer, driver, 2.0)
         fired = [with_pulse(unit, driven.waveform) for unit in units]
         alone = shares(fired, nominal(driven, tolerance=DISPLAY_TOLERANCE), rate, open_loop)
-        add(f"open loop, {driver}", alone)
+        add(f"open loop, {driver}", len(units), [*cells(alone), None, None])
         plain = np.maximum(plain, alone)
         for name, options in (("table", {}), ("robust table", {"variability": Variability()})):
             table = ph.tune(hammer, rate=rate, driver=driver, **options)
             good = shares(units, single, rate, table.strategy(hammer))
-            add(f"{name}, {driver}", good, good < plain - 1e-12)
+            fewer = int((good < plain - 1e-12).sum())
+            add(f"{name}, {driver}", len(units), [*cells(good), fewer, None])
     for driver in ("switch", "own"):
         for name, sensor in SENSORS.items():
             some = units if (driver, name) == USUAL else units[: len(units) // 4]
 
-            def stages(
+            def measured(
                 driver: str = driver, sensor: ImpactSensor = sensor, some: list[ph.Hammer] = some
-            ) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+            ) -> Learned:
                 return learned(law_for(hammer, rate, driver=driver, sensor=sensor)[0], some, sensor)
 
-            seen = kept(folder, f"{share:g} {driver} {name}", stages)
+            seen = kept(folder, f"{share:g} {driver} {name}", measured)
             for dots in AFTER:
-                add(f"learned from {name}, {driver}, {dots} dots", *seen[dots])
+                add(f"learned from {name}, {driver}, {dots} dots", len(some), seen.cells(dots))
     return rows
 
 
@@ -188,7 +208,7 @@ def feedback(hammer: ph.Hammer, units: list[ph.Hammer]) -> list[list[Cell]]:
             cases = [Case(unit, controller.single, share * open_loop_rate(hammer)) for unit in units]
             trial = attempt(cases, [slots], way, limits=Limits(), tolerance=DISPLAY_TOLERANCE)
             good = trial.judgement.good.mean(axis=1)
-            rows.append([share, name, *cells(good)[:2]])
+            rows.append([share, name, *cells(good)])
             print(*rows[-1], f"{time.time() - begin:.0f} s", flush=True)
     return rows
 
@@ -200,7 +220,7 @@ def sensors(hammer: ph.Hammer, units: list[ph.Hammer]) -> list[list[Cell]]:
         law, _base = law_for(hammer, ASKED * open_loop_rate(hammer), sensor=sensor)
         for other, options in OTHERS.items():
             shown = ImpactSensor(**{"force": sensor.force, "offset": OFFSET, **options})
-            rows.append([name, other, *cells(*learned(law, units, shown)[AFTER[-1]])])
+            rows.append([name, other, *learned(law, units, shown).cells(AFTER[-1])])
             print(*rows[-1], flush=True)
         for key, spread in UNKNOWN.items():
             rng = np.random.default_rng(5)
@@ -209,24 +229,8 @@ def sensors(hammer: ph.Hammer, units: list[ph.Hammer]) -> list[list[Cell]]:
                 unit.replace(key, unit.constants[key].si * by) for unit, by in zip(units, off, strict=True)
             ]
             said = f"white noise; {key} is off by {100.0 * spread:g} % as well"
-            rows.append([name, said, *cells(*learned(law, other, sensor)[AFTER[-1]])])
+            rows.append([name, said, *learned(law, other, sensor).cells(AFTER[-1])])
             print(*rows[-1], flush=True)
-    return rows
-
-
-def drivers(hammer: ph.Hammer, units: list[ph.Hammer]) -> list[list[Cell]]:
-    """Return the results of each driver in open loop, with a robust table and with a learned table."""
-    rows, sensor, rate = [], SENSORS["time and force"], ASKED * open_loop_rate(hammer)
-    for driver in DRIVERS:
-        table = ph.tune(hammer, rate=rate, driver=driver, variability=Variability())
-        alone = shares([hammer], nominal(hammer), rate, table.strategy(hammer))
-        robust = shares(units, nominal(hammer), rate, table.strategy(hammer))
-        law, _base = law_for(hammer, rate, driver=driver, sensor=sensor)
-        stages = learned(law, units, sensor)
-        first, last = stages[0][0], stages[AFTER[-1]][0]
-        seen = [100.0 * float(each.mean()) for each in (first, alone, robust, last)]
-        rows.append([ASKED, driver, *seen, int((last == 1.0).sum())])
-        print(*rows[-1], flush=True)
     return rows
 
 
@@ -241,13 +245,13 @@ def family(count: int, seed: int) -> list[list[Cell]]:
             continue
         rate, units = ASKED * open_loop_rate(hammer), Variability().draw(hammer, count, seed)
         single = nominal(hammer, tolerance=DISPLAY_TOLERANCE)
-        rows.append([number, "open loop, own", *cells(shares(units, single, rate, open_loop))[:2]])
+        rows.append([number, "open loop, own", *cells(shares(units, single, rate, open_loop))])
         table = ph.tune(hammer, rate=rate, driver="switch", variability=Variability()).strategy(hammer)
-        rows.append([number, "robust table, switch", *cells(shares(units, single, rate, table))[:2]])
+        rows.append([number, "robust table, switch", *cells(shares(units, single, rate, table))])
         for name, sensor in SENSORS.items():
             law, _base = law_for(hammer, rate, sensor=sensor)
-            good = learned(law, units, sensor)[AFTER[-1]][0]
-            rows.append([number, f"learned from {name}, switch, 1000 dots", *cells(good)[:2]])
+            good = learned(law, units, sensor).last()
+            rows.append([number, f"learned from {name}, switch, 1000 dots", *cells(good)])
             print(*rows[-1], flush=True)
     return rows
 
@@ -407,10 +411,10 @@ def tolerance(hammer: ph.Hammer, count: int, seed: int) -> list[list[Cell]]:
         }
         for name, sensor in SENSORS.items():
             law, _base = law_for(hammer, rate, sensor=sensor, variability=spread)
-            ways[f"learned from {name}, switch"] = learned(law, units, sensor)[AFTER[-1]][0]
+            ways[f"learned from {name}, switch"] = learned(law, units, sensor).last()
         ways[f"feedback, {min(FEEDBACK, count)} units"] = looped(controller, units[:FEEDBACK], rate)
         for name, good in ways.items():
-            rows.append([factor, name, *cells(good)[:2]])
+            rows.append([factor, name, *cells(good)])
             print(*rows[-1], flush=True)
     return rows
 
@@ -423,7 +427,6 @@ def main() -> None:
     parser.add_argument("--feedback", type=int)
     parser.add_argument("--sensors", action="store_true")
     parser.add_argument("--tolerance", action="store_true")
-    parser.add_argument("--drivers", action="store_true")
     parser.add_argument("--family", action="store_true")
     parser.add_argument("--picture", type=Path)
     parser.add_argument("--curves", type=Path)
@@ -450,17 +453,8 @@ def main() -> None:
     units = Variability().draw(hammer, asked.units, asked.seed)
     settings = {"units": asked.units, "seed": asked.seed, "safe_rate": open_loop_rate(hammer)}
     if asked.sensors:
-        heads = [Column(name="learned from"), Column(name="sensor"), *GOOD, FEWER]
+        heads = [Column(name="learned from"), Column(name="sensor"), *GOOD, *FEWER]
         write("learning-sensors", heads, sensors(hammer, units), settings, ROOMS)
-    elif asked.drivers:
-        names = ("open loop", "table on the nominal hammer", "robust table", "learned from time and force")
-        heads = [
-            RATE,
-            Column(name="driver"),
-            *(Column(name=f"{name}: dots within limits", unit="%", format=".1f") for name in names),
-        ]
-        heads.append(Column(name="units that print all in the end"))
-        write("learning-drivers", heads, drivers(hammer, units), settings, ROOMS)
     elif asked.family:
         heads = [Column(name="hammer of the family"), DRIVE, *GOOD]
         names = tuple(f"hendriks-1983-family-{number}" for number in FAMILY)
@@ -474,7 +468,7 @@ def main() -> None:
         rows = feedback(hammer, units[: asked.feedback])
         write("learning-feedback", [RATE, DRIVE, *GOOD], rows, settings, (*ROOMS, "control/feedback"))
     else:
-        heads = [RATE, DRIVE, Column(name="units", format="d"), *GOOD, FEWER]
+        heads = [RATE, DRIVE, Column(name="units", format="d"), *GOOD, *FEWER]
         rows = [row for share in asked.at or SHARES for row in measure(hammer, units, share, asked.keep)]
         if asked.at is None:
             write("learning", heads, rows, settings, ROOMS)
