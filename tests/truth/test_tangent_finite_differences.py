@@ -3,7 +3,6 @@
 Runs of tolerance 1e-13, central differences extrapolated after Richardson, touches faster than 1 mm/s.
 """
 
-import itertools
 from pathlib import Path
 
 import numpy as np
@@ -222,11 +221,14 @@ def test_many_random_hammers() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("magnet", ["inverse-root", ""], ids=lambda name: name or "none")
 @pytest.mark.parametrize("pack", PACKS, ids=lambda name: name or "none")
-def test_all_combinations_of_parts(magnet: str, pack: str, tmp_path: Path) -> None:
+def test_combinations_of_parts(magnet: str, pack: str, tmp_path: Path) -> None:
+    """Every triple of magnet, pack and backstop, with a spring in turn."""
     rng = np.random.default_rng(3)
-    names = list(drives("current"))
+    names, springs = list(drives("current")), list(SPRINGS)
+    turn = list(PACKS).index(pack) + bool(magnet)
     compared = 0
-    for spring, backstop in itertools.product(SPRINGS, BACKSTOPS):
+    for number, backstop in enumerate(BACKSTOPS):
+        spring = springs[(turn + number) % len(springs)]
         hammer = hammer_of(magnet, spring, pack, backstop, tmp_path)
         drive = drive_of(magnet, names[rng.integers(len(names))])
         with interpreted():
@@ -240,4 +242,4 @@ def test_all_combinations_of_parts(magnet: str, pack: str, tmp_path: Path) -> No
             )
             assert any(error < WANTED for error in errors)
             compared += 1
-    assert compared >= 12
+    assert compared >= 4
