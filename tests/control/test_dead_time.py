@@ -56,6 +56,19 @@ def test_the_own_blow_needs_the_own_pulse(wire: ph.Hammer) -> None:
     assert own.speed[0, 0] == pytest.approx(own.blow, rel=1e-9)
 
 
+def test_a_driver_whose_shortest_pulse_outlasts_the_flight_gives_its_own_blow() -> None:
+    """At its own rail any width gives the blow; a higher rail strikes harder, a lower one weaker."""
+    flipper = ph.load("pinball-flipper")
+    table = ph.dead_time(flipper, voltage=[49.0, 50.0, 51.0], temperature=[20.0])
+    assert np.isnan(table.width[[0, 2], 0]).all()
+    assert table.strongest[0, 0] < table.blow < table.strongest[2, 0]
+    assert flipper.waveform is not None
+    pulse = of_width(flipper.waveform, float(table.width[1, 0]))
+    dot = ph.simulate(flipper, ph.PulseTrain(pulse, at=[0.0]), duration="40 ms").dots[0]
+    assert dot.impact_speed == pytest.approx(table.blow, rel=1e-6)
+    assert "\nAt 1 of 3 pairs" in str(table)
+
+
 def test_a_blow_out_of_reach_has_no_pulse(wire: ph.Hammer) -> None:
     table = ph.dead_time(wire, voltage=[20.0, 38.0], temperature=[20.0], blow=3.2)
     assert np.isnan(table.width[0, 0])

@@ -376,7 +376,10 @@ def _same_blow(
     if not longest.speed >= wanted * (1.0 - _SAME):
         return None
     shortest = _shortest(pulse, SHORTEST * longest.time)
-    if not shortest < longest.time or off(shortest) > 0.0:
+    if not shortest < longest.time:
+        # The impact comes before the shortest pulse ends: all widths give the same speed.
+        return shortest if longest.speed <= wanted * (1.0 + _SAME) else None
+    if off(shortest) > 0.0:
         return None
     if off(longest.time) <= 0.0:
         return longest.time
