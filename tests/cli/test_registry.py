@@ -35,7 +35,7 @@ LONG = {
     "bifurcation": "--values 4",
     "continue": "",
     "curve": "",
-    "orbits": "--longest 1 --starts 20",
+    "orbits": "--longest 1 --starts 20 --follow 0",
     "energy": "--dots 1",
     "tune": "--history 1",
     "sweep": "",
