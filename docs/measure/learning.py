@@ -6,10 +6,10 @@ limits, at multiples of the nominal hammer's open-loop safe rate. The strategies
 robust table, each with the hammer's own pulse and with a fast switch, and tables learned after some dots
 from impact times with 5 us of noise, without and with forces to 3 %. All units learn from times with the
 fast switch, the default of ``printhammer learn``, a quarter of them from forces too or, at 1.5 times the
-safe rate, with the hammer's own pulse. The sensor of each unit has an offset that the learner does not know,
-with a standard deviation of 25 us. It takes two hours on one core: ``--keep FOLDER`` stores what units
-learn, and reuses it; ``--at X [X ...]`` measures only these multiples of the safe rate, for ``--keep``, and
-writes no table.
+safe rate, with the hammer's own pulse; none learn at the safe rate itself. The sensor of each unit has an
+offset that the learner does not know, with a standard deviation of 25 us. It takes two hours on one core:
+``--keep FOLDER`` stores what units learn, and reuses it; ``--at X [X ...]`` measures only these multiples of
+the safe rate, for ``--keep``, and writes no table.
 
 ``--units N`` sets the number of units, ``--feedback N`` the number of units on which feedback prints a
 cycle of order 6. ``--sensors`` measures other sensors instead, ``--tolerance`` other variabilities, and
@@ -76,6 +76,8 @@ SHOWN = 2
 FAMILY = ("02", "06")
 """Numbers of two hammers of the family."""
 AFTER = (50, 200, 1000)
+LEARNED = {1.25: ("switch",), 1.5: ("switch", "own"), 1.75: ("switch",)}
+"""Drivers with which units learn, by rate; learning at the open-loop safe rate takes the longest."""
 USUAL = "switch", "time"
 """Driver and sensor that `printhammer learn` takes by default, with which all units learn."""
 FEEDBACK = 10
@@ -161,8 +163,8 @@ def kept(folder: Path | None, name: str, measured: Callable[[], Learned]) -> Lea
 def measure(hammer: ph.Hammer, units: list[ph.Hammer], share: float, folder: Path | None) -> list[list[Cell]]:
     """Return one row of the table for each strategy at a rate.
 
-    All units learn with the fast switch from times alone, a quarter of them with the other combinations, of
-    which the hammer's own pulse is measured at one rate only.
+    All units learn with the fast switch from times alone, a quarter of them with the other combinations; see
+    `LEARNED` for the rates.
     """
     rate, single, rows = share * open_loop_rate(hammer), nominal(hammer, tolerance=DISPLAY_TOLERANCE), []
 
@@ -182,7 +184,7 @@ def measure(hammer: ph.Hammer, units: list[ph.Hammer], share: float, folder: Pat
             good = shares(units, single, rate, table.strategy(hammer))
             fewer = int((good < plain - 1e-12).sum())
             add(f"{name}, {driver}", len(units), [*cells(good), fewer, None])
-    for driver in ("switch", "own") if share == ASKED else ("switch",):
+    for driver in LEARNED.get(share, ()):
         for name, sensor in SENSORS.items():
             some = units if (driver, name) == USUAL else units[: len(units) // 4]
 
