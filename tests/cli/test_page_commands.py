@@ -59,7 +59,7 @@ FEWER = {
     "tune mine.toml": "tune mine.toml --history 1 --no-judge",
     "--longest 4": "--longest 1 --starts 20 --follow 0",
     "'1300 Hz' --longest 3 --out regimes": "'720 Hz' --longest 1 --seeds 1 --most 10 --out regimes",
-    "learn hendriks-1983-1": "learn hendriks-1983-1 --members 100",
+    "learn hendriks-1983 ": "learn hendriks-1983 --members 100 ",
     "--doublings 1": "--doublings 1 --most 20",
     "--grid 24": "",
     "'1.23 ms' --to '1.29 ms'": "'1.24 ms' --to '1.26 ms'",
