@@ -277,12 +277,12 @@ def test_a_page_waits_for_an_oscillator_without_a_pack(tmp_path: Path) -> None:
     assert 0 < settled < 12
 
 
-def test_the_page_agrees_with_python_for_random_states(tmp_path: Path) -> None:
+def test_the_page_agrees_with_python_for_500_states(tmp_path: Path) -> None:
     rng, names = np.random.default_rng(36), shipped()
     counts: dict[str, int] = {}
     with Engine(Shelf(), tmp_path) as engine:
-        for k in range(12 * len(names)):
+        for k in range(500):
             compared = check_state(engine, random_state(names[k % len(names)], rng))
             counts[compared] = counts.get(compared, 0) + 1
-    assert counts["whole"] > 6 * len(names)
-    assert counts.get("refused", 0) < 2.4 * len(names)
+    assert counts["whole"] > 250
+    assert counts.get("refused", 0) < 100
