@@ -10,6 +10,7 @@ const SPACE = { 1: 14, 2: 60, 3: 30 }; // pixels between ticks, by side
 const LEAST = 1e-6; // N
 const KEY = 0.2; // of the height, for the key of forces
 const DENSE = 16; // points per pixel of the screen above which only the extremes of each pixel are drawn
+const extremes = uPlot.paths.linear(); // path through the extremes of each pixel
 const DASHES = { damping: [2, 2], drag: [6, 2] };
 
 /** Displacement against time, with backstop, pack and platen, firings, and the drive on the right axis. */
@@ -186,8 +187,6 @@ function segments(u, series, from, to) {
   for (let k = from; k <= to; k++) stroke.lineTo(u.valToPos(t[k], "t", true), u.valToPos(values[k], scale, true));
   return { stroke, fill: null, clip: null, band: null, gaps: null, flags: 1 };
 }
-
-const extremes = uPlot.paths.linear();
 
 function curveView(body, studio, kind) {
   let plot = null;
