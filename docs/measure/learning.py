@@ -172,17 +172,18 @@ def measure(hammer: ph.Hammer, units: list[ph.Hammer], share: float, folder: Pat
         rows.append([share, way, count, *found])
         print(*rows[-1], time.strftime("%H:%M:%S"), flush=True)
 
-    plain = np.zeros(len(units))
+    loops = {}
     for driver in ("own", "switch"):
         driven = driven_by(hammer, driver, 2.0)
         fired = [with_pulse(unit, driven.waveform) for unit in units]
-        alone = shares(fired, nominal(driven, tolerance=DISPLAY_TOLERANCE), rate, open_loop)
+        loops[driver] = shares(fired, nominal(driven, tolerance=DISPLAY_TOLERANCE), rate, open_loop)
+    better = np.maximum(*loops.values())
+    for driver, alone in loops.items():
         add(f"open loop, {driver}", len(units), [*cells(alone), None, None])
-        plain = np.maximum(plain, alone)
         for name, options in (("table", {}), ("robust table", {"variability": Variability()})):
             table = ph.tune(hammer, rate=rate, driver=driver, **options)
             good = shares(units, single, rate, table.strategy(hammer))
-            fewer = int((good < plain - 1e-12).sum())
+            fewer = int((good < better - 1e-12).sum())
             add(f"{name}, {driver}", len(units), [*cells(good), fewer, None])
     for driver in LEARNED.get(share, ()):
         for name, sensor in SENSORS.items():
