@@ -81,7 +81,7 @@ def described(report: Report) -> list[RenderableType]:
 
 
 def _table(title: str, heads: tuple[str, ...], rows: Rows) -> list[RenderableType]:
-    text = {"solver", "engine", "ours as exact"}
+    text = {"solver", "engine", "printhammer tolerance"}
     cells = [lambda row, k=k: escape(row[k]) for k in range(len(heads))]
     columns = [Column(escape(head), cell, left=head in text) for head, cell in zip(heads, cells, strict=True)]
     return [table(columns, rows, title=title), ""]

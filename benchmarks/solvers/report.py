@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Rows = list[tuple[str, ...]]
 
 SOLVER_HEADS: Final = (
-    *("solver", "error [m]", "hammer-s/s", "first call [s]", "ours as exact", "ours / theirs"),
+    *("solver", "error [m]", "hammer-s/s", "first call [s]", "printhammer tolerance", "speed ratio"),
 )
 FRAME_HEADS: Final = (
     *("engine", "tolerance", "error, median", "95 %", "threads", "median [ms]", "best [ms]"),
