@@ -35,12 +35,13 @@ SINGLE: Final[dict[str, SingleMaker]] = {
 ENSEMBLES: Final[dict[str, EnsembleMaker]] = {"heyoka": heyoka.ensembles, "diffrax": diffrax.entries}
 """Other solvers that integrate ensembles, by name."""
 
-USED: Final = """\ The other solvers are used as follows (`benchmarks/peers`). Every solver has a
-compiled right-hand side for each mode, stops at every switch and at every edge of the drive, and
-restarts at these instants. A solver marked "one right-hand side" evaluates all modes in a single
-function, which is the straightforward formulation. For heyoka, the equations are written in variables
-in which they are analytic, as a Taylor method requires. heyoka handles switches in event callbacks in
-Python, and a vector lane that has finished one member continues with the next member. diffrax is a
-single compiled loop under `jax.vmap`. Boost.Odeint and SUNDIALS are C++ libraries, compiled with `-O3
--march=native`; Odeint has no events, so a switch is located by repeating the step with a length
-computed by Newton's method.""" """Text of the documentation page about the use of the other solvers."""
+USED: Final = """\
+The other solvers are used as follows (`benchmarks/peers`). Every solver has a compiled right-hand side
+for each mode, stops at every switch and at every edge of the drive, and restarts at these instants. A
+solver marked "one right-hand side" evaluates all modes in a single function, which is the
+straightforward formulation. For heyoka, the equations are written in variables in which they are
+analytic, as a Taylor method requires. heyoka handles switches in event callbacks in Python, and a
+vector lane that has finished one member continues with the next member. diffrax is a single compiled
+loop under `jax.vmap`. Boost.Odeint and SUNDIALS are C++ libraries, compiled with `-O3 -march=native`;
+Odeint has no events, so a switch is located by repeating the step with a length computed by Newton's
+method.""" """Text of the documentation page about the use of the other solvers."""
