@@ -44,4 +44,5 @@ analytic, as a Taylor method requires. heyoka handles switches in event callback
 vector lane that has finished one member continues with the next member. diffrax is a single compiled
 loop under `jax.vmap`. Boost.Odeint and SUNDIALS are C++ libraries, compiled with `-O3 -march=native`;
 Odeint has no events, so a switch is located by repeating the step with a length computed by Newton's
-method.""" """Text of the documentation page about the use of the other solvers."""
+method."""
+"""Text of the documentation page about the use of the other solvers."""
