@@ -171,14 +171,14 @@ def _stationary_time(problem: Problem, record: Record, t: float, step: float) ->
 
 
 def _acceleration(problem: Problem, row: FloatArray, *without: int) -> float:
-    """Compute the acceleration, m/s^2, from a row of `Problem.resample`; omit forces in columns `without`."""
+    """Compute the acceleration, m/s^2, from a row of `Problem.resample`, omitting some force columns."""
     forces = {k: float(row[k]) for k in range(3, 9) if k not in without}
     drive = float(row[2]) if problem.drive.quantity == "force" else 0.0
     return (math.fsum(forces.values()) + drive) / problem.hammer.mass
 
 
 class Changes(Declared):
-    """Derivatives of the quantities of the dots and of the run with respect to ``value / scale``."""
+    """Derivatives of the quantities of the dots and of the run with respect to the scaled constants."""
 
     dots: FloatArray = part(
         "derivatives of `DOT_QUANTITIES`, shape (dots, quantities, n)",

@@ -190,7 +190,7 @@ def _changed(waveform: Waveform, name: str, value: float) -> Waveform:
 
 
 def _table_change(made: Callable[[float], Waveform], value: float, scale: float, name: str) -> FloatArray:
-    """Compute the derivative of a waveform's segment table by a constant; segment kinds must not change."""
+    """Compute the derivative of a segment table with respect to a constant that changes no segment kind."""
     kinds = made(value).segments()[:, 1]
 
     def table(moved: float) -> FloatArray:

@@ -100,7 +100,7 @@ class Ragged:
         return type(self)(self.values[self.places(rows)], starts_of(self.counts[rows]))
 
     def filled(self, columns: int | None = None) -> npt.NDArray[Any]:
-        """Return a table, shape (rows, columns, ...), padded with NaN; by default as wide as needed."""
+        """Return the rows as a table of `columns` columns, by default the longest row, padded with NaN."""
         counts, width = self.counts, self.longest if columns is None else columns
         shape = (len(self), width, *self.values.shape[1:])
         if (counts == width).all():

@@ -20,7 +20,7 @@ MOST_PULSES: Final = 10_000_000
 """Largest number of firings of a drive; arbitrary, catches typing errors."""
 
 SPACING_UNITS: Final = {"rate": "Hz", "period": "s"}
-"""Names of the arguments that state the spacing of firings, rate or period, and their SI units."""
+"""SI unit of each argument that states the spacing of firings, rate or period."""
 
 
 def read_number(value: float | str, si: str, name: str) -> float:
@@ -96,7 +96,7 @@ def even_times(
 
     Returns
     -------
-    The firing times, s; the pair of "rate" or "period" and the value passed; the time between firings, s.
+    The firing times, s; the name of the passed argument, "rate" or "period", and its value; the period, s.
     """
     steps = np.arange(count, dtype=np.float64)
     if rate is not None:

@@ -37,13 +37,15 @@ SINE: Final = 2
 END: Final = 3
 """Kind of the end row of a segment table when several tables are stacked in one array for the kernel."""
 SWITCHED: Final = 4
+"""Kind of a driver's segment with the supply on; the value is the supply voltage p0."""
 DECAY: Final = 5
+"""Kind of a driver's segment with the supply off; the value is 0."""
 RESERVOIR: Final = 6
-"""Kinds of a driver's segments: supply on (value: supply voltage p0), supply off (value 0), reservoir."""
+"""Kind of a driver's segment in which a reservoir feeds the coil."""
 COLUMNS: Final = 6  # Number of columns of a table
 
 _CHUNK: Final = 1024  # Number of intervals evaluated at once, which bounds the memory; arbitrary
-_REFINED: Final = 16  # Number of intervals, those with the largest samples, to refine; arbitrary
+_REFINED: Final = 16  # Number of intervals with the largest samples, which are refined; arbitrary
 _ROUNDS: Final = 9  # Rounds of refinement, so that a maximum is located to 1e-9 of the interval
 
 
@@ -112,7 +114,7 @@ def evaluate(segments: FloatArray, t: npt.ArrayLike, fired: npt.ArrayLike = 0.0)
 
 
 def filled(shape: int, fields: Sequence[float]) -> FloatArray:
-    """Build the segment table of a shape from the shape's code in `printhammer.drive.tables`, read-only."""
+    """Build the segment table of a shape, read-only; `shape` is a code of `printhammer.drive.tables`."""
     rows = np.empty((ROWS, COLUMNS))
     result = rows[: fill_table(shape, fields, rows)].copy()
     result.flags.writeable = False

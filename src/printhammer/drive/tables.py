@@ -19,10 +19,11 @@ END: Final = 3.0
 SWITCHED: Final = 4.0
 DECAY: Final = 5.0
 RESERVOIR: Final = 6.0
-"""Codes of the kinds of segments, as described in `printhammer.drive.segments`."""
+"""Code of a segment fed by a reservoir; codes from `POLYNOMIAL` on are those of
+`printhammer.drive.segments`."""
 
 ROWS: Final = 4
-"""Largest number of rows of the table of a shape, by definition of the shapes, including the end."""
+"""Number of rows of the longest segment table of a shape, end row included; fixed by the shapes."""
 
 DECAY_TIMES: Final = 27.6310211159
 """Number of time constants after which a decaying current is cut off: -ln 1e-12; arbitrary."""
@@ -35,7 +36,7 @@ RAIL: Final = 2.0
 
 _VOLTAGE, _WIDTH, _DECAY_VOLTAGE, _DECAY_RESISTANCE, _SOURCE_RESISTANCE, _COILS, _DIODE_VOLTAGE = range(7)
 _OWN: Final = 7
-"""Indices of the fields common to all drivers; fields of the shape and the decay path follow."""
+"""Number of fields common to all drivers; the fields of the shape and the decay path follow."""
 
 
 def put(table: Any, row: int, start: float, kind: float, p0: float, p1: float, p2: float, p3: float) -> int:

@@ -56,7 +56,8 @@ class Equilibrium:
     x: float
     """Displacement of the armature, m."""
     stable: bool
-    """Whether the force returns the armature after a small displacement in either direction."""
+    """Whether the force returns the armature to the equilibrium after a small displacement in either
+    direction."""
     frequency: float | None
     """Natural frequency of small undamped oscillations, Hz; None if unstable, on a rigid backstop, or in a
     pack with memory, which has no unique stiffness."""
@@ -75,7 +76,7 @@ class EquilibriumPicture:
     equilibria: tuple[Equilibrium, ...]
     """Equilibria at zero current, in ascending order."""
     release_current: float | None
-    """Coil current at which the armature lifts off the backstop, A."""
+    """Coil current at which the armature lifts off the backstop, A; None without such a current."""
     x: FloatArray
     """Displacements from the backstop to the end of the stroke, m."""
     margin: FloatArray

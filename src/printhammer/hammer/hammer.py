@@ -167,7 +167,7 @@ class Hammer:
 
     @property
     def shown_units(self) -> dict[str, str]:
-        """Display units of lengths and times set in the file, by SI unit; omitted if not set."""
+        """Display units that the hammer file sets for lengths and times, by SI unit."""
         units = {"m": self._contents.length_unit, "s": self._contents.time_unit}
         return {si: unit for si, unit in units.items() if unit}
 

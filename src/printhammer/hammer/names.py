@@ -49,7 +49,7 @@ PLACES: Final = ("platen", "pack.front", "backstop.position")
 """Constants that are positions on the axis of the armature, such as "backstop.position"."""
 
 _ZERO: Final = {"m": 100e-6, "s": 500e-6, "kg": 1e-3, "N": 10.0}
-"""Upper end of the control range of a zero constant, by SI unit; arbitrary, the size of print hammers."""
+"""Upper end of the control range of a zero constant, by SI unit; arbitrary, typical of print hammers."""
 
 
 @dataclass(frozen=True)

@@ -38,19 +38,29 @@ MOST_PLACES: Final = 8192
 
 
 class Statics(NamedTuple):
-    """Law functions and constants that determine the static force of a hammer."""
+    """Law functions and constants that determine the static force of a hammer.
+
+    The law functions of absent parts are those of `printhammer.parts.absent`.
+    """
 
     magnet_force: Any
+    """Force of the magnet, N."""
     spring_force: Any
+    """Force of the spring, N."""
     pack_loading: Any
+    """Force of the pack on its loading branch, N."""
     backstop_elastic: Any
+    """Elastic force of the backstop, N."""
     spring_level: Any
-    """Law functions of the parts; for absent parts, the functions of `printhammer.parts.absent`."""
+    """Position of a kink of the spring law, m."""
     magnet: Any
+    """Packed constants of the magnet."""
     spring: Any
+    """Packed constants of the spring."""
     pack: Any
+    """Packed constants of the pack."""
     backstop: Any
-    """Packed constants of the parts."""
+    """Packed constants of the backstop."""
     position: float
     """Position of the backstop, m; minus infinity without a backstop."""
     front: float
@@ -64,8 +74,9 @@ class Statics(NamedTuple):
     has_magnet: bool
     """Whether the hammer has a magnet."""
     low: float
+    """Smallest displacement for which the law of the magnet is valid, m."""
     high: float
-    """Range of displacements in which the law of the magnet is valid, m."""
+    """Largest displacement for which the law of the magnet is valid, m."""
     platen: float
     """Position of the platen, m; NaN without a platen."""
     thickness: float
@@ -215,8 +226,9 @@ class Work(NamedTuple):
     grid: Any
     """Search grid, m, shape (`MOST_PLACES`,)."""
     places: Any
+    """Points at which the force was evaluated, m, shape (3 `MOST_PLACES`,)."""
     values: Any
-    """Points at which the force was evaluated, m, and forces, N, shape (3 `MOST_PLACES`,)."""
+    """Net force at each of the `places`, N, shape (3 `MOST_PLACES`,)."""
     found: Any
     """Roots, m, with the signs of the force on both sides, shape (3 `MOST_PLACES`, 3)."""
     ascending: Any

@@ -132,7 +132,7 @@ def backstop_rebound(c: Any, v_in: float) -> float:
 
 
 def magnet_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants of a law that has no packing function: all values but the range."""
+    """Write the packed constants of a law that has no packing function: all values except the range."""
     for k in range(len(q) - 2):
         c[k] = q[k]
     return max(len(q) - 2, 0)
@@ -150,7 +150,7 @@ def spring_domain(q: Any, ends: Any) -> None:
 
 
 def _copy(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants of a law that has no packing function: the values of the part."""
+    """Write the packed constants of a law that has no packing function: the unchanged values of the part."""
     for k in range(len(q)):
         c[k] = q[k]
     return len(q)

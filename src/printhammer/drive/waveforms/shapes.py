@@ -58,7 +58,7 @@ class Chain(Waveform):
 
     @property
     def replaces(self) -> bool:
-        """Whether the waveforms belong to a driver, which has a single output stage."""
+        """Whether the waveforms belong to a coil driver, whose latest firing replaces earlier firings."""
         return self.parts[0][1].replaces
 
     @property
@@ -68,7 +68,7 @@ class Chain(Waveform):
         return offset + last.support
 
     def supply(self) -> Supply:
-        """Return the supply of the first waveform in the sequence."""
+        """Return the supply of the first waveform of the chain."""
         return self.parts[0][1].supply()
 
     def segments(self) -> FloatArray:

@@ -43,7 +43,7 @@ def backstop_energy(c: Any, w: float) -> float:
 
 
 def backstop_switch(c: Any, w: float, v: float) -> float:
-    """Return k w^2 - 1.5 k A v, N/m^0.5, whose sign changes at the cut-off of the force; 1 with pull."""
+    """Return k w^2 - 1.5 k A v, N/m^0.5, which changes sign at the cut-off of the force; 1 with `pull`."""
     if c[2] != 0.0:
         return 1.0
     return float(c[0] * w * w - c[1] * v)

@@ -46,7 +46,7 @@ def backstop_energy(c: Any, w: float) -> float:
 
 
 def backstop_switch(c: Any, w: float, v: float) -> float:
-    """Return k - l v, N/m^1.5, whose sign changes at the cut-off of the force; 1 with pull."""
+    """Return k - l v, N/m^1.5, which changes sign at the cut-off of the force; 1 with `pull`."""
     if c[2] != 0.0:
         return 1.0
     return float(c[0] - c[1] * v)

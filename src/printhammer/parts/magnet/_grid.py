@@ -117,8 +117,8 @@ def bicubic(table: Grid) -> FloatArray:
     from scipy.interpolate import CubicSpline
 
     x, current = np.array(table.x), np.array(table.current)
-    along_x = CubicSpline(x, np.array(table.values), axis=0).c[::-1]  # power of x, x cell, current
-    cells = CubicSpline(current, along_x, axis=2).c[::-1]  # power of I, I cell, power of x, x cell
+    along_x = CubicSpline(x, np.array(table.values), axis=0).c[::-1]  # Axes: power of x, x cell, current
+    cells = CubicSpline(current, along_x, axis=2).c[::-1]  # Axes: power of I, I cell, power of x, x cell
     coefficients: FloatArray = np.transpose(cells, (3, 1, 2, 0))
     return coefficients
 

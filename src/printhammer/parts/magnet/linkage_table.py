@@ -224,7 +224,7 @@ class LinkageTableMagnet(GridMagnet):
         x, current = np.array(table.x), np.array(table.current)
         slope = (
             coefficients[:, :, 1:] * np.arange(1.0, 4.0)[:, None]
-        )  # x cell, I cell, power of x, power of I
+        )  # Axes: x cell, I cell, power of x, power of I
         whole = slope / np.arange(1.0, 5.0)
         powers = np.power(np.diff(current)[:, None], np.arange(1, 5))
         rise = np.einsum("ijpq,jq->ijp", whole, powers)

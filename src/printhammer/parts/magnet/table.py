@@ -184,8 +184,8 @@ def _packed_spline(table: Grid) -> tuple[float, ...]:
     j, place = cell_at_zero(table)
     at_zero = coefficients[:, j] @ np.power(place, np.arange(4))
     energy = _integral(x, -at_zero)
-    slope = coefficients[..., 1:] * np.arange(1.0, 4.0)  # x cell, I cell, power of x, power of I
-    linkage = _integral(x, np.swapaxes(slope, 2, 3))[..., 0]  # x cell, I cell, power of I
+    slope = coefficients[..., 1:] * np.arange(1.0, 4.0)  # Axes: x cell, I cell, power of x, power of I
+    linkage = _integral(x, np.swapaxes(slope, 2, 3))[..., 0]  # Axes: x cell, I cell, power of I
     parts = (x, current, coefficients.ravel(), energy.ravel(), linkage.ravel())
     return (float(len(x)), float(len(current)), *np.concatenate(parts).tolist())
 
