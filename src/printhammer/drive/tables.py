@@ -23,7 +23,7 @@ RESERVOIR: Final = 6.0
 `printhammer.drive.segments`."""
 
 ROWS: Final = 4
-"""Number of rows of the longest segment table of a shape, end row included; fixed by the shapes."""
+"""Number of rows of the longest segment table of a shape, end row included, by definition of the shapes."""
 
 DECAY_TIMES: Final = 27.6310211159
 """Number of time constants after which a decaying current is cut off: -ln 1e-12; arbitrary."""
@@ -36,7 +36,7 @@ RAIL: Final = 2.0
 
 _VOLTAGE, _WIDTH, _DECAY_VOLTAGE, _DECAY_RESISTANCE, _SOURCE_RESISTANCE, _COILS, _DIODE_VOLTAGE = range(7)
 _OWN: Final = 7
-"""Number of fields common to all drivers; the fields of the shape and the decay path follow."""
+"""Index of the first field of a shape, after the fields common to all drivers; the decay path comes last."""
 
 
 def put(table: Any, row: int, start: float, kind: float, p0: float, p1: float, p2: float, p3: float) -> int:
