@@ -112,7 +112,7 @@ def main() -> None:
 
 
 def told(page: Any, count: int) -> None:
-    """Print the number of actions and the memory of the page after a garbage collection."""
+    """Print the number of actions and the memory use of the page after garbage collection."""
     page.call("HeapProfiler.collectGarbage")
     heap = page.run("performance.memory.usedJSHeapSize") / 1e6
     print(f"{count} actions: page {heap:.0f} MB", flush=True)

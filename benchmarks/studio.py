@@ -25,8 +25,9 @@ GROUPS: dict[str, tuple[str, list[tuple[str, str | None]]]] = {
 }
 WHAT = {"motion": "the first curve", "preview": "the first map", "full": "the full map"}
 CONTROLS = ("waveform.width", "forms thickness")
+"""Controls of a hammer with its current pulse whose response times are measured."""
 RAIL_CONTROLS = ("waveform.width", "waveform.voltage", "coil.temperature")
-"""Controls of the hammer with a rail driver, measured alternately with those of its current pulse."""
+"""Controls of the hammer with a rail driver, measured alternately with `CONTROLS`."""
 LISTEN = """
 window.seen = [];
 const note = ({ detail }) => { window.seen.push({ ...detail, at: performance.now() }); };
@@ -50,7 +51,7 @@ def main() -> None:
     parser.add_argument("--times", type=int, default=40)
     parser.add_argument("--openings", type=int, default=5)
     parser.add_argument("--ratio", type=float, default=1.0, help="pixel ratio of the screen")
-    parser.add_argument("--rail", action="store_true", help="also behind a rail, by turns")
+    parser.add_argument("--rail", action="store_true", help="also measure a rail-driven hammer, alternately")
     given = parser.parse_args()
     drives: dict[str, tuple[str, tuple[str, ...]]] = {"": ("", CONTROLS)}
     if given.rail:

@@ -1,4 +1,4 @@
-"""The complete chain from a hammer to measurements, to fitted constants, and back to a hammer.
+"""Recovery of a hammer: simulated measurements, fits of the constants, and a hammer built from the fits.
 
 A hammer is measured on every bench of the synthetic laboratory, its constants are fitted to the tables, and a
 hammer is built from them. As the true constants are known, the study shows the accuracy of the fits and the
@@ -42,14 +42,14 @@ _START: Final = 0.2
 
 
 class Recovery(Declared, eq=False):
-    """The results of one laboratory: the true hammer, the fits, and the hammer built from them."""
+    """Results of one laboratory: the true hammer, the fits, and the hammer built from the fits."""
 
-    truth: Hammer = part("what was measured")
-    fits: Mapping[str, Fit] = part('by kind: "magnet" (with the spring), "pack", "backstop", "motion"')
+    truth: Hammer = part("measured hammer, with the true constants")
+    fits: Mapping[str, Fit] = part('fits by kind: "magnet" (with the spring), "pack", "backstop", "motion"')
     constants: Mapping[str, FittedConstant] = part(
-        "the constants of the hammer file in the end, from all measurements"
+        "constants of the final hammer file, from all measurements"
     )
-    hammer: Hammer = part("built of them")
+    hammer: Hammer = part("hammer built from the fitted constants")
 
     def true(self, key: str) -> float:
         """Return the true value of a constant, SI."""

@@ -28,7 +28,7 @@ EXAMPLE: Final = f"{NAME} --quick --out build/bench.json"
     "solvers",
     EXAMPLE,
     out=opt.file(
-        "Results (.json) or tables (.md); repeatable.",
+        "Output file for the results (.json) or the tables (.md); repeatable.",
         ".json",
         ".md",
         many=True,
@@ -36,8 +36,8 @@ EXAMPLE: Final = f"{NAME} --quick --out build/bench.json"
 )
 def solvers(
     job: Job,
-    quick: bool = opt.switch("Short runs and one round, to check that all solvers run."),
-    threads: int | None = opt.whole("Largest number of threads of ensembles (2)."),
+    quick: bool = opt.switch("Use short runs and a single round, to check that all solvers work."),
+    threads: int | None = opt.whole("Maximum number of threads of the ensembles (default: 2)."),
     peers: str | None = opt.text("FOLDER", "Folder of other solvers, such as benchmarks/peers."),
 ) -> Answer:
     """Measure speed and error against a slow reference and other solvers, single runs and ensembles."""

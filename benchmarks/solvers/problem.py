@@ -23,7 +23,7 @@ GRID: Final = np.linspace(0.0, FIRST, 3001)
 
 
 class Task(Declared):
-    """A hammer with the laws of the paper, fired at a constant rate, from rest."""
+    """Benchmark problem: a hammer with the laws of the paper, fired at a constant rate, from rest."""
 
     hammer: Hammer = part("the hammer")
     period: float = scalar("s", "time between firings", default=PERIOD)
@@ -56,7 +56,7 @@ MEMBERS: Final = 512
 CHECKED: Final = 8
 """Number of evenly spaced members that are compared with the reference."""
 ENDS: Final = np.linspace(3e-4, FIRST, 10)
-"""Times at which these members are compared with the reference, s."""
+"""Times at which ensemble members are compared with the reference, s."""
 
 
 def ensemble_tasks(task: Task, members: int) -> list[Task]:

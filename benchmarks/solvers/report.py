@@ -30,17 +30,17 @@ MASS_HEADS: Final = (
 
 
 class Report(Declared):
-    """All results of a benchmark."""
+    """Results of a benchmark: machine, solvers, ensembles and compilation times."""
 
-    machine: dict[str, str] = part("what it ran on")
-    quick: bool = part("whether it was a short one, whose figures mean little")
-    lines: list[Line] = part("the solvers")
-    absent: dict[str, str] = part("peers that are not installed here, or failed, and why")
-    figures: Figures = part("figures about ensembles")
+    machine: dict[str, str] = part("description of the machine")
+    quick: bool = part("whether the benchmark was a short test, whose timings are not meaningful")
+    lines: list[Line] = part("table rows, one per solver, method and tolerance")
+    absent: dict[str, str] = part("reasons for missing solvers (not installed, or failed), by name")
+    figures: Figures = part("timings of ensembles")
     compiling: dict[str, float] = part(
-        "time to compile everything that an ensemble needs, by engine, s; empty in a quick benchmark"
+        "time to compile the code of an ensemble, s, by engine; empty in a quick benchmark"
     )
-    peers: str = part("how the peers are used, in words", default="")
+    peers: str = part("text about the use of the other solvers", default="")
 
     def to_json(self) -> str:
         """Return the results as JSON; NaN and infinity become null."""

@@ -29,20 +29,22 @@ class Line(Declared):
     """Table row of one solver."""
 
     solver: str = part("solver, version, method, tolerance")
-    ours: bool = part("whether it is this program")
-    members: int = part("1 for a single run")
+    ours: bool = part("whether the solver is printhammer")
+    members: int = part("number of runs; 1 for a single run")
     error: float = scalar(
         "m",
         "largest deviation from the reference over the first 3 ms",
-        more="NaN where the solver ended before",
+        more="NaN if the solver ended early",
     )
-    speed: float = part("hammer-seconds per second of processor time")
-    first: float = part("time of the first call, s, in which things are compiled")
-    duration: float = part("hammer-seconds of one call timed")
+    speed: float = part("simulated hammer-seconds per second of processor time")
+    first: float = part("time of the first call, including compilation, s")
+    duration: float = part("hammer-seconds simulated by one timed call")
     match: str = part(
-        "for a peer: the fastest of our lines of its kind that is at least as exact", default=""
+        "for another solver: the fastest printhammer row of its kind that is at least as accurate", default=""
     )
-    ratio: float = part("how many times faster that line is; NaN where there is none", default=math.nan)
+    ratio: float = part(
+        "speed of the matching printhammer row relative to this solver; NaN without a match", default=math.nan
+    )
 
 
 def measure(

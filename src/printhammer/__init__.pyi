@@ -1,4 +1,4 @@
-"""Public names: each stands here once, is imported on first use, and is what a type checker sees."""
+"""Public names of the package, for the lazy loader and for type checkers."""
 
 from .chaos.basins.basins import basins as basins
 from .chaos.basins.quench import quench_map as quench_map

@@ -1,4 +1,4 @@
-"""The program of the study: ``python -m studies.reconstruction``, from the root of the repository."""
+"""Command line of the study: ``python -m studies.reconstruction``, from the root of the repository."""
 
 from __future__ import annotations
 

@@ -51,12 +51,12 @@ def search(
     job: Job,
     aim: str = opt.choice(
         "stated|all|panels|buzz|claims",
-        "Claims that lead: stated ones alone; shapes too; these, panels of Fig. 11 or buzz printing first;"
-        " these and the looks of Figs. 8, 9 and 11.",
+        "Claims that guide the search: stated claims; also shapes; also with emphasis on panels of Fig. 11"
+        " or on buzz printing; or also the appearance of Figs. 8, 9 and 11.",
         default="all",
     ),
     waveform: str = opt.choice(
-        "rectangle|trapezoid|half-sine", "Shape of the current of a firing.", default="rectangle"
+        "rectangle|trapezoid|half-sine", "Shape of the current waveform.", default="rectangle"
     ),
     seed: int = _SEED,
     sample: int = opt.bounded(1, "Number of points of the initial Sobol sample.", default=16384),
@@ -163,7 +163,7 @@ def judge(
 def base_rates(
     job: Job,
     hammers: int = opt.bounded(1, "Number of random hammers.", default=100),
-    slow: int = opt.bounded(0, "Number of hammers for which slow claims are judged too.", default=3),
+    slow: int = opt.bounded(0, "Number of hammers for which the slow claims are also judged.", default=3),
     seed: int = _SEED,
     workers: int = _WORKERS,
 ) -> Answer:
@@ -243,7 +243,7 @@ _FRONT: Final[tuple[Column[Any], ...]] = (
     "front",
     f"{_SEARCHED} python -m studies.reconstruction judge all.jsonl judged.jsonl --best 1 --every-claim"
     " && python -m studies.reconstruction front judged.jsonl --out front.csv",
-    out=opt.results("Front"),
+    out=opt.results("the Pareto front"),
 )
 def front(
     judged: list[Path] = opt.argument(
@@ -273,9 +273,9 @@ def family(
     judged: list[Path] = opt.argument(
         "JUDGED...", "Logs of judged candidates.", type=Path, is_input=True, many=True, default=...
     ),
-    out: Path = opt.folder("Folder to write to.", default=Path("build/family")),
-    hammers: int = opt.bounded(1, "Largest number of hammers in the family.", default=24),
-    least: int = opt.bounded(1, "Smallest number of hammers in the family.", default=20),
+    out: Path = opt.folder("Output folder for the family.", default=Path("build/family")),
+    hammers: int = opt.bounded(1, "Maximum number of hammers in the family.", default=24),
+    least: int = opt.bounded(1, "Minimum number of hammers in the family.", default=20),
 ) -> Answer:
     """Select clearly different hammers that do equally well; report which conclusions hold for all."""
     from studies.reconstruction.family.family import WRITTEN, write_family
@@ -302,7 +302,7 @@ def ship(
     logs: list[Path] = opt.argument(
         "LOG...", "Logs of the searches.", type=Path, is_input=True, many=True, default=...
     ),
-    out: Path = opt.folder("Folder to write to.", default=Path("build/hammer")),
+    out: Path = opt.folder("Output folder for the hammer file and the data.", default=Path("build/hammer")),
     name: str = opt.text("TEXT", "Name of the hammer.", default="hendriks-1983"),
     core_hours: float = opt.bounded(0, "Core time of the searches in hours.", default=0.0),
 ) -> Answer:

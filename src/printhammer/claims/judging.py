@@ -46,8 +46,8 @@ class Claim(Declared):
     note: str = part("additional note for the reader; may be empty")
     settings: Mapping[str, Any] = part("numbers that set up the experiment, SI")
     band: Mapping[str, Any] = part(
-        "allowed values of each measured value: a number or text, true or false; a list (least, largest) of"
-        " two numbers, or of texts; a table of `SIDES`"
+        "allowed values of each measured value: a number or text, true or false; a list (smallest, largest)"
+        " of two numbers, or of texts; a table of `SIDES`"
     )
 
     def holds(self, value: Mapping[str, Any]) -> bool:

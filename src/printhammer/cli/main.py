@@ -124,7 +124,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 
 
 def _advice(message: str, error: Exception) -> str:
-    """Return advice on how to select the hammer, for an extra argument of a verb with the option --hammer."""
+    """Return a hint at --hammer if the error is an extra argument of a verb with this option; else empty."""
     command = getattr(getattr(error, "ctx", None), "command", None)
     flags = [flag for option in getattr(command, "params", ()) for flag in option.opts]
     return "; --hammer selects the hammer" if "unexpected extra" in message and "--hammer" in flags else ""

@@ -27,8 +27,10 @@ from printhammer.printing.page.page import Page
 from printhammer.support.arrays import FloatArray
 
 PAPER: Final = (252, 250, 243)
+"""RGB colour of the paper; arbitrary."""
+
 INK: Final = (24, 24, 38)
-"""RGB colours of the paper (`PAPER`) and of fully opaque ink; arbitrary."""
+"""RGB colour of fully opaque ink; arbitrary."""
 
 MOST_PIXELS: Final = 24_000_000
 """Number of pixels above which a sheet of paper is rendered more coarsely; arbitrary."""
@@ -40,13 +42,12 @@ _TOGETHER: Final = 1_000_000  # Pixels computed at once, which bounds the memory
 
 @dataclass(frozen=True)
 class Sheet:
-    """Rectangle of paper to draw, given by its edges, m."""
+    """Rectangle of paper to draw: left and right edge across, top and bottom edge downward, m."""
 
     left: float
     right: float
     top: float
     bottom: float
-    """Edges of the rectangle, m: left and right across the paper, top and bottom downward."""
 
     @property
     def width(self) -> float:

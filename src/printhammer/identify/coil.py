@@ -60,7 +60,7 @@ _SPARE: Final = 4
 """Smallest number of rows in excess of parameters for which standard errors are computed; arbitrary."""
 
 _EXACT: Final = 1e-6  # Arbitrary
-"""Residual, as a fraction of the current, below which the test of the law would see integration errors."""
+"""Relative residual below which the law is not tested, since integration errors dominate the residuals."""
 
 _COARSE: Final = 1.5  # Arbitrary
 """Ratio of resolution to residual standard deviation above which quantisation dominates the residuals."""
@@ -182,10 +182,10 @@ def fit_coil(
 
 
 class CurrentLaw:
-    """Law of a fit: currents of all records, A, shape (m,).
+    """Law of the current fit: predicted currents of all records, A, shape (m,).
 
-    p contains the named constants, the fitted probe errors, and the offset of each edge of a recorded voltage
-    from the middle between its two rows, SI.
+    The parameters p are the named constants, the fitted probe errors, and the offset of each edge of a
+    recorded voltage from the middle between its two rows, SI.
     """
 
     def __init__(

@@ -52,7 +52,7 @@ def extent(values: Any) -> str:
 
 
 def span(values: Any) -> str:
-    """Format the range of an array as "least to largest"; empty if the array has no finite number."""
+    """Format the range of an array as "minimum to maximum"; empty if the array has no finite number."""
     array = np.asarray(values)
     if array.dtype.kind not in "fiu":
         return ""

@@ -1,5 +1,7 @@
 """Base class of results, with Dataset, table, files and repr derived from the declared fields.
 
+A result class is a frozen dataclass whose fields declare their units and meanings:
+
 >>> class Drop(Result, rows="fall"):
 ...     '''Falls of a stone.'''
 ...
@@ -8,9 +10,9 @@
 ...     time: FloatArray = column("s", "time of the fall", "fall", more="nan where it did not land")
 ...     tolerance: float = scalar("1", "error allowed in one step")
 
-defines a frozen dataclass whose Dataset, table, files, docstring and HTML repr follow from the declaration;
-`printhammer.figures.plots` registers its plot function by the name of the class. A class overrides `entries`
-for units that depend on the instance and for arrays that are not fields, and `notes` for further attributes.
+Dataset, table, files, docstring and HTML repr follow from the declarations. `printhammer.figures.plots`
+registers the plot function of a class by the name of the class. A class overrides `entries` for units that
+depend on the instance and for arrays that are not fields, and `notes` for further attributes.
 
 `stacked` combines results of one class along a new dimension.
 

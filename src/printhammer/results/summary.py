@@ -56,7 +56,7 @@ def quantity(value: float | None, unit: str, *, bare: bool = False) -> str:
 
 
 def interval(values: npt.NDArray[Any], unit: str) -> str | None:
-    """Return the text "least to largest" for an SI array, with marked quantities; None if empty."""
+    """Format the range of an SI array as "minimum to maximum", in marked quantities; None if empty."""
     return f"{quantity(values.min(), unit)} to {quantity(values.max(), unit)}" if values.size else None
 
 

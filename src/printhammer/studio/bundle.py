@@ -15,7 +15,7 @@ _EXPORT: Final = re.compile(r"^export (?=(async )?function|const|let|class)", re
 
 _BLOCK: Final = 16
 _SHORTEST: Final = 32  # Arbitrary
-"""Length of hashed blocks, and least length of a copy, bytes; shorter blocks do not compress better."""
+"""Minimum length of a copy, bytes; shorter copies do not improve the compression."""
 
 
 @lru_cache

@@ -29,7 +29,7 @@ _LAST: Final = 1.19
 """Ratio of the time constant of coil and magnet to the pulse width; arbitrary."""
 
 _REACH: Final = 1.0 / (1.0 - math.exp(-1.0 / _LAST))
-"""Rail voltage divided by R × peak current, where R is the resistance, for exponential rise."""
+"""Ratio of the rail voltage to resistance times peak current, for an exponential rise of the current."""
 
 _PULSE: Final = (1.97, 177e-6)
 """Default peak, A, and width, s, of a current pulse, from the hammer `hendriks-1983`."""

@@ -82,7 +82,7 @@ def _shaken(amplitude: float, angular: float, phase: float, low: float, high: fl
 
 
 SINE: Final = ("amplitude", "phase")
-"""Constants of a sinusoidal force that a page sets; the rate of the page sets the frequency."""
+"""Constants of a sinusoidal force that the page can change; the firing rate sets the frequency."""
 
 _QUARTER: Final = 0.5 * math.pi
 

@@ -140,7 +140,7 @@ def with_probes(function: Any, about: Any, grid: Any, count: int, places: Any, v
 def in_stretch(
     function: Any, about: Any, places: Any, values: Any, begin: int, last: int, found: Any, count: int
 ) -> int:
-    """Append the roots between two indices, without NaN in between; return the new number of roots."""
+    """Append the roots in an index range without NaN values; return the new number of roots."""
     k = begin
     while k <= last:
         x, value = places[k], values[k]

@@ -56,7 +56,7 @@ class Members(NamedTuple):
 
 
 class Base(Declared):
-    """Common settings of all members, complete enough to build the members on another machine."""
+    """Settings common to all members, sufficient to build the members on another machine."""
 
     hammer: Hammer = part("the hammer, before the axes change it")
     drive: Mapping[str, Any] = part("tables of the drive file; its waveform only where an axis changes it")
@@ -69,7 +69,7 @@ class Base(Declared):
     )
     duration: float | None = scalar("s", "end of the runs")
     tolerance: float = part("error allowed in one step")
-    axes: tuple[Axis, ...] = part("meaning of a row of axis values")
+    axes: tuple[Axis, ...] = part("axes, in the order of the values in a row")
 
     @property
     def kind(self) -> str:

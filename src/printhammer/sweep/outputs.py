@@ -67,7 +67,7 @@ _CODES: Final = ("status", "strobe_branch")
 UNSETTLED: Final = Output(
     "unsettled", "", "bool", "", "whether the armature is not at rest at the end of the window of the device"
 )
-"""Output that is false for members with a status other than ok, and if the spec states a duration."""
+"""Output that is always false if the spec states a duration, or for members with a status other than ok."""
 
 ALWAYS: Final = (
     Output("status", "", "int8", "", "status of the run"),

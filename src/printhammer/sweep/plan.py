@@ -118,7 +118,7 @@ class Plan(Declared):
 
     spec: Spec = part("the spec")
     shape: tuple[int, ...] = part("members along each dimension")
-    dims: tuple[str, ...] = part("names of these dimensions")
+    dims: tuple[str, ...] = part("names of the member dimensions")
     blocks: Blocks = part("the blocks of work")
 
     @property

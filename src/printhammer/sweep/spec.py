@@ -36,7 +36,7 @@ class Spec(Declared):
     """Parsed sweep spec: hammer, drive, axes, outputs and block size."""
 
     where: str = part("name for messages, usually the file")
-    text: str = part("TOML")
+    text: str = part("text of the spec, TOML")
     title: str = part("one-line description")
     base: Base = part("common settings of all members")
     axes: tuple[Axis, ...] = part("axes that vary")

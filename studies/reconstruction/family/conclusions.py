@@ -35,41 +35,45 @@ _AT_ONCE: Final = 40
 
 
 class Conclusions(Declared):
-    """Conclusions about one hammer, None for a value that does not exist; field names end in the unit."""
+    """Conclusions about one hammer; None for a value that does not exist. Field names end with the unit."""
 
     safe_rate_Hz: float | None = scalar(
         "Hz",
-        "largest rate up to which every pattern of eight slots prints with the force of the single pulse"
-        " within a tenth and its flight time within 50 us, on a grid of 5 Hz",
+        "highest rate up to which the dots of every pattern of eight slots agree with the single-pulse dot to"
+        " 10 % in force and to 50 us in flight time, on a grid of 5 Hz",
         name="safe rate",
     )
     chaos_onset_s: float | None = scalar(
         "s",
-        "longest strobe time whose train is strange, on a grid of 5 us falling from 3 ms",
+        "longest strobe time at which the train is strange, on a grid of 5 us, searched downward from 3 ms",
         name="chaos onset",
     )
     flight_time_spread_s: float = scalar(
         "s",
         "largest difference of flight times within a burst of nine pulses, over rates from 500 to 1250 Hz on"
         " a grid of 5 Hz",
-        more="lost dots have none",
+        more="lost dots are excluded",
         name="flight-time spread",
     )
     engraved_limit_Hz: float | None = scalar(
         "Hz",
-        "lowest of these rates at which that difference exceeds 30 us, what engraved characters tolerate",
+        "lowest rate at which the flight-time spread exceeds 30 us, the tolerance of engraved characters",
         name="spread exceeds 30 us from",
     )
     dot_matrix_limit_Hz: float | None = scalar(
         "Hz",
-        "lowest of these rates at which that difference exceeds 200 us, what dot-matrix printing tolerates",
+        "lowest rate at which the flight-time spread exceeds 200 us, the tolerance of dot-matrix printing",
         name="spread exceeds 200 us from",
     )
     energy_per_dot_J: float = scalar(
         "J", "work of the coil on the armature in the cycle of a single pulse", name="energy per dot"
     )
-    pack_loss_J: float = scalar("J", "what the pack keeps of it", name="pack loss")
-    backstop_loss_J: float = scalar("J", "what the backstop takes of it", name="backstop loss")
+    pack_loss_J: float = scalar(
+        "J", "energy absorbed by the pack in the cycle of a single pulse", name="pack loss"
+    )
+    backstop_loss_J: float = scalar(
+        "J", "energy absorbed by the backstop in the cycle of a single pulse", name="backstop loss"
+    )
     settle_out_s: float = scalar(
         "s",
         "time from the firing of a single pulse to the end of the last rebound higher than a hundredth of the"
@@ -79,7 +83,7 @@ class Conclusions(Declared):
     print_force_N: float = scalar(
         "N",
         "peak force of the single-pulse dot",
-        more="mass and all forces scale together without a change of the motion; it sets that scale",
+        more="sets the common scale of mass and forces, which does not affect the motion",
         name="print force",
     )
 

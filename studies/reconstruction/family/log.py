@@ -17,12 +17,12 @@ LEAST_PANELS: Final = 8
 
 
 class Logged(Declared):
-    """A judged hammer, read from a log."""
+    """Judged hammer, read from a log."""
 
-    constants: Mapping[str, float] = part("key of a hammer file to value, SI")
-    verdicts: Mapping[str, bool] = part("claim to whether it holds, as far as it was judged")
-    panels: int | None = part("verdicts of Fig. 11 that are as printed")
-    source: str = part("file, and place in it")
+    constants: Mapping[str, float] = part("values of the constants, SI, by key of a hammer file")
+    verdicts: Mapping[str, bool] = part("whether each judged claim holds, by name of the claim")
+    panels: int | None = part("number of panels of Fig. 11 classified as printed; None if not judged")
+    source: str = part("file and line of the log")
 
     @property
     def promising(self) -> bool:

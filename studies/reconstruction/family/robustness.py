@@ -30,13 +30,13 @@ _SCALING: Final = ("J", "N")
 
 
 class Statement(Declared):
-    """A general statement of the paper, expressed as a margin that is positive if the statement is true."""
+    """General statement of the paper, expressed as a margin that is positive if the statement is true."""
 
     text: str = part("the statement")
-    source: str = part("where the paper says it")
+    source: str = part("section of the paper that makes the statement")
     unit: str = part("SI unit of the margin")
     margin: Callable[[Values], float] = part(
-        "conclusions of a hammer to the margin", more="the statement is true where it is positive"
+        "function that computes the margin from the conclusions about a hammer"
     )
 
 

@@ -25,14 +25,14 @@ class Front(Result):
     candidate: IntArray = coordinate(
         "1", "number of the judged hammer", "hammer", more="in the order of the logs, the first is number 1"
     )
-    panels: IntArray = column("1", "verdicts of Fig. 11 as printed, of twelve", "hammer")
-    others: IntArray = column("1", "other claims that hold", "hammer")
+    panels: IntArray = column("1", "number of the twelve panels of Fig. 11 classified as printed", "hammer")
+    others: IntArray = column("1", "number of other claims that hold", "hammer")
     stated: BoolArray = column("1", "whether all other stated claims hold", "hammer")
-    buzzes: BoolArray = column("1", "whether it buzz-prints", "hammer")
+    buzzes: BoolArray = column("1", "whether the hammer prints in buzz mode", "hammer")
     on_front: BoolArray = column(
         "1", "whether no other hammer has as many panels and as many other claims, and more of one", "hammer"
     )
-    core_time: float = scalar("s", "time of one core that the searches took")
+    core_time: float = scalar("s", "computation time of the searches on one core")
 
     @property
     def title(self) -> str:

@@ -26,9 +26,11 @@ if TYPE_CHECKING:
     from studies.reconstruction.search.space import Shape
 
 Aim = Literal["stated", "all", "panels", "buzz", "claims"]
-"""Claims that guide a search: claims of kind "stated" only; also claims of kind "shape"; in addition each
-panel of Fig. 11 with the weight of a claim; in addition buzz printing with a large weight; or all of these
-and the appearance of Figs. 8, 9 and 11.
+"""Name of the set of claims that guide a search.
+
+"stated": claims of kind "stated". "all": also claims of kind "shape". "panels": also each panel of Fig. 11,
+with the weight of a claim. "buzz": also buzz printing, with a large weight. "claims": also the appearance of
+Figs. 8, 9 and 11.
 """
 
 AIMS: Final[tuple[Aim, ...]] = get_args(Aim)
@@ -69,14 +71,18 @@ WEIGHTS: Final[dict[str, dict[str, float]]] = {
         "clouds": 4.0,
     },
 }
-"""Weights of the losses. The stated claims outside Fig. 11 have the largest weights, since all other claims
-depend on them. A claim of kind "shape" has the weight of three panels of Fig. 11, or of two for the aim
-"panels". Buzz printing has the weight of the two claims that concern it. Arbitrary.
+"""Weights of the losses, by aim and claim; arbitrary.
+
+The stated claims outside Fig. 11 have the largest weights, since all other claims depend on them. A claim of
+kind "shape" has the weight of three panels of Fig. 11, or of two for the aim "panels". Buzz printing has the
+weight of the two claims about it.
 """
 
 STEPS: Final[dict[Aim, float]] = {"stated": 0.0, "all": 0.0, "panels": 0.0, "buzz": 0.0, "claims": 0.3}
-"""Loss of a claim that just fails, as a fraction of its weight: if the number of claims that hold has to be
-large, two claims that nearly hold are worth less than one that holds."""
+"""Loss of a claim that barely fails, as a fraction of its weight, by aim.
+
+With a positive value, one claim that holds is worth more than two claims that nearly hold.
+"""
 
 PIECE: Final = 64
 """Number of points that one process evaluates together; arbitrary."""

@@ -41,7 +41,7 @@ _RISE: Final = 0.1
 """Rank correlation between restitution and order of the touches above which the loss is 0."""
 
 _STABLE: Final = 2.3
-"""Longest stable step of the Runge-Kutta method over the time scale of an oscillation, with a margin."""
+"""Largest stable step of the Runge-Kutta method, in oscillation time scales, with a safety margin."""
 
 _STEP: Final = 10e-6
 """Step of the trial times between two pulses, s."""
@@ -50,10 +50,10 @@ _REACH: Final = 200e-6
 """Distance from the printed time at which a quench no longer reduces the loss, s."""
 
 _CLEAR: Final = 0.06
-"""Smallest overshoot of later pulses beyond the pack front, as a fraction of the way to the pack."""
+"""Smallest overshoot of later pulses beyond the pack front, as a fraction of the distance to the pack."""
 
 _CLEARLY: Final = 0.002
-"""Smallest distance by which a quenched pulse misses the pack, as a fraction of the way to the pack."""
+"""Smallest gap between a quenched pulse and the pack, as a fraction of the distance to the pack."""
 
 _LATE: Final = 100e-6
 """Delay of the armature's rise after the second current at which the loss is largest, s."""

@@ -54,13 +54,13 @@ STARTS: Final = 64
 class Plan(Declared):
     """Settings that determine a search."""
 
-    aim: Aim = part("which claims lead, one of `AIMS`")
-    seed: int = part("of everything random")
-    sample: int = part("points of the wide sample", default=SAMPLE)
+    aim: Aim = part("claims that guide the search, one of `AIMS`")
+    seed: int = part("seed of the random number generators")
+    sample: int = part("number of points of the initial Sobol sample", default=SAMPLE)
     starts: tuple[tuple[float, ...], ...] = part(
-        "further points from which islands may begin, such as the best of another search", default=()
+        "additional starting points of islands, such as the best points of another search", default=()
     )
-    shape: Shape = part("waveform of the hammers", default="rectangle")
+    shape: Shape = part("waveform shape of the hammers", default="rectangle")
 
     def heading(self) -> dict[str, Any]:
         """Return the first line of the log as a mapping."""

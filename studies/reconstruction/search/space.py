@@ -56,8 +56,9 @@ class Variable:
     name: str
     """Name of the variable in the log."""
     low: float
+    """Lower end of the range of plausible values, SI."""
     high: float
-    """Ends of the range of plausible values, SI."""
+    """Upper end of the range of plausible values, SI."""
     logarithmic: bool
     """Whether the values are evenly spaced on a logarithmic scale."""
     unit: str

@@ -28,5 +28,5 @@ def cli(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> 
 def refused(
     cli: Callable[..., Outcome], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Callable[..., None]:
-    """Run a command line that cannot be used: one sentence, status 2, no file written or changed."""
+    """Check that a command line is refused in one sentence, with status 2 and without writing a file."""
     return check_refusal(cli, tmp_path, monkeypatch)

@@ -1,4 +1,4 @@
-"""The program of the study: help, examples, commands on the pages, bad options."""
+"""Tests of the program of the study: help, examples, commands on the pages, bad options."""
 
 import os
 import re

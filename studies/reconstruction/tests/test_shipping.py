@@ -1,4 +1,4 @@
-"""From judged candidates to the hammer file and the report's data on the search."""
+"""Tests of shipping: from judged candidates to the hammer file and the report's data on the search."""
 
 import json
 from collections.abc import Callable
@@ -34,7 +34,7 @@ def row(mass: float, *, panels: int = 5, **verdicts: bool) -> dict[str, Any]:
 
 @pytest.fixture
 def some_fail(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Replace the verdicts on the shipped hammer: all claims hold, except for some."""
+    """Replace the verdicts on the shipped hammer: all but a few claims hold."""
 
     def judge_all(_hammer: ph.Hammer, progress: Callable[[str], None] | None = None) -> list[JudgedClaim]:
         for name in claims() if progress is not None else ():

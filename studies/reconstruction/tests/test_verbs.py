@@ -1,4 +1,4 @@
-"""The verbs of the study."""
+"""Tests of the verbs of the study."""
 
 import json
 import os
@@ -164,7 +164,7 @@ def test_base_rates_are_counted(cli: Callable, here: Path, cheap: None) -> None:
 def test_verdicts_of_the_schemes_are_counted(
     cli: Callable, here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The slow count itself is tested in judging/test_schemes.py."""
+    """Test the verb only; judging/test_schemes.py tests the slow count."""
     asked: dict[str, Any] = {}
 
     def counted(hammer: ph.Hammer, hammers: int, seed: int, **how: Any) -> dict[str, Any]:
@@ -209,7 +209,7 @@ def test_the_best_ships(cli: Callable, here: Path, cheap: None) -> None:
 
 @pytest.fixture
 def files(here: Path) -> Path:
-    """Write files of several kinds: a short search, its judged candidates, notes."""
+    """Write a short search, its judged candidates, and a text file; return the folder."""
     row = {"point": [0.5], "total": 1.0, "constants": None}
     judged_rows(here / "search.jsonl", {**HEADING, "aim": "all"}, row)
     judged_rows(here / "stated.jsonl", HEADING, row)

@@ -18,23 +18,25 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 MATCH: Final = 1e-2  # Arbitrary
-"""Largest distance between two orbits of the same attractor, in half-widths of the strobe window."""
+"""Distance, in half-widths of the strobe window, below which two orbits are the same attractor."""
 
 CLOUD: Final = 2000
 """Number of points that represent a strange attractor; arbitrary."""
 
 SETTLING: Final = 1000
-"""Number of firings discarded before the points of a strange attractor; doubled until two successive sets of
-points agree. Arbitrary."""
+"""Number of firings discarded before the points of a strange attractor are recorded; arbitrary.
+
+The number is doubled until two successive sets of points agree.
+"""
 
 LONGEST: Final = 16_000
 """Maximum number of discarded firings; a train that still drifts stays undecided. Arbitrary."""
 
 REACH: Final = 0.99
-"""Quantile of nearest-neighbour distances that is used as the reach of a strange attractor; arbitrary."""
+"""Quantile of nearest-neighbour distances that sets the matching radius of a strange attractor; arbitrary."""
 
 INSIDE: Final = 0.95  # Arbitrary
-"""Smallest fraction of a train's points within reach of a strange attractor for the train to match."""
+"""Minimum fraction of a train's points within the matching radius of a strange attractor for a match."""
 
 ATTEMPTS: Final = 12
 """Maximum number of aperiodic trains followed in the search for strange attractors; arbitrary."""
@@ -49,8 +51,8 @@ class Attractor(Declared):
     name: str = part('name of the attractor: "period-q" or "strange"')
     period: int | None = part("period q in firings; None for a strange attractor")
     states: FloatArray = part(
-        "displacement, m, and velocity, m/s, at successive firings: the orbit, from its least displacement"
-        " on, shape (q, 2), or points of a strange attractor, shape (n, 2)"
+        "displacement, m, and velocity, m/s, at successive firings: the orbit, starting at its smallest"
+        " displacement, shape (q, 2), or points of a strange attractor, shape (n, 2)"
     )
     exponent: float = part(
         "largest exponent of the strobe map, per firing; NaN for a periodic orbit", default=math.nan
@@ -59,14 +61,14 @@ class Attractor(Declared):
 
 
 class Cloud(NamedTuple):
-    """Points of a strange attractor, and the distance within which a state belongs to the attractor."""
+    """Points of a strange attractor, and the radius within which a state belongs to the attractor."""
 
     tree: cKDTree  # Search tree of the points, (n, 2)
     reach: float
 
     @classmethod
     def of(cls, points: FloatArray) -> Cloud:
-        """Build a cloud of successive points, shape (n, 2); distances between both halves set the reach."""
+        """Build a cloud from successive points, shape (n, 2); distances between its halves set the radius."""
         half = len(points) // 2
         apart, _ = cKDTree(points[:half]).query(points[half:])
         return cls(cKDTree(points), float(np.quantile(apart, REACH)))
@@ -77,7 +79,7 @@ class Cloud(NamedTuple):
         return np.asarray(np.isfinite(apart).mean(axis=-1) >= INSIDE)
 
     def equals(self, other: Cloud) -> bool:
-        """Whether the points of each of two clouds lie within reach of the other cloud: one attractor."""
+        """Whether the points of each of two clouds lie within the radius of the other: same attractor."""
         return bool(self.holds(other.tree.data) and other.holds(self.tree.data))
 
 
@@ -189,7 +191,7 @@ class Attractors:
                     break
 
     def _within(self, points: FloatArray, rows: IntArray, place: int, places: IntArray) -> IntArray:
-        """Assign the trains that lie on a known strange attractor; return the rows of the other trains."""
+        """Assign the trains that lie on a known strange attractor; return the unmatched rows."""
         if not rows.size:
             return rows
         lies = self._clouds[place].holds(points[rows])

@@ -64,7 +64,7 @@ class BasinEntropy(Declared):
     )
     boundary_entropy: float = part(
         "S / Nb; NaN where no box has more than one attractor",
-        more="more than ln 2 shows that the boundary is fractal; less shows nothing",
+        more="a value above ln 2 proves a fractal boundary; a smaller value is inconclusive",
     )
     left_out: int = part("number of cells outside whole boxes, or undecided")
 
@@ -170,9 +170,13 @@ MOST_CELLS: Final = 10_000_000
 """Largest number of cells of a plane that `basins` and `printhammer.quench_map` accept; arbitrary."""
 
 UNDECIDED: Final = 0
+"""Label of a cell whose attractor is undecided."""
+
 FAILED: Final = -1
+"""Label of a cell whose run ended early."""
+
 NO_STATE: Final = -2
-"""Labels of cells without a known attractor: undecided, run ended early, and no valid initial state."""
+"""Label of a cell that is not a valid initial state."""
 
 NO_STATE_STATUS: Final = "no state"
 
@@ -202,7 +206,7 @@ class Basins(Result, rows="v x"):
         dtype=np.int32,
     )
     attractors: tuple[Attractor, ...] = part(
-        "attractors, sorted by period (strange attractors last), then by least displacement"
+        "attractors, sorted by period (strange attractors last), then by smallest displacement"
     )
     firings: IntArray = column(
         "1",
@@ -353,8 +357,8 @@ def basins(
         The hammer, or a regime; a hammer requires the keywords of `printhammer.Regime.of`. States are those
         at a firing, independent of the phase of the regime.
     x, v : tuple, optional
-        Least and largest displacement, m, and velocity, m/s, or text with a unit, and number of values, both
-        ends included; by default the window of `printhammer.run.regime` and 128 values.
+        Smallest and largest displacement, m, and velocity, m/s, or text with a unit, and number of values,
+        both ends included; by default the window of `printhammer.run.regime` and 128 values.
     firings : int, optional
         Number of firings per round, at least 4; the last half of them, at most 128, is classified.
     rounds : int, optional
@@ -449,7 +453,7 @@ def _key(attractor: Attractor) -> tuple[int, float, float]:
 
 
 def read_axis(entry: Any, name: str, unit: str) -> FloatArray:
-    """Parse the bounds of an axis and its number of values; InputError for invalid bounds or numbers."""
+    """Parse the bounds of an axis and its number of values; raise InputError if they are invalid."""
     if not isinstance(entry, tuple | list) or len(entry) != 3:
         raise InputError.of(name, entry, "least value, largest value and number of values")
     low, high = (read_number(end, unit, name) for end in entry[:2])

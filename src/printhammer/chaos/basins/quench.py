@@ -64,7 +64,7 @@ class QuenchMap(Result):
     gaps: FloatArray = coordinate("s", "time between the two firings", "gap", name="gap")
     widths: FloatArray = coordinate("s", "width of the second pulse", "width", name="width")
     struck: BoolArray = column(
-        "1", "whether the second firing made a dot", "gap width", more="False for a lost dot"
+        "1", "whether the second firing printed a dot", "gap width", more="False for a lost dot"
     )
     peak: FloatArray = column(
         "m",
@@ -212,9 +212,9 @@ def quench_map(
     hammer : Hammer
         A hammer with a pack.
     gaps : tuple, optional
-        Least and largest time between the two firings, s, or text with a unit, and the number of times, both
-        ends included; by default 128 from 0.5 to 0.9 ms, multiplied by `printhammer.run.window.time_scale` of
-        the device.
+        Smallest and largest time between the two firings, s, or text with a unit, and the number of times,
+        both ends included; by default 128 from 0.5 to 0.9 ms, multiplied by
+        `printhammer.run.window.time_scale` of the device.
     widths : tuple, optional
         As `gaps`, for the width of the second pulse; by default 128 from 0.5 to 1.5 times the width of the
         first pulse.

@@ -48,7 +48,7 @@ class Window(Declared):
 
     verdict: str = part('classification: "period-q", "strange", "superstable" or "undecided"')
     period: int = part("period q in firings; 0 if aperiodic")
-    low: float = part("least value")
+    low: float = part("smallest value")
     high: float = part("largest value")
     width: float = part("width of the window, up to half-way to the neighbouring values")
     columns: int = part("number of values")
@@ -324,7 +324,7 @@ class Bifurcation(Result, rows="direction column"):
     def windows(self, direction: str | None = None) -> list[Window]:
         """Compute the windows of one direction, in ascending order of the parameter.
 
-        The default is the first direction; InputError if the diagram lacks the direction.
+        The default is the first direction; raises InputError if the diagram lacks the direction.
         """
         return self._group(self._row(direction), range(len(self.values)))
 
@@ -379,7 +379,7 @@ class Bifurcation(Result, rows="direction column"):
         return windows
 
     def _is_strange(self, row: int, k: int) -> bool:
-        """Whether an aperiodic train is chaotic, by the Lyapunov exponent of its later firings."""
+        """Whether an aperiodic train is chaotic, by the Lyapunov exponent after its last recorded firing."""
         x, v = (float(states[row, k, -1]) for states in (self.x, self.v))
         regime = self.regime.with_(self.parameter, float(self.values[k]))
         front = regime.hammer.front

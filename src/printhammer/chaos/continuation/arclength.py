@@ -122,7 +122,7 @@ def follow(
     scales : array, shape (n + 1,)
         Scales that divide the components of the state and, last, the parameter.
     bounds : tuple of float
-        Least and largest parameter, at which the curve ends.
+        Smallest and largest parameter, at which the curve ends.
     steps : Steps, optional
         Step sizes and maximum number of steps.
     directions : str, optional

@@ -205,9 +205,9 @@ class Branch(Result):
         "1", "number of pack contacts in one period of the orbit", "orbit", dtype=np.int32
     )
     printed: IntArray = column(
-        "1", "number of firings in one period that make a dot", "orbit", dtype=np.int32
+        "1", "number of firings in one period that print a dot", "orbit", dtype=np.int32
     )
-    lost: IntArray = column("1", "number of firings in one period that make no dot", "orbit", dtype=np.int32)
+    lost: IntArray = column("1", "number of firings in one period that print no dot", "orbit", dtype=np.int32)
     flight_time: FloatArray = column(
         "s", "time from the firing to the touch of the pack", "orbit firing", more="nan for a lost dot"
     )

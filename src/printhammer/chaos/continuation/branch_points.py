@@ -71,7 +71,7 @@ _ASIDE: Final = 0.5
 _NEW_MULTIPLIER: Final = 0.3
 """Largest distance between 1 and the nearest multiplier of an orbit near its birth by doubling; arbitrary."""
 _HALF_NEAR: Final = 0.05  # Arbitrary
-"""Largest scaled distance at which an orbit and an orbit of half its period meet at a doubling."""
+"""Scaled distance below which an orbit coincides with an orbit of half its period, as at a doubling."""
 _HALF_DOUBLES: Final = 0.5
 """Largest distance of a multiplier from -1 at which a nearby period doubling is searched for; arbitrary."""
 

@@ -57,7 +57,7 @@ def continuation(
         "period", "rate", or the dotted key of a constant of the hammer, such as "backstop.damping", of the
         waveform or of a continuous periodic force, such as "waveform.amplitude" or "drive.amplitude".
     bounds : tuple
-        Least and largest value, SI or text with a unit.
+        Smallest and largest value, SI or text with a unit.
     firings : int, optional
         For a hammer or regime: number of firings after which the orbit repeats; by default the period that
         the train from rest settles to, or 1 if it does not settle or a state is given.

@@ -36,7 +36,7 @@ _CURRENT: Final = "with a voltage drive, the current at a touch belongs to the s
 _CLOSE: Final = 0.01  # Arbitrary
 """Time before and after an impact during which the surface is removed, as a fraction of the period."""
 _STILL: Final = 1e-9
-"""Speed at a section, relative to the speed scale, below which the orbit turns there; arbitrary."""
+"""Relative speed at a section below which the section is a turning point of the orbit; arbitrary."""
 _SPACING: Final = 1e-6  # Finite-difference step of Newton's method, in scaled variables; arbitrary
 _ROUNDS: Final = 20  # Iteration limit of Newton's method; arbitrary
 _PRECISION: Final = 1e-12  # Scaled correction below which Newton's method has converged; arbitrary

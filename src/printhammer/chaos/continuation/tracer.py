@@ -55,7 +55,7 @@ _NO_STOP: Final = Stop("section", math.nan, np.zeros(0), "the section moves")
 def read_bounds(
     regime: Regime, parameter: str, bounds: tuple[float | str, float | str]
 ) -> tuple[float, float]:
-    """Parse the bounds of a parameter, SI; InputError unless the bounds are two ascending numbers."""
+    """Parse the bounds of a parameter, SI; raise InputError unless they are two ascending numbers."""
     unit = regime.quantity(parameter).si
     try:
         low, high = bounds

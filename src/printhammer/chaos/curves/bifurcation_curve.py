@@ -239,8 +239,8 @@ def settled_plane(
     """Compute the periods, in firings, of trains from rest over a grid of both parameters.
 
     The result contains the values of the first parameter, shape (m,), of the second, shape (n,), and the
-    periods, shape (n, m): 0 without a period, -1 if the run ended early. InputError if a number of values is
-    negative.
+    periods, shape (n, m): 0 without a period, -1 if the run ended early. Raises InputError if a number of
+    values is negative.
     """
     if min(grid) < 0:
         raise InputError.of("grid", grid, "two numbers of values, not negative")
@@ -292,7 +292,7 @@ def bifurcation_curve(
     second : str
         Name of the second parameter, such as "backstop.damping" or "waveform.amplitude".
     bounds : tuple
-        Least and largest value of the second parameter, SI or text with a unit.
+        Smallest and largest value of the second parameter, SI or text with a unit.
     event : BranchEvent, int or str, optional
         Start of the curve: an event object of the branch; the index of an event, from 0; a kind of event, for
         the first event of that kind; or "first" or "last", for the grazing at that end of the branch. By
@@ -301,7 +301,7 @@ def bifurcation_curve(
     regime : Regime, optional
         For a file: the regime (hammer and periodic drive), which the file does not contain.
     first : tuple, optional
-        Least and largest value of the first parameter, by default those of the branch.
+        Smallest and largest value of the first parameter, by default those of the branch.
     grid : tuple of int, optional
         Numbers of values of the two parameters at which the periods of trains from rest are computed
         (default: none).

@@ -162,9 +162,9 @@ def stability_chart(
     second : str
         Name of the second parameter, such as "backstop.damping" or "waveform.amplitude".
     bounds : tuple
-        Least and largest value of the second parameter, SI or text with a unit.
+        Smallest and largest value of the second parameter, SI or text with a unit.
     first : tuple, optional
-        For a regime or hammer: name, least and largest value of the first parameter.
+        For a regime or hammer: name, smallest and largest value of the first parameter.
     grid : tuple of int, optional
         Numbers of values of the two parameters at which the periods of trains from rest are computed; (0, 0)
         for none.

@@ -111,7 +111,7 @@ def _of_branch(branch: Branch, event: BranchEvent | int | str | None) -> Start:
 
 
 def _number(kinds: Sequence[str], located: list[bool], event: int | str | None, whose: str) -> int:
-    """Return the index of the event selected by index, kind or default; InputError without such an event."""
+    """Return the index of the event selected by index, kind or default; raise InputError if missing."""
     known = ", ".join(dict.fromkeys(kinds)) or "none"
     if isinstance(event, int | np.integer):
         if not 0 <= event < len(kinds):

@@ -86,7 +86,7 @@ class Plane:
         return np.array([*self.regime.window.half_widths, *widths])
 
     def at(self, first: float, second: float) -> Regime:
-        """Return the regime at a point of the parameter plane; InputError if the values are invalid."""
+        """Return the regime at a point of the parameter plane; raise InputError for invalid values."""
         return self.regime.with_(self.names[1], float(second)).with_(self.names[0], float(first))
 
 
@@ -200,7 +200,7 @@ class GrazingSystem:
         """Compute the orbit that starts at a grazing of the surface, and its closing error at the next touch.
 
         The closing error is the difference of the states at start and end, in units of the state scales. If
-        the run ends early, the reason is returned as text. InputError if the parameters are invalid.
+        the run ends early, the reason is returned as text. Raises InputError for invalid parameters.
         """
         flight = _flight(self.plane, self.surface, phase, 0.0, first, second)
         if flight.trouble:

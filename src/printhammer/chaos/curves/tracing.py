@@ -102,7 +102,7 @@ class CurveTracer:
         self.rigid = has_rigid_backstop(plane.regime)
 
     def trace(self, start: Start, second: float, threads: int | None) -> Traced:
-        """Trace the bifurcation curve from an initial guess; InputError if Newton's method fails there."""
+        """Trace the bifurcation curve from an initial guess; raise InputError if Newton's method fails."""
         system, unknown = self.begin(start, second)
         at = f"{self.kind} at {start.first} = {start.value:.9g} {start.regime.quantity(start.first).si}"
         try:

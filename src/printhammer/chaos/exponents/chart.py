@@ -120,7 +120,7 @@ class LyapunovChart(Result, rows="period"):
 
     @classmethod
     def of(cls, trains: Sequence[Lyapunov]) -> LyapunovChart:
-        """Combine the results of single trains into a chart; InputError for an empty sequence."""
+        """Combine the results of single trains into a chart; raise InputError for an empty sequence."""
         if not trains:
             raise InputError("periods: expected at least one train", key="periods")
         points = trains[0].points

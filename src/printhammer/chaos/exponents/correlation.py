@@ -50,7 +50,7 @@ class CorrelationDimension(Result, rows="radius"):
     """Correlation sums of a series of states, local slopes, and the dimension if there is a plateau."""
 
     radius: FloatArray = coordinate("1", "distance of states", "radius", more="in units of the scales")
-    sums: FloatArray = column("1", "fraction of the pairs that are closer", "radius", name="correlation_sum")
+    sums: FloatArray = column("1", "fraction of pairs that are closer", "radius", name="correlation_sum")
     slopes: FloatArray = column(
         "1",
         "local slope of the logarithm of the correlation sum over that of the distance",

@@ -39,11 +39,13 @@ SEED: Final = 1983
 """Default seed of the random number generator of the angles: the year of the paper."""
 
 REGULAR: Final = 0.2
+"""Largest K of a regular series; arbitrary."""
+
 CHAOTIC: Final = 0.8
-"""Limits of K: a series is regular up to `REGULAR`, and chaotic if K is at least `CHAOTIC`.
+"""Smallest K of a chaotic series; arbitrary.
 
 K^2 is the fraction of the variance of M_c(n) that a straight line explains: at most a twentieth for a regular
-series, about two thirds or more for a chaotic series. Arbitrary.
+series, about two thirds or more for a chaotic series.
 """
 
 FEWEST: Final = 100  # Arbitrary

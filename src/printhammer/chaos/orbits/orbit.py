@@ -184,13 +184,13 @@ class Orbit(Result):
         return sum(contact.surface == "pack" for contact in self.contacts)
 
     @property
-    @derived("1", "number of dots made in one period", kind="column", dtype=np.int32)
+    @derived("1", "number of dots printed in one period", kind="column", dtype=np.int32)
     def printed(self) -> int:
         """Number of dots printed in one period of the orbit."""
         return sum(dot.struck for dot in self.dots)
 
     @property
-    @derived("1", "number of firings in one period that make no dot", kind="column", dtype=np.int32)
+    @derived("1", "number of firings in one period that print no dot", kind="column", dtype=np.int32)
     def lost(self) -> int:
         """Number of firings in one period of the orbit that print no dot."""
         return len(self.dots) - self.printed

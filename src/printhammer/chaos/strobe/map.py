@@ -102,7 +102,7 @@ class Image(Declared):
 
 
 def read_state(state: npt.ArrayLike) -> FloatArray:
-    """Parse a state, (displacement, m, velocity, m/s); InputError unless there are two finite numbers."""
+    """Parse a state, displacement in m and velocity in m/s; raise InputError unless both are finite."""
     pair = np.asarray(state, dtype=np.float64)
     if pair.shape != (2,) or not np.isfinite(pair).all():
         raise InputError.of("state", state, "two finite numbers, displacement in m and velocity in m/s")

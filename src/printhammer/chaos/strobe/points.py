@@ -254,7 +254,8 @@ def strobes(
 def points_of(series: Any, firing: Firing) -> Any:
     """Return the given points, or compute the settled strobe points of a hammer or regime.
 
-    InputError as for `strobe`, or if points are given together with keywords that describe the firing.
+    Raises InputError as `strobe` does, or if points are given together with keywords that describe the
+    firing.
     """
     if isinstance(series, Hammer | Regime):
         return strobe(series, points=_SETTLED, transient=_SETTLED, verdict=False, **firing)

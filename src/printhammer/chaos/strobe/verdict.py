@@ -54,7 +54,7 @@ class Verdict(Declared):
     period: int | None = part("number of firings after which the states repeat; None without a period")
     distance: float = part(
         "largest distance of states `nearest` firings apart, in half-widths of the window",
-        more="NaN if the run ended before",
+        more="NaN if the run ended early",
     )
     nearest: int | None = part(
         "number of firings, at most 64, after which the states come closest to repeating",

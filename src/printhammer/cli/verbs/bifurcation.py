@@ -163,7 +163,7 @@ _count = partial(opt.whole, panel=_BASINS)
         "firings": _count("Number of firings simulated between tests for an attractor (default: 200)."),
         "rounds": _count("Maximum number of tests for an attractor per grid cell (default: 20)."),
         "gaps": opt.span(
-            "Range of times between the firings (default: '0.5 ms, 0.9 ms, 128'; longer for a slow device).",
+            "Range of gaps between the firings (default: '0.5 ms, 0.9 ms, 128'; longer for a slow device).",
             panel=_QUENCH,
         ),
         "widths": opt.span(
@@ -189,7 +189,7 @@ def basins(
         "Largest period, in firings, of the saddle orbits whose manifolds are drawn."
     ),
     quench: bool = opt.switch(
-        "Map, by gap and width, whether the second of two pulses prints a dot, instead of basins.",
+        "Map where the second of two pulses prints a dot, against gap and width, instead of basins.",
         panel=_QUENCH,
     ),
     units: Units = opt.UNITS,

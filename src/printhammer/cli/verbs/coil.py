@@ -70,9 +70,7 @@ def dead_time(
         ),
         "delay": opt.text("TIME", "Delay of the probe, e.g. '2 us' (default: none)."),
         "bandwidth": opt.text("FREQUENCY", "Bandwidth of the probe, e.g. '50 kHz' (default: unlimited)."),
-        "known": opt.switch(
-            "Let the estimator correct for the delay and bandwidth of the probe.", default=True
-        ),
+        "known": opt.switch("Correct the estimates for the delay and bandwidth of the probe.", default=True),
         "dots": opt.whole(
             "Number of dots for each combination of noise, sampling rate and resolution.", default=50
         ),

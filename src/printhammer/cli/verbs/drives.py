@@ -25,7 +25,7 @@ _MOST_RATES: Final = 200  # Largest number of rates; each takes seconds to minut
     {
         "dots": opt.whole("Number of dots in the burst.", default=8),
         "force": opt.number(
-            "Smallest peak force of a dot, relative to that of a single pulse (default: 0.9).",
+            "Minimum peak force of a dot, relative to a single pulse (default: 0.9).",
             flag="--least-force",
         ),
         "largest": opt.text(
@@ -58,7 +58,7 @@ def energy(
     pulses: bool = opt.switch(
         "Use only pulses of the hammer's waveform, and optimise their firing times and widths."
     ),
-    supply: bool = opt.switch("Report also the dots of the burst with all currents scaled by 0.97 to 1.03."),
+    supply: bool = opt.switch("Also report the dots of the burst with all currents scaled by 0.97 to 1.03."),
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:

@@ -56,7 +56,7 @@ def map_(
     rates: int | None = _count("Number of rates (default: 512)."),
     times: int | None = _count("Number of points on the time axis of the map (default: 512)."),
     measured: Path | None = opt.source(
-        "Measured map to compare with (CSV or NetCDF); supplies the rates and times unless options set them."
+        "Measured map to compare with (CSV or NetCDF); by default, its rates and times are used."
     ),
     columns: str | None = opt.text(
         "COLUMNS",

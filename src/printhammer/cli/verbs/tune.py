@@ -106,7 +106,7 @@ def tune(
     tick: float | None = opt.quantity(
         "s", "TIME", "Tick of the firmware timer, e.g. '1 us' (default: 1 ns).", positive=True
     ),
-    budget: int | None = opt.whole("Maximum size of the arrays in the C header, bytes."),
+    budget: int | None = opt.whole("Maximum size of the arrays in the C header, in bytes."),
     along: str | None = opt.text(
         "AXIS LOW, HIGH, N",
         "Additional axis of the table, with its range, e.g. 'rail 90 V, 110 V, 3': rail (voltage),"
@@ -119,7 +119,7 @@ def tune(
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:
-    """Tune pulse width and advance for each history of gaps, so that every dot equals a dot from rest.
+    """Tune pulse width and advance for each history of gaps, so that every dot matches a dot from rest.
 
     The exit status is 1 if the table exceeds the limits on the hammer for which it was tuned.
     """

@@ -172,8 +172,10 @@ def plot(basins: Basins, *, attractors: bool = True, manifolds: Sequence[Manifol
 
 
 PRINTED: Final = "viridis"
+"""Colour map of the force of a printed second dot in a quench map."""
+
 LOST: Final = "bone"
-"""Colour maps of a quench map: force of a printed second dot (`PRINTED`), peak of a lost one (`LOST`)."""
+"""Colour map of the second displacement peak where the second dot is lost, in a quench map."""
 
 _FAILED: Final = "#d55e00"
 _FEW_QUENCH: Final = 0.01  # Fraction of forces beyond either end of the colour scale; arbitrary

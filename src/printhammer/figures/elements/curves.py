@@ -24,7 +24,7 @@ _PER_PIECE: Final = 60  # Points of a smooth segment; arbitrary
 
 
 def waveform_of(hammer: Hammer) -> Waveform:
-    """Return the standard waveform of a hammer; InputError for a hammer without a waveform."""
+    """Return the standard waveform of a hammer; raise InputError for a hammer without a waveform."""
     if hammer.waveform is None:
         raise InputError(
             f"the hammer {hammer.name!r} has no waveform to fire", key="waveform", expected="a [waveform]"

@@ -182,7 +182,7 @@ def beside(
     side: str = "left baseline",
     **options: Any,
 ) -> None:
-    """Write small text next to a point, at an offset in points; `side` is its alignment."""
+    """Write small text at an offset, in points, from a position; `side` is the alignment of the text."""
     ha, va = side.split()
     how = {"fontsize": TINY, "color": MUTED, "textcoords": "offset points", "ha": ha, "va": va, **options}
     ax.annotate(text, at, shift, **how)

@@ -5,8 +5,8 @@ The armature rests at the backstop at 0 and is pulled through the stroke to its 
 restitution of the sheet and is so stiff that the work of the magnet indents it by a quarter of the remaining
 gap.
 
-Contacts are linear springs: a make contact between its gap and the end of the stroke, a break contact that
-the armature lifts from its place at rest.
+Contacts are linear springs. A make contact is compressed between its gap and the end of the stroke; a break
+contact is closed at rest, and the armature opens it as it moves.
 
 The magnet follows the reluctance law. A sheet has a few forces at one current, whereas the law has seven
 constants, so the fit is a maximum a posteriori estimate: every constant but the pole area has a log-normal
@@ -78,8 +78,9 @@ class Sheet:
     current: float
     """Coil current at which the forces are stated, A."""
     gaps: FloatArray
+    """Gaps at which the forces are stated, m, shape (n,)."""
     forces: FloatArray
-    """Gaps, m, and the forces at the gaps, N."""
+    """Forces at the gaps, N, shape (n,)."""
     inductance: tuple[float, float] | None
     """Inductance at small currents, H, and the gap of the measurement, m."""
     turns: float | None
@@ -333,7 +334,7 @@ def _derived_from(sheet: DataSheet, key: str, how: str) -> tuple[str, str]:
 
 
 def _spring(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, Any] | None:
-    """Return the spring table, None without a spring; `InputError` if the spring overcomes the magnet."""
+    """Return the spring table, or None; raise `InputError` if the spring overcomes the magnet."""
     stated = [name for name in ("preload", "stiffness") if f"spring.{name}" in sheet.entries]
     if not stated:
         return None

@@ -60,7 +60,7 @@ class Shot(Declared, eq=False):
     bandwidth: float | None = scalar("Hz", "bandwidth of the sensor", more="None for unlimited")
     noise: float = part("noise of the displacement, m, estimated from differences of the samples")
     touches: list[Touch] = part("contacts in order; the first is the rest at the backstop, if recorded")
-    joints: IntArray = part("indices at which the record is cut, shape (j,)")
+    joints: IntArray = part("sample indices at which the record is divided into segments, shape (j,)")
     states: FloatArray = part(
         "displacement, m, and velocity, m/s, at the joints, estimated from the record. Shape (j, 2)"
     )
@@ -267,8 +267,8 @@ class Pulse(Declared, eq=False):
     names: tuple[str, ...] = part(
         'uncertain constants; "scale" for the size of a waveform taken from the record'
     )
-    values: FloatArray = part("estimated values of these constants, SI, shape (n,)")
-    covariance: FloatArray = part("covariance of these constants, shape (n, n)")
+    values: FloatArray = part("estimated values of the uncertain constants, SI, shape (n,)")
+    covariance: FloatArray = part("covariance of the uncertain constants, shape (n, n)")
     note: str = part("remark; may be empty", default="")
 
     def changed(self, values: Sequence[float]) -> Waveform:

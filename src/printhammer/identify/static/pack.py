@@ -263,7 +263,7 @@ def fit_pack(
 
 
 def _start(law: PackLaw, table: Readings) -> FloatArray:
-    """Estimate the initial guess from the loading rows; `InputError` for too few or negative forces."""
+    """Estimate the initial guess from the loading rows; raise `InputError` for too few or negative forces."""
     force, cycles = table.values["force"], law.cycles
     rows = np.flatnonzero(law.inside & ~cycles.unloading)
     if len(rows) < _LOADING_ROWS:

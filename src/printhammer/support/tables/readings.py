@@ -36,7 +36,7 @@ BEFORE: Final = 0.1
 
 _TINY: Final = float(np.finfo(np.float64).tiny)
 _CAPITALS: Final = frozenset({"MA", "MV", "MN", "MW", "MJ"})
-"""Units that headings in capital letters write for mA, mV, mN, mW and mJ."""
+"""Capitalised spellings of mA, mV, mN, mW and mJ in headings that are all capitals."""
 _BY_UNIT: Final = {"time": "s", "current": "A", "force": "N"}
 """Quantities of a record that are identified by their unit alone; a voltage may be any quantity."""
 

@@ -1,4 +1,4 @@
-"""Each conclusion against its definition, with runs made one by one."""
+"""Tests of each conclusion against its definition, with single runs."""
 
 import math
 from collections.abc import Iterator
@@ -30,7 +30,7 @@ def test_every_conclusion_is_described_with_its_unit() -> None:
 
 
 def bad_patterns(hammer: ph.Hammer, rate: float) -> Iterator[tuple[int, ...]]:
-    """The definition of a pattern printed badly, with the default integrator, one run at a time."""
+    """Yield the badly printed patterns of eight slots at a rate, found by single runs."""
     single = ph.simulate(hammer, ph.PulseTrain(hammer.waveform), duration=20e-3).dots[0]
     for number in range(1, 256):
         slots = tuple(slot for slot in range(8) if number >> slot & 1)

@@ -48,7 +48,7 @@ def log(hammer: ph.Hammer, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def judged(hammer: ph.Hammer) -> dict[str, Any]:
-    """Replacement for the slow claims, by which one hammer does not belong to the family."""
+    """Return the judgement of a hammer, in place of the slow claims; one hammer is not in the family."""
     rise = hammer.constants["waveform.rise"].si
     conclusions = {
         "safe_rate_Hz": 1e7 * rise,

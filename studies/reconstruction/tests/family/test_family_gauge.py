@@ -1,4 +1,4 @@
-"""Mass and all forces scale together without a change of the motion, and so do the current and 1 / Bm."""
+"""Tests of the scalings of mass and forces, and of current and 1 / Bm, which leave the motion unchanged."""
 
 import pytest
 from studies.reconstruction.family.choice import at_gauge, scaled

@@ -1,4 +1,4 @@
-"""Judged candidates, read as hammers for the family; `test_judged` covers invalid logs."""
+"""Tests of reading judged candidates as hammers of the family; `test_judged` covers invalid logs."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The family that ships with the program, once there is one."""
+"""Tests of the family that ships with the program, if it exists."""
 
 import itertools
 

@@ -10,7 +10,7 @@ COUNT = 24
 
 
 def family(**other: list[float | None]) -> tuple[list[dict], list[dict[str, float]]]:
-    """Family in which the safe rate follows the damping, and all else is constant."""
+    """Return a family whose safe rate varies with the damping; all other conclusions are constant."""
     random = np.random.default_rng(3)
     constants = [
         {"mass": float(random.uniform(1.0, 2.0)), "backstop.damping": 1.0 + number, "platen": 1.0}

@@ -1,4 +1,4 @@
-"""How often claims hold among random hammers."""
+"""Tests of the base rates: how often claims hold for random hammers."""
 
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any

@@ -1,4 +1,4 @@
-"""The Pareto front of judged hammers."""
+"""Tests of the Pareto front of judged hammers."""
 
 from typing import Any
 

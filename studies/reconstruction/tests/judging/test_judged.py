@@ -1,4 +1,4 @@
-"""Candidates judged by the claims, and the log of judged candidates."""
+"""Tests of the evaluation of candidates by the claims, and of the log of judged candidates."""
 
 import json
 from dataclasses import replace
@@ -210,7 +210,7 @@ def test_files_that_cannot_be_read_or_written_are_told(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_panels_of_the_shipped_hammer_are_those_of_the_claim(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Three of the twelve panels: all are judged in the same way."""
+    """Compare three of the twelve panels; all panels are judged in the same way."""
     claim, some = claims()[FIGURE_11], dict(list(printed_verdicts().items())[::4])
     claim = replace(claim, settings={"strobe_times_s": list(some)}, band={"verdicts": list(some.values())})
     monkeypatch.setattr(module, "printed_verdicts", lambda: some)

@@ -1,4 +1,4 @@
-"""Predictions of the other claims by hammers found on the stated claims alone."""
+"""Tests of the predictions: other claims that hold for hammers found with the stated claims alone."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Comparison of verdicts computed in two ways."""
+"""Tests of the comparison of verdicts between the integrators of 1983 and the exact motion."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The shortlist of a search, and candidates judged once."""
+"""Tests of the shortlist of a search, whose candidates are judged only once."""
 
 import json
 from pathlib import Path

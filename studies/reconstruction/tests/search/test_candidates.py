@@ -1,4 +1,4 @@
-"""Candidates: hammers of the search space that print the stroke of the paper, judged by the claims."""
+"""Tests of candidates: hammers of the search space with the printed stroke, judged by the claims."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Losses of candidates against the verdicts of the claims themselves, which they lead to."""
+"""Tests of the losses of candidates against the verdicts of the claims."""
 
 import json
 import math
@@ -202,7 +202,7 @@ def test_losses_are_between_zero_and_one_and_go_into_the_log(aim: str) -> None:
 
 @pytest.mark.slow
 def test_losses_that_follow_whole_scans_of_rates() -> None:
-    """Of a shipped hammer, which loses its second dot as in the paper, and of two that hang up later."""
+    """Compare a shipped hammer, which loses its second dot as in the paper, and two that hang up later."""
     shipped = candidates(near_points(1, 5, 0.0, "hendriks-1983-1"))
     chosen = (*(each for each in shipped if each is not None), *some_candidates(6, 6, 3)[-2:])
     scores = looked_at(chosen)

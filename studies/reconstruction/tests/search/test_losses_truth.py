@@ -1,4 +1,4 @@
-"""The search space and its losses against the equations of the paper, written out once more."""
+"""Tests of the search space and its losses against an independent form of the paper's equations."""
 
 import math
 from typing import Any
@@ -22,13 +22,13 @@ POUND = 0.45359237 * 9.80665
 
 
 def free_force(c: dict[str, float], x: Any, current: float = 0.0) -> Any:
-    """Magnet and spring, equations (3) and (4), N."""
+    """Compute the force of magnet and spring, equations (3) and (4), N."""
     magnet = c["magnet.F0"] - (c["magnet.Am"] - c["magnet.Bm"] * current) ** 2 / np.sqrt(x)
     return magnet + c["spring.Bs"] - c["spring.Bs"] / c["spring.As"] * (x - B)
 
 
 def current_of(c: dict[str, float], t: float) -> float:
-    """A rectangle with exponential flanks, A."""
+    """Compute the current of a rectangular pulse with exponential rise and decay, A."""
     top, width = c["waveform.amplitude"], c["waveform.width"]
     if t < width:
         return top * (1.0 - math.exp(-t / c["waveform.rise"]))
@@ -48,7 +48,7 @@ def acceleration(c: dict[str, float], t: float, x: float, v: float) -> float:
 
 
 def stroke(c: dict[str, float]) -> tuple[float, float]:
-    """Return rest and turning point in the pack, m, by an integrator of scipy."""
+    """Compute the rest position and the turning point in the pack, m, with a SciPy integrator."""
     rest = float(brentq(lambda x: acceleration(c, 0.0, x, 0.0), 0.2 * B, B, xtol=1e-16))
 
     def turned(_t: float, y: np.ndarray) -> float:

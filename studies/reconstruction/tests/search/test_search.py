@@ -1,4 +1,4 @@
-"""The search is determined by its seed, and resumes from an existing log."""
+"""Tests of the search: determined by its seed, and resumed from an existing log."""
 
 import itertools
 import json
@@ -21,8 +21,9 @@ from printhammer.errors import InputError
 
 PLAN = Plan("all", seed=3, sample=16)
 SAMPLED = 16
+"""Number of points in the initial sample."""
 ROUND = 12
-"""Numbers of points in the sample and in each later round; the log grows by whole rounds."""
+"""Number of points in each later round; the log grows by whole rounds."""
 
 SHORT, LONG = SAMPLED + 2 * ROUND, SAMPLED + 4 * ROUND
 

@@ -1,4 +1,4 @@
-"""Reading the log of a search."""
+"""Tests of reading the log of a search."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The space of the search: values of its variables to constants and back, its two scales."""
+"""Tests of the search space: conversion of variables to constants and back, and the two scales."""
 
 import math
 from pathlib import Path
