@@ -1,4 +1,4 @@
-"""Thermal duty: the largest dot rate that respects a coil's temperature limit, and bursts at higher rates.
+"""Thermal duty: the largest dot rate within a coil's temperature limit, and bursts at higher rates.
 
 The coil is modelled as one thermal mass, or as two: winding, temperature T, and surrounding body, temperature
 B.

@@ -24,7 +24,7 @@ from printhammer.support.arrays import FloatArray
 from printhammer.support.tables.readings import Readings, read_table
 
 _BITS: Final = 24
-"""Resolution, bits, without noticeable rounding; the noise estimate of a record includes rounding."""
+"""Resolution assumed for the converter, bits; fine, since the noise of a record already includes rounding."""
 
 _UNITS: Final = 20  # Number of simulated units behind an uncertainty; arbitrary
 

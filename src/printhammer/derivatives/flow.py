@@ -222,9 +222,9 @@ def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
 
 
 def _released(hammer: Hammer, push: float, before: float) -> float:
-    """Return the force on the armature, N, after a `push` that ends its rest; 0 if the rest does not end.
+    """Return the net force, N, after a jump `push` of the force on a resting armature; 0 if still at rest.
 
-    `before` is the sum of the forces, N, that stop or friction balance until then.
+    `before` is the sum of the forces, N, that a stop or friction balances until the jump.
     """
     after, damping = push + before, hammer.damping
     if isinstance(damping, DryFriction):
@@ -281,7 +281,7 @@ def surface_moves(wanted: Sequence[Parameter]) -> dict[str, FloatArray]:
 def pack_push_changes(
     problem: Problem, wanted: Sequence[Parameter], state: FloatArray, changes: FloatArray
 ) -> FloatArray:
-    """Return the derivatives of the pack force on the armature, N, with respect to n constants, shape (n,).
+    """Return the derivatives of the pack force, N, with respect to n constants, shape (n,).
 
     `state` is a row of `Flow.states` inside the pack; `changes`, shape (3 or more, n), are the derivatives of
     displacement, velocity and latest local maximum in this state.

@@ -1,4 +1,4 @@
-"""Constants with respect to which a motion can be differentiated, and their effect on the kernel's arrays.
+"""Differentiable constants of a motion, and their effect on the kernel's arrays.
 
 A constant is named as in a hammer file, such as "pack.stiffness"; constants of the pulse, such as
 "waveform.width", are those of the drive. Further constants are "period" and "rate" of a train at a constant
@@ -151,7 +151,7 @@ def _parameter(hammer: Hammer, drive: Drive, name: str) -> Parameter:
 
 
 def _spacing(drive: Drive, name: str, packed: FloatArray) -> Parameter:
-    """Build the constant "period" or "rate" of a train, with its first firing fixed, or of a sine."""
+    """Build the constant "period" or "rate" of a sinusoidal force, or of a train with fixed first firing."""
     period, count = drive.period, len(drive.times)
     if period is None or (count == 1 and not isinstance(drive.waveform, Sine)):
         raise InputError.of("constant", name, "a drive with a single period and several firings")

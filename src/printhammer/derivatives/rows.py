@@ -1,4 +1,4 @@
-"""Rows of dots: the periodic orbit of a row, and its Floquet multipliers over one repetition of its pulses.
+"""Periodic orbits of rows of dots, and their Floquet multipliers over one repetition of the pulses.
 
 A drive that fires the same pulses for every dot of a row has a strobe map, from the state at one firing to
 the state at the next; for a row that repeats after n dots, the map leads from one firing to the n-th firing
@@ -110,7 +110,7 @@ def row_multipliers(
 
 
 def leading(jacobians: FloatArray) -> FloatArray:
-    """Compute the eigenvalue of largest absolute value of each 2 x 2 matrix, shape (rows,); NaN propagates.
+    """Compute the dominant eigenvalue of each 2 x 2 matrix, shape (rows,); NaN propagates.
 
     A real eigenvalue keeps its sign; a complex pair is represented by its absolute value.
     """

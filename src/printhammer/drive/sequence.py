@@ -1,4 +1,4 @@
-"""Drive with a separate waveform for each firing, for instance wider pulses or pulses with a brake pulse."""
+"""Drive with a separate waveform for each firing, such as wider pulses or pulses with a brake pulse."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Numerical kernel: integration of the motion on numbers and arrays in SI units, without files or plots."""
+"""Numerical kernel: integration of the motion on arrays in SI units, without files or plots."""

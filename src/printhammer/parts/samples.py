@@ -1,4 +1,4 @@
-"""Curve through samples, as plain functions that laws and waveforms share: cell, slope, value, integral.
+"""Curve through samples, as plain functions for laws and waveforms: cell, slope, value and integral.
 
 The n abscissas of a curve, ascending, are c[first], c[first + 1], ...; the n ordinates follow them in `c`.
 Between the samples the curve is a straight line or a shape-preserving cubic (PCHIP), which is once

@@ -47,7 +47,7 @@ class CoilWork(Declared):
 
     @property
     def given_back(self) -> float:
-        """Energy that the armature returns to the coil, J: positive minus net work."""
+        """Energy that the armature returns to the coil, J: positive work minus net work."""
         return self.positive - self.net
 
 

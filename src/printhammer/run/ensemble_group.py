@@ -48,7 +48,7 @@ _CONTACTS: Final = 256  # Initial number of rows for contacts; arbitrary, enlarg
 MOST_COLUMNS: Final = 6  # Number of columns of an ensemble result without rows; arbitrary
 _EXTRA: Final = 4
 """Initial number of rows for extra contacts of a member, in addition to one per firing; arbitrary."""
-_STROBE_WIDTH: Final = 4  # As in `printhammer.kernel.single.stretch`
+_STROBE_WIDTH: Final = 4  # Number of columns of a strobe row, as in `printhammer.kernel.single.stretch`
 _ELECTRIC_WIDTH: Final = 3  # Number of additional columns of a strobe row if the laws contain a circuit
 _PIECE: Final = 4 * lane_layout.LANES
 """Number of members in one unit of work for vector lanes."""

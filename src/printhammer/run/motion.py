@@ -84,7 +84,8 @@ class Motion(Result, fields=False):
     """
 
     unsettled = ""
-    """Sentence about an armature not at rest at the end of the window; empty for a run with a duration."""
+    """Sentence that describes an armature not at rest at the end of the run; empty if a duration was
+    stated."""
 
     def __init__(self, problem: Problem, record: Record, end: float, times: FloatArray, scheme: str) -> None:
         self._problem = problem

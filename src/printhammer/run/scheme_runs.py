@@ -34,9 +34,9 @@ _GAUSS = np.polynomial.legendre.leggauss(4)  # Nodes and weights of the quadratu
 class SchemeProblem(Problem):
     """Hammer under a drive, integrated with a scheme of 1983.
 
-    Arguments as for `Problem`, with the tolerance ignored; `scale` multiplies all step sizes of the
-    paper's schedule, and `reading`, one of `READINGS`, decides when a short step is taken. InputError if the
-    factor is not positive, or the hammer has damping.
+    Arguments as for `Problem`, with the tolerance ignored; `scale` multiplies all step sizes of the paper's
+    schedule, and `reading`, one of `READINGS`, decides when a short step is taken. Raises InputError if
+    `scale` is not positive, or the hammer has damping.
     """
 
     def __init__(

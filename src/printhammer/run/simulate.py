@@ -107,7 +107,7 @@ def simulate(
 
 
 def announce_compiling(callback: Callable[[str], None], *, helped: bool = True) -> Callable[[], None]:
-    """Register a callback for messages before compilation; return a function that unregisters the callback.
+    """Register a callback for messages before compilation; return a function that unregisters it.
 
     A message names the compiled functions and the expected duration. Further messages report, once each, that
     machine code cannot be cached, or why cached code is invalid. If `helped`, a second process compiles the

@@ -53,8 +53,9 @@ HELD_BRANCHES: Final = {HELD_LOADING: LOADING, HELD_UNLOADING: UNLOADING}
 """Modes in which the armature rests in the pack, and the branch of the pack law of each."""
 
 _UNITS: Final = ("m", "m/s")
+"""Units of displacement and velocity."""
 _UNITS_BEYOND: Final = ("1", "m", "A", "A", "V")
-"""Units of the state components: displacement and velocity, then the further components in `Beyond`."""
+"""Units of the further state components, in the order of the fields of `Beyond`."""
 
 _BRANCHES = {LOADING: "loading", UNLOADING: "unloading", RELOADING: "reloading"}
 

@@ -39,8 +39,8 @@ MOST_STEPS: Final = 500_000  # Largest number of steps of a single pulse; arbitr
 _LEAST_REACH: Final = 1e-4
 THRESHOLDS: Final = {"least_reach": _LEAST_REACH, "flights": FLIGHTS, "held": (HELD + 1, HELD_FREE)}
 """Thresholds for a web page: smallest reach, smallest window in flight times, range of the held modes."""
-# Path at the last speed for the length of a run, as a fraction of the distance from rest, below which an
-# armature stands still; arbitrary
+# Distance travelled at the final speed in a time equal to the run, as a fraction of the distance from rest,
+# below which the armature counts as standing still; arbitrary
 _STILL: Final = 0.01
 _MOST_KEPT: Final = 512  # Number of cached windows at which the cache is emptied; arbitrary
 

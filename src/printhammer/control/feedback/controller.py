@@ -1,4 +1,4 @@
-"""Feedback controller: model of the nominal hammer, observer of the driven hammer, and control of the coil.
+"""Feedback controller: model of the nominal hammer, observer of the driven hammer, coil control.
 
 Before the armature touches the pack, the controller chooses the pulses that follow, from the estimated time
 and speed of the touch. The controller releases the armature before a first impact and adds the missing energy
@@ -68,7 +68,7 @@ _RELAXED: Final = 0.2
 _CLEAR: Final = 0.22
 """Fraction of a launch's flight time after which the armature has left the backstop; arbitrary."""
 _PATIENCE: Final = 40e-6
-"""Smallest time from the end of a contact to a throw whose decision may be revised, s; arbitrary."""
+"""Shortest time from the end of a contact to a throw whose decision may be revised, s; arbitrary."""
 _POLICIES: Final = 8  # Size of the policy cache; arbitrary
 
 
@@ -92,8 +92,8 @@ class Controller:
     """A controller designed for a nominal hammer and the driver of its coil.
 
     The hammer needs a pack and a backstop. `limits` normalise the deviations of dots; `threads` defaults to
-    one per core; `progress` is called with the numbers of finished and of all steps of the computation of
-    `fronts`.
+    one per core; `progress` is called with the number of finished steps of the computation of `fronts` and
+    the total number.
 
     Raises
     ------

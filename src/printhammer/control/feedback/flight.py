@@ -1,4 +1,4 @@
-"""The observer: estimates of the armature's state in flight and at the next contact, from a force model.
+"""Observer: model-based estimates of the armature's state in flight and at the next contact.
 
 In flight the acceleration is that of magnet and spring, a known function of displacement and current. Three
 numbers are unknown: displacement X and speed V at a reference time, and the relative deviation s of all

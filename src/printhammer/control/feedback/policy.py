@@ -330,13 +330,13 @@ class Choice:
             setattr(self, name, settled.reshape(self.force.shape))
 
     def by_speed(self, values: FloatArray, way: IntArray | None = None) -> FloatArray:
-        """Interpolate a table (T, A) of the nominal map in speed, for all actions or for `way`."""
+        """Interpolate a table (T, A) of the nominal map in speed, for all actions or one per touch, `way`."""
         every: Any = slice(None) if way is None else way
         share = self.share[:, np.newaxis] if way is None else self.share
         return blend(values[self.below, every], values[self.below + 1, every], share)
 
     def of(self, name: str, way: IntArray | None = None) -> FloatArray:
-        """Interpolate the tables `name` of all maps in speed and distance, for all actions or for `way`."""
+        """Interpolate tables of all maps in speed and distance, for all actions or one per touch (`way`)."""
         tables = [getattr(table, name) for table in self._fronts.maps]
         shape = (len(self.below), tables[MIDDLE].shape[1]) if way is None else (len(self.below),)
         values = np.empty(shape)

@@ -1,1 +1,1 @@
-"""Run-to-run calibration of a compensation table for an unmeasured hammer, from sensor readings of dots."""
+"""Run-to-run calibration of an unmeasured hammer's compensation table, from sensor readings of dots."""

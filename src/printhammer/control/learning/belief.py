@@ -1,4 +1,4 @@
-"""Maximum a posteriori estimation of a unit's constants from its readings, with a Laplace approximation.
+"""Maximum a posteriori estimation of a unit's constants, with a Laplace approximation.
 
 The constants are in prior standard deviations: the prior is the standard normal distribution. Each mode of
 the posterior is found by the Levenberg-Marquardt method (Nocedal and Wright, *Numerical Optimization*, 2006,
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     Search: TypeAlias = Work[FloatArray, FloatArray, T]
 
 LEVELS: Final = (1.0, 0.3, 0.1, 0.03, 0.0)
-"""Fraction of the surrogate's residual that is treated as noise; arbitrary."""
-_NEAR: Final = (0.1, 0.0)  # Levels of a search that begins at a mode of the stage before; arbitrary
+"""Noise levels of the continuation: fractions of the surrogate's residual treated as noise; arbitrary."""
+_NEAR: Final = (0.1, 0.0)  # Noise levels of a search that begins at a mode of the previous stage; arbitrary
 _MODES: Final = 4  # Maximum number of modes of a belief; arbitrary
 _SHARE: Final = 0.01  # Smallest probability of a mode, relative to the most probable mode; arbitrary
 _CARE: Final = 1.3
@@ -58,7 +58,7 @@ class Evidence:
     """Readings of a unit, normalised by the limits, shape (readings,); NaN for a dot not detected."""
 
     value: FloatArray
-    noise: FloatArray  # Standard deviation
+    noise: FloatArray  # Standard deviation of each reading
     rough: FloatArray  # RMS residual of the quadratic surrogate of a reading
 
     def at(self, level: float) -> FloatArray:
@@ -71,7 +71,7 @@ class Mode:
     """A mode of the posterior distribution of the constants, with its Laplace approximation."""
 
     mean: FloatArray  # Constants at the mode, in prior standard deviations, (constants,)
-    covariance: FloatArray  # (constants, constants)
+    covariance: FloatArray  # Covariance of the constants, (constants, constants)
     predicted: FloatArray  # Predicted readings of a unit with the constants of the mode, (readings,)
     level: float  # Last level of the continuation that explains the readings
     objective: float  # Negative log posterior density, up to a constant

@@ -151,7 +151,7 @@ def choose(
     noise: float,
     offset: float,
 ) -> list[Rung]:
-    """Select test pulses with `DOTS` dots in all by greedy A-optimal design.
+    """Select test pulses with a total of `DOTS` dots by greedy A-optimal design.
 
     Parameters
     ----------

@@ -374,7 +374,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return size_of(self.rates.size, entries_of(self.gaps, self.reach), bits)
 
     def quantised(self, tick: float | str) -> CompensationTable:
-        """Return a copy with times rounded to whole timer ticks (s, or text) and unknown deviations (NaN).
+        """Return a copy with times rounded to a timer tick (s, or text), and deviations set to NaN.
 
         The multipliers are unknown too, unless no time changes by more than 1 ns; see
         `printhammer.control.table.multipliers.with_multipliers`.

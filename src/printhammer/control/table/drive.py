@@ -111,7 +111,7 @@ def history_text(history: Sequence[int]) -> str:
 
 
 def growing_text(multipliers: FloatArray, rates: FloatArray, gaps: int, reach: int) -> str:
-    """Name the histories whose repetition lets an error grow, or has no periodic orbit; empty for none.
+    """Name the histories whose repetition amplifies errors or has no periodic orbit; may be empty.
 
     `multipliers` has the shape (rates, entries). All NaN is a table without multipliers.
     """
@@ -222,7 +222,7 @@ def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
 
 
 def fading(hammer: Hammer, pulse: Waveform, share: float) -> float:
-    """Return the decay time of a pulse, s: from its end until the current stays below `share` times its peak.
+    """Return the time, s, from the end of a pulse until the current stays below `share` times its peak.
 
     For a driver this is the first time at which the current has decayed; later induced currents are ignored.
     """

@@ -1,12 +1,13 @@
-"""Multiplier of each history of a compensation table: growth of a small error where the history repeats.
+"""Multiplier of each history of a compensation table: error growth per dot if the history repeats.
 
 The history of a dot lists the last gaps between dots. Printed again and again, these gaps are a periodic
 pattern, in which this history occurs. The strobe map of the pattern leads from a firing to the firing after
 one repetition. A repetition of n dots with the Floquet multiplier M has the dot-to-dot multiplier
 sign(M) |M|^(1/n), the geometric mean over its dots. Rotations of the gaps are the same pattern.
 
-A rest is taken as its shortest gap, one slot more than the reach, which leaves the most of the preceding
-motion. For equal gaps, the multiplier is the multiplier of a row; see `printhammer.derivatives.rows`.
+A rest is represented by the shortest gap that counts as rest, one slot more than the reach, after which the
+residual motion is largest. For equal gaps, the multiplier is the multiplier of a row; see
+`printhammer.derivatives.rows`.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ def with_multipliers(
     table : CompensationTable
         Table with the pulses.
     hammer : Hammer
-        The hammer for which the table was tuned; its driver makes the pulses.
+        The hammer for which the table was tuned, and whose driver generates the pulses.
     unit : Hammer, optional
         Driven hammer, if it differs from `hammer`.
 
@@ -66,7 +67,7 @@ def history_multipliers(
 ) -> FloatArray:
     """Compute the dot-to-dot multiplier of each history at each rate, shape (rates, entries).
 
-    `strategy` makes the drives from the entries of `table`, and `driven` is the simulated hammer.
+    `strategy` generates the drives from the entries of `table`, and `driven` is the simulated hammer.
     """
     every = histories(table.gaps, table.reach)
     patterns = sorted({repetition(history, table.reach) for history in every})

@@ -1,4 +1,4 @@
-"""Comparison of a compensation table with open loop, on patterns, rates and hammers not used in tuning."""
+"""Comparison of a compensation table with open loop on patterns, rates and hammers not used in tuning."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Compilation of the kernel for a combination of force laws: lowering, linking, code generation, cache."""
+"""Compilation of the kernel for given force laws: lowering, linking, code generation and cache."""

@@ -117,7 +117,7 @@ def syntax_text(node: Any, replaced: Callable[[ast.AST], str | None] = lambda _n
 
 
 def helpers_of(function: FunctionType) -> dict[str, FunctionType]:
-    """Return the Python functions that a law calls directly, by the name under which it calls them."""
+    """Return the Python functions that a law calls directly, keyed by their names in the law."""
     return {
         name: value
         for name in function.__code__.co_names

@@ -77,7 +77,7 @@ def _folders() -> Iterator[Path]:
 
 
 def _is_safe(folder: Path) -> bool:
-    """Whether only the user can write to a cache folder; every folder but the temporary folder is trusted."""
+    """Whether only the user can write to a cache folder; only the temporary folder is tested."""
     if folder != _temporary_folder():
         return True
     try:
@@ -157,7 +157,7 @@ class File:
     """File of the disk cache, named after the digest of its sources.
 
     The file is looked up in the folders up to and including the first writable folder, and is written to that
-    folder. Read and write errors never stop the program: the content is then made again.
+    folder. Read and write errors never stop the program: the content is then created again.
     """
 
     def __init__(self, name: str) -> None:

@@ -96,7 +96,7 @@ def _flat(value: Any) -> Iterator[Any]:
 
 
 def calling_code(entry: str, signature: Signature, name: str, *, bare: bool = False) -> str:
-    """Return the source of a module whose function reads a block of arguments and calls the function `entry`.
+    """Return the source of a function that reads a block of arguments and calls the function `entry`.
 
     The function returns 0, the number of the first slot whose array does not match the signature, or -1 for
     an exception. The results follow the arguments in the block. Outside Python (WebAssembly), arrays are

@@ -1,4 +1,4 @@
-"""Numba compilers that keep each function as an unoptimised module, and link all modules before optimisation.
+"""Numba compilers that keep functions as unoptimised modules, and link them before optimisation.
 
 By default, numba compiles every function together with its callees, and links and optimises the same callees
 again in every caller: a helper five calls deep is compiled five times, and four of the results are never run.

@@ -46,8 +46,8 @@ _NUMBERS = {"f": types.float64, "s": types.float32, "i": types.int64, "b": types
 def template(entry: str, variant: Mapping[str, bool]) -> bytes:
     """Lower the template of an entry point; return LLVM bitcode.
 
-    `variant` states whether the hammer `HAS_CIRCUIT` and, for `flow`, whether the tangent columns are
-    `FORCED`, i.e. include derivatives with respect to constants.
+    The flags of `variant` are `HAS_CIRCUIT`, whether the hammer has a coil circuit, and, for `flow`,
+    `FORCED`, whether the tangent columns include derivatives with respect to constants.
     """
     if entry == "lanes":
         namespace = _lanes()

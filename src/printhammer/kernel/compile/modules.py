@@ -1,7 +1,8 @@
-"""Entry points and the lowered modules from which their machine code is linked: the template and the laws.
+"""Entry points of the kernel, and the lowered modules from which their machine code is linked.
 
-A module is named after a digest of its sources. It is read from the wheel, or else lowered by numba on first
-use and cached with the machine code.
+The machine code of an entry point is linked from its template and the modules of the laws. A module is named
+after a digest of its sources. It is read from the wheel, or else lowered by numba on first use and cached
+with the machine code.
 """
 
 from __future__ import annotations
@@ -116,7 +117,7 @@ class Module:
         return self.shipped.exists() or File(f"{self.name}_{_versions()}{self.suffix}").exists()
 
     def content(self) -> bytes:
-        """Return the content of the module: from the wheel, from the disk cache, or lowered now."""
+        """Return the content of the module: read from the wheel or the disk cache, otherwise lowered."""
         if self.shipped.exists():
             with suppress(OSError, EOFError, lzma.LZMAError):
                 content = lzma.decompress(self.shipped.read_bytes())
@@ -161,7 +162,7 @@ def template_of(entry: str, variant: Mapping[str, bool]) -> Module:
 
 
 def plain_template(name: str, plain: Plain, circuit: bool, packing: Mapping[str, Any] = _NONE) -> Module:
-    """Return the template of a plain function, in a variant if it uses names of the kernel.
+    """Return the template of a plain function, without lowering it; `circuit` selects the kernel's variant.
 
     `packing` holds the functions that pack constants, for a function that uses them.
     """

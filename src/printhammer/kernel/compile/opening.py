@@ -1,4 +1,4 @@
-"""Names that a template leaves undefined: laws, defined by other modules, and choices, set when linking.
+"""Names that a template leaves undefined: laws, linked from other modules, and choices, set at linking.
 
 Both are ordinary Python names in the source of a template. The numba extensions below compile a law as a call
 of an external function, and a choice as the value of an external constant.

@@ -44,7 +44,7 @@ def laws(role: str, functions: Mapping[str, Callable[..., Any]], for_lanes: bool
     Raises
     ------
     InputError
-        The compiler does not understand a function; the message names the function and the reason.
+        Numba cannot compile a function; the message names the function and the reason.
     """
 
     def compiled(function: Any) -> Any:

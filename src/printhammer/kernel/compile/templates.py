@@ -84,7 +84,7 @@ def compile_law(function: Callable[..., Any], compiled: Callable[..., Any], **na
 
 
 def bind(function: Any, namespace: Mapping[str, Any], compiled: Callable[..., Any], known: Any = None) -> Any:
-    """Compile a plain function and its helpers; `namespace` has the names that their modules leave undefined.
+    """Compile a plain function and its helpers; `namespace` defines the names missing in their modules.
 
     The dictionary `known` collects the compiled functions, so that each is compiled once.
     """

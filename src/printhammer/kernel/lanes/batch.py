@@ -54,7 +54,7 @@ class Batch(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """Output arrays of an ensemble of M members, with the requested times; NaN after an early end of a run.
+    """Requested times and output arrays of an ensemble of M members; NaN after an early end of a run.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Events of a member between two steps of its lane: mode changes, edges of the drive, samples, strobes.
+"""Events of a member between two steps of its lane: mode changes, drive edges, samples and strobes.
 
 The functions are scalar code for one lane at a time. Data of a member that the steps do not need are stored
 in a row `slot` outside its lane. Rare events (a touch with zero velocity, a rest, a departure from the range,
@@ -73,7 +73,7 @@ def quintic(part: float, h: float, x0: float, v0: float, a0: float, x1: float, v
 
 @compiled
 def sixth_term(pool: Any, i: int, which: int) -> float:
-    """Return the coefficient k of a correction k u^3 (u - 1)^3 to the quintic interpolant of the latest step.
+    """Return the coefficient k of the correction k u^3 (u - 1)^3 to the latest step's quintic interpolant.
 
     The correction matches the acceleration at the middle of the step, u = 1/2, to the force there.
     """
@@ -368,7 +368,7 @@ def close_member(pool: Any, i: int, which: int, slot: Any, dots: Any, hammer: Ha
 def locate(
     pool: Any, i: int, which: int, hammer: Hammer, live: Drive, control: Control
 ) -> tuple[int, float, float, float]:
-    """Locate the event in a lane's latest step with the scalar kernel; return code, time, position, velocity.
+    """Locate the event in a lane's latest step by the scalar kernel; return its code, time and state.
 
     In the contact pool, w replaces the position. The code is NO_SWITCH if the step contains no event,
     UNRESOLVED if the step must be halved.

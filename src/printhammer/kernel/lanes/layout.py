@@ -1,4 +1,4 @@
-"""Layout of a pool of lanes: a flat array of blocks; a block has one row per quantity, of `BLOCK` lanes.
+"""Layout of a pool of lanes: a flat array of blocks, each with one row of `BLOCK` lanes per quantity.
 
 A lane holds one member of an ensemble, and all members in a pool are in the same mode. A loop over the lanes
 of a block accesses contiguous memory, and the rows of a block are contiguous as well.

@@ -1,4 +1,4 @@
-"""Scalar loop over the members of an ensemble: runs one after the other, storing only requested results.
+"""Scalar loop over the members of an ensemble, which stores only the requested results.
 
 A run is integrated in segments that fit the working space. After each segment, dots, strobes and samples are
 extracted from its record.
@@ -64,8 +64,8 @@ def members(
     Returns
     -------
     int
-        Number of members of `which` that are done; less than the length of `which` if the working space is
-        too small for the next member.
+        Number of members of `which` that are finished; less than the length of `which` if the working space
+        is too small for the next member.
     """
     grid, states, bounds = kept.grid, batch.states, batch.bounds
     for number in range(which.size):

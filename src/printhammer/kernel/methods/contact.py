@@ -41,7 +41,7 @@ def contact_rate(w: float, v: float, t: float, hammer: Hammer, drive: Drive) -> 
 
 @compiled
 def length_while_pushed_in(left: float, w: float, v: float, kv: float) -> float:
-    """Return the increment of the regularised variable s over the time `left` [s], for inward acceleration.
+    """Return the increment of the regularised variable s over the time `left` [s] for inward acceleration.
 
     Solves 2 w ds - v ds^2 - kv ds^3 / 3 = left for ds by Newton's method; the left side increases with ds.
     """
@@ -208,7 +208,7 @@ def contact_switch(
     drive: Drive,
     control: Control,
 ) -> tuple[int, ContactState]:
-    """Return the first event in a backstop step of length `h` in the regularised variable s, and its state.
+    """Return the first event in a backstop step of length `h` (in the regularised variable), and its state.
 
     `leaves` states whether w falls to zero within the step, so that the armature leaves the backstop.
     """

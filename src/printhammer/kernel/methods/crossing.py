@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.pulses import Drive
 
 STILL = 1e-12
-"""Largest velocity change in one characteristic time at rest, as a fraction of the velocity scale."""
+"""Largest velocity change of an armature at rest in one characteristic time, relative to the velocity
+scale."""
 
 BEGUN = 1e-9
 """Largest event-function value treated as zero at the start of a step, as on a new current path."""
@@ -43,7 +44,7 @@ PATH_GAP, REST_GAP = 0, 1
 
 @compiled
 def closes(g0: float, d0: float, g1: float, d1: float) -> int:
-    """Decide whether an event function has a zero in a step, from values g and scaled slopes d at its ends.
+    """Decide from values g and scaled slopes d at both ends whether an event function has a zero in a step.
 
     The slopes are derivatives with respect to the fraction of the step.
 

@@ -1,4 +1,4 @@
-"""Error-controlled step off the backstop that ends exactly at the first switching event inside it, if any.
+"""Error-controlled step off the backstop that ends exactly at the first switching event, if any.
 
 After a step is accepted, its quintic Hermite interpolant shows whether it contains an event (see
 :mod:`printhammer.kernel.methods.hermite`). If so, the step is repeated from its start with the length that
@@ -229,8 +229,8 @@ def is_cut(v0: float, v1: float, hammer: Hammer) -> bool:
 def land_on_push(start: State, h: float, upper: float, cut: bool, law: ForceLaw, control: Control) -> State:
     """Return the state in which a contact starts or ceases to push in a step `h`, up to fraction `upper`.
 
-    With `cut`, the contact is one of the spring law, otherwise the pack or the backstop. The method is
-    bisection.
+    The state is located by bisection. With `cut`, the contact belongs to the spring law, otherwise to the
+    pack or the backstop.
     """
     t, x, v, a = start
     low, high = 0.0, upper

@@ -64,13 +64,14 @@ POINTS = (
     0.525532409916329,
     0.1834346424956498,
 )
+"""Positive points of the eight-point Gauss-Legendre quadrature."""
 WEIGHTS = (
     0.10122853629037626,
     0.22238103445337448,
     0.31370664587788727,
     0.362683783378362,
 )
-"""Positive points and their weights of the eight-point Gauss-Legendre quadrature."""
+"""Weights of the `POINTS` of the eight-point Gauss-Legendre quadrature."""
 
 
 @compiled

@@ -1,4 +1,4 @@
-"""Coil circuit: the flux linkage as a state variable, with a voltage source or the current paths of a driver.
+"""Coil circuit with the flux linkage as a state variable, fed by a voltage source or a driver.
 
 With the flux linkage lambda_m(x, i) of the magnet and the constant inductance L of the coil, the circuit
 obeys
@@ -73,8 +73,9 @@ SOURCE, CHOPPED, BLOCKED, BACKWARD = 0.0, 1.0, 2.0, 3.0
 current), and decay of a negative current."""
 
 PATH = 1
+"""Index in `live`, counted from its end, of the path of the coil current."""
 UNTIL = 2
-"""Indices in `live`, counted from its end: path of the coil current, and end of the chopper's off-time."""
+"""Index in `live`, counted from its end, of the end of the chopper's off-time."""
 
 STILL_SHARE = 1e-12
 """Largest change of the electric state in one characteristic time that is treated as zero, relative to the

@@ -1,4 +1,4 @@
-"""Assignment of pack contacts to firings: which contact makes a dot, and the columns of a row of dot data.
+"""Assignment of pack contacts to firings and dots, and the columns of a row of dot data.
 
 A pack contact belongs to the latest firing at or before its touch. The first contact of a firing makes its
 dot, later contacts are extra contacts. A contact that is open at the start of a run belongs to no firing.

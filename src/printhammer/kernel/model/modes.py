@@ -84,7 +84,7 @@ STEP_UNDERFLOW = 4
 PAUSED = 5
 """Run status: paused after the requested number of nodes; the next call continues the run."""
 LOST = 6
-"""Run status: the worker process of the run did not return."""
+"""Run status: the worker process of the run ended without a result."""
 
 STATUS_NAMES = ("ok", "range left", "runaway", "step limit", "step underflow", "paused", "worker lost")
 """Public names of the run statuses, indexed by status code."""

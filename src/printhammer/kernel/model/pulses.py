@@ -30,7 +30,7 @@ LIVE_WIDTH = 7
 
 @inlined
 def piece_value(row: Any, i: int, s: float) -> float:
-    """Evaluate the waveform piece [kind, p0, p1, p2, p3] at index `i` of a row, `s` seconds after its start.
+    """Evaluate the waveform piece [kind, p0, p1, p2, p3] at index `i` of a row at `s` [s] after its start.
 
     The kinds are a cubic p0 + s (p1 + s (p2 + s p3)), an exponential p0 + p1 exp(-p2 s) and a sine
     p0 + p1 sin(p2 s + p3).
@@ -96,7 +96,7 @@ def pass_edges(
     first: int,
     last: int,
 ) -> tuple[int, int, float]:
-    """Start and end all waveform pieces whose edges lie at or before time `t` [s], and rewrite `train.live`.
+    """Start and end all waveform pieces with edges up to time `t` [s], and rewrite `train.live`.
 
     Pulses before index `first` have ended; pulses from `last` on have not been fired. For a pulse p in
     between, ``under_way[p]`` is the row of its active piece, or the `END` row if it ended before an older

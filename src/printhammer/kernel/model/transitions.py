@@ -11,10 +11,12 @@ from printhammer.kernel.model import modes as M
 NO_JUMP = 0
 """Kind of jump: none, because the contact force is zero where a contact starts or ceases to push."""
 AT_FRONT = 1
+"""Kind of jump: the displacement crosses the pack front, where the force law changes."""
 AT_POSITION = 2
+"""Kind of jump: the displacement crosses the backstop position, where the force law changes."""
 AT_PEAK = 3
-"""Kind of jump: the displacement crosses the level at which the force law changes, i.e. the pack front
-(AT_FRONT), the backstop position (AT_POSITION) or the latest local maximum in the pack (AT_PEAK)."""
+"""Kind of jump: the displacement crosses the latest local maximum in the pack, where the force law
+changes."""
 TURN = 4
 """Kind of jump: the velocity changes sign inside the pack, where a law with memory changes its branch."""
 

@@ -72,7 +72,7 @@ def write_codes(x: Any, low: float, high: float, codes: Any) -> None:
 
 
 def write_struck(dots: Any, starts: Any, firings: int, struck: Any) -> None:
-    """Write to `struck` 1 for each firing that made a dot, else 0; a member of the map has `firings` firings.
+    """Write 1 to `struck` for each firing that made a dot, else 0; a member has `firings` firings.
 
     `dots` and `starts` are `Kept.dots` and `Kept.dot_starts` of :mod:`printhammer.kernel.lanes.batch`.
     """

@@ -62,6 +62,7 @@ _POINTS = (
     0.8650633666889845,
     0.9739065285171717,
 )
+"""Positive points of the ten-point Gauss-Legendre quadrature."""
 _WEIGHTS = (
     0.2955242247147528,
     0.2692667193099965,
@@ -69,7 +70,7 @@ _WEIGHTS = (
     0.1494513491505804,
     0.06667134430868814,
 )
-"""Positive points and their weights of the ten-point Gauss-Legendre quadrature."""
+"""Weights of the `_POINTS` of the ten-point Gauss-Legendre quadrature."""
 _PIECES = 8
 """Number of subintervals of the quadrature over the current."""
 

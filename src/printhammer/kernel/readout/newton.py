@@ -1,4 +1,4 @@
-"""Damped Newton's method for one periodic orbit of a strobe map, and whether a motion has settled to it.
+"""Damped Newton's method for a periodic orbit of a strobe map, and a test for motions settled to the orbit.
 
 The unknowns are the states at successive firings, as in `printhammer.chaos.orbits.newton`: the image of each
 state has to be the next state, and the image of the last state the first state. The caller computes images at
@@ -49,7 +49,7 @@ derivative of the map by rows, four columns; all in half-widths of the window.""
 
 
 def write_guess(states: Any, scales: Any, period: int, count: int, orbit: Any, trial: Any) -> int:
-    """Write the initial guess of an orbit of `count` firings; return 0 if the states are not near an orbit.
+    """Write an initial guess of an orbit of `count` firings; return 0 if the states are not near one orbit.
 
     If the states alternate about the orbit, their mean is closer to the orbit than any single state.
 
@@ -91,7 +91,7 @@ def write_image(
     current : float
         Coil current at the end as a fraction of a typical current.
     columns : float64 array, shape (any, 2)
-        Changes at the end by changes of displacement and velocity at the start.
+        Derivatives of the state at the end with respect to displacement and velocity at the start.
     smooth : float
         1 if the motion is differentiable.
     hammer : float64 array
@@ -189,10 +189,10 @@ def accept(images: Any, scales: Any, orbit: Any, search: Any) -> None:
 
 
 def is_aimed(images: Any, scales: Any, orbit: Any) -> bool:
-    """Write the Newton step of each state, clipped to `LONGEST_STEP`; return False if the system is singular.
+    """Write the clipped Newton step of each state; return False if the linear system is singular.
 
-    The step of state i + 1 is J_i d_i + e_i with the defect e_i; around the orbit, d_0 = M d_0 + c. Arrays
-    as for `improve`.
+    The step of state i + 1 is J_i d_i + e_i with the defect e_i; around the orbit, d_0 = M d_0 + c. Steps are
+    clipped to `LONGEST_STEP`. Arrays as for `improve`.
     """
     m = images.shape[0]
     a, b, c, d = 1.0, 0.0, 0.0, 1.0

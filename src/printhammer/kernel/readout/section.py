@@ -53,7 +53,7 @@ def class_of(agreed: int, settled: int, value: float, error: float, smooth: bool
     smooth : bool
         Whether the motion has a derivative.
     rests : int
-        Number of firings after which the armature came to rest on the backstop.
+        Number of firings that were followed by a rest of the armature on the backstop.
 
     Returns
     -------
@@ -133,7 +133,7 @@ def write_distances(states: Any, branches: Any, scales: Any, distances: Any) -> 
     Returns
     -------
     tuple
-        Smallest q at which all states agree, 0 without such a q; and that q or else the q of least distance.
+        Smallest q at which all states agree, or 0; and that q or, without such a q, the q of least distance.
     """
     n, parts = states.shape
     period, nearest, least = 0, 0, math.inf

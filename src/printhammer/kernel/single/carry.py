@@ -30,10 +30,11 @@ MEMORY_NOW = 10
 STEP = 11
 """Index of the next step size: in seconds, or in the regularised variable s in the backstop."""
 FREE_STEP = 12
+"""Index of the first step size in free flight [s]."""
 PACK_STEP = 13
+"""Index of the first step size in the pack [s]."""
 CONTACT_STEP = 14
-"""Indices of the first step sizes in free flight [s], in the pack [s] and in the backstop, where the size
-is in multiples of `contact_unit`."""
+"""Index of the first step size in the backstop, in multiples of `contact_unit`."""
 STARTED = 15
 """Index of the mode of the latest step."""
 ENTERED = 16
@@ -43,19 +44,22 @@ WAIT = 17
 STUCK = 18
 """Index of the number of consecutive steps that did not advance the time."""
 TIME_BEFORE = 19
+"""Index of the time at the start of the latest step [s]."""
 FIRST = 20
+"""Index of the element that holds the index of the first active firing."""
 LAST = 21
+"""Index of the element that holds the index of the next firing."""
 EDGE = 22
-"""Indices of the first active firing, the firing after the last fired one, and the time of the next edge
-[s]."""
+"""Index of the time of the next edge of the drive [s]."""
 STEPS = 23
 ELECTRIC = 24
 PATH = 27
 UNTIL = 28
 WITH_CURRENT = 29
 USED = 30
+"""Index of the number of nodes that the present call has recorded."""
 TOUCHED = 31
-"""Indices of the numbers of nodes and contacts that the present call has recorded."""
+"""Index of the number of contacts that the present call has recorded."""
 SIZE = 32
 """Length of the state array of a run."""
 
@@ -63,9 +67,11 @@ SHORTEST_WAIT = 0.005
 """Shortest interval between checks of an armature at rest, in characteristic times; arbitrary."""
 
 FRESH = 0.0
+"""Value of `STATE`: new run."""
 GOES_ON = 1.0
+"""Value of `STATE`: run that continues after a pause."""
 ON_BRANCH = 2.0
-"""Values of `STATE`: new run, run that continues after a pause, new run on a branch inside the pack."""
+"""Value of `STATE`: new run on a branch inside the pack."""
 
 
 class Setup(NamedTuple):

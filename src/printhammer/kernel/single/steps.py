@@ -158,7 +158,7 @@ def reverse(state: State, setup: Setup) -> None:
 def set_off(state: State, setup: Setup, nodes: Any) -> bool:
     """Determine the direction in which an armature at rest begins to slide, against dry friction.
 
-    Returns whether the armature stays at rest after all, on the unloading branch that begins at its place.
+    Returns whether the armature stays at rest after all, on the unloading branch that begins at its position.
     """
     mode, a = int(state[C.MODE]), state[C.ACCELERATION]
     kept = 1.0 if a > 0.0 else -1.0
@@ -221,7 +221,7 @@ def wait(state: State, setup: Setup, t_next: float, still: float, nodes: Any) ->
 
 @inlined
 def step_at_rest(state: State, setup: Setup, t_next: float, nodes: Any) -> int:
-    """Integrate the coil circuit for one step, armature at rest; return the event that ends the step."""
+    """Integrate the circuit over one step with the armature at rest; return the event that ends the step."""
     mode, x = int(state[C.MODE]), state[C.POSITION_NOW]
     held = mode
     if not is_on_stop(mode):

@@ -142,7 +142,7 @@ def note_states(
     train: Train,
     hammer: Hammer,
 ) -> tuple[int, int]:
-    """Compute strobes and samples, beginning at the indices `strobe` and `sample`, to the end of a segment.
+    """Compute the strobes and samples of a segment, from the indices `strobe` and `sample` on.
 
     A time at the end of a segment belongs to the next segment, unless this segment is `final`. Returns the
     indices of the first strobe and the first sample that remain.

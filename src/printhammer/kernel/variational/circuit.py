@@ -1,4 +1,4 @@
-"""Coil circuit in the variational equations: derivatives of coil current, state rates and path changes.
+"""Coil circuit in the variational equations: derivatives of current, state rates and path changes.
 
 At a fixed flux linkage the current depends on the displacement by di/dx = -emf / L and di/d lambda = 1 / L,
 with L the differential inductance; the force depends on both through the current. While no current flows in a
@@ -191,7 +191,7 @@ def linkage_change(x: float, k: int, forcing: Forcing) -> float:
 
 @called
 def add_circuit(rates: Any, y: Any, count: int, x: float, moves: bool, setting: Setting) -> None:
-    """Write the rates of the electric state and of its tangent rows at `y`; add the effect on the velocities.
+    """Write the rates of the electric state and of its tangent rows; add the effect on the velocity rows.
 
     `moves` is false while the armature is held at rest.
     """

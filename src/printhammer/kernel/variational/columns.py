@@ -55,7 +55,7 @@ LONGEST_PHASE = 0.75
 def force_slopes(
     y: Any, mode: int, memory: float, peak: float, peaks: Any, setting: Setting
 ) -> tuple[float, float, float, float, float, float]:
-    """Return the derivatives of the forces with respect to displacement (or w), velocity and local maximum.
+    """Return the force derivatives with respect to displacement (or w), velocity and local maximum.
 
     `peaks` holds the memory values for local maxima around `peak`, computed by `note_memories`.
 
@@ -148,9 +148,9 @@ def longest_step(mode: int, memory: float, peak: float, work: Any, setting: Sett
 def column_step(
     length: float, columns: Any, work: Any, mode: int, memory: float, peak: float, setting: Setting
 ) -> None:
-    """Integrate state and tangent columns over one step of `length`, in t [s] or s, from row START of `work`.
+    """Integrate state and tangent columns over one step of `length` from row START of `work`.
 
-    `s` is the regularised time of the backstop.
+    The length is a time [s] or, in the backstop, an increment of the regularised time s.
     """
     count = V.FIRST_COLUMN + CHANGING * columns.shape[1]
     if HAS_CIRCUIT:

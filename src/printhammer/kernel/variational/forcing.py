@@ -1,4 +1,4 @@
-"""Forcing of the variational equations: derivatives of forces with respect to constants, at a fixed state.
+"""Forcing of the variational equations: force derivatives with respect to constants, at a fixed state.
 
 The derivative a_c of the acceleration with respect to a constant is added to the rate of dv, and the
 derivative of each power to the rate of its energy. In the backstop, the force is a function of w = sqrt(b -
@@ -135,7 +135,7 @@ def force_with_value(x: float, value: float, hammer: Hammer, drive: Drive, forci
 
 @compiled
 def smooth_side(x: float, k: int, setting: Setting) -> int:
-    """Select the difference formula whose shifts of constant `k` move no kink of the spring law past `x` [m].
+    """Select the difference formula for constant `k` that moves no kink of the spring law past `x` [m].
 
     If a positive shift moves a kink past `x`, the formula is BACKWARD; if a negative shift does, FORWARD.
     """
@@ -277,7 +277,7 @@ def contact_changes(w: float, v: float, k: int, forcing: Forcing) -> tuple[float
 def rebound_change(front: bool, v_in: float, k: int, forcing: Forcing) -> float:
     """Return the derivative of the velocity after an impact with respect to constant k.
 
-    `front` states the rigid surface: the front or else the backstop.
+    The rigid surface is the pack front if `front` is true, otherwise the backstop.
     """
     varied, of_hammer = forcing.varied, forcing.of_hammer
     change = 0.0

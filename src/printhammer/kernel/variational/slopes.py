@@ -54,7 +54,7 @@ NEAR_END = 1e-3
 """Limit of the step size, as a fraction of the distance to an end of the range, where the law may be
 singular."""
 NEAR_KINK = 1e-2
-"""Limit of the step size, as a fraction of the distance to a kink of the spring law; chosen by hand."""
+"""Limit of the step size, as a fraction of the distance to a kink of the spring law; arbitrary."""
 DEPTH_SPACING = 3e-4
 """Step size in the pack, as a fraction of the depth, since the law may contain high powers of the depth."""
 LEAST_DEPTH_SPACING = 1e-7

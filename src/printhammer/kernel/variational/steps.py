@@ -173,7 +173,7 @@ def rest(t: float, t_to: float, node: Any, columns: Any, setting: Setting) -> fl
     """
     grown = 0.0
     if FRICTION and is_held(int(node[3])):
-        # Dry friction holds the neighbouring motion at its own place.
+        # Dry friction holds the neighbouring motion at its own position.
         for k in range(columns.shape[1]):
             columns[1, k] = 0.0
         return grown

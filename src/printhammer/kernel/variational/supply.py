@@ -1,4 +1,4 @@
-"""Derivatives of the coil circuit with respect to constants: forcing of the electric rows, and moving edges.
+"""Derivatives of the coil circuit with respect to constants: forcing of electric rows, moving edges.
 
 At a fixed state and time, the rates of the electric state depend on the resistances, the voltages and the
 current for a flux linkage. If an edge moves to a later time, the rates before the edge apply for longer.

@@ -30,7 +30,7 @@ def hertz_stiffness(
 
 
 def damping_from_restitution(k: float, restitution: float, speed: float) -> float:
-    """Return the damping l of equation (7), N s/m^2.5, for the coefficient of restitution of a free rebound.
+    """Return the damping l of equation (7), N s/m^2.5, for the restitution coefficient of a free rebound.
 
     With z = (l/k) v_in and y = (l/k) v_out a free contact obeys z - ln(1 + z) = -(y + ln(1 - y)), at any mass
     and stiffness: divide m v dv = -(k - l v) delta^1.5 d(x) by (k - l v) and integrate both ways. Solved for

@@ -29,7 +29,7 @@ class Grid:
     current: tuple[float, ...]
     """Currents, ascending, with 0 A inside their range, A."""
     values: tuple[tuple[float, ...], ...]
-    """`values[i][j]` at `x[i]` and `current[j]`."""
+    """Values of the quantity, SI: `values[i][j]` at `x[i]` and `current[j]`."""
 
 
 def gather(rows: Iterable[tuple[float, float, float]], what: str, quantity: str) -> Grid:

@@ -79,7 +79,7 @@ class FurtherSpring(Term):
 
 
 class CubicForce(Term):
-    """Linear and cubic spring about a relaxed position."""
+    """Spring with a linear and a cubic term about a relaxed position."""
 
     law: ClassVar[str] = "cubic"
 
@@ -143,7 +143,7 @@ class SampledForce(Term):
 
 
 def _samples_of(path: Path) -> tuple[tuple[float, float], ...]:
-    """Read the displacements, m, and forces, N, of a sampled force from a table; sort them by displacement.
+    """Read the samples of a force from a table: displacements, m, ascending, and forces, N.
 
     Raises InputError if the table cannot be read, or has fewer than two samples, more than `MOST_SAMPLES`, or
     two samples at the same displacement.

@@ -321,7 +321,7 @@ class _Search:
         return self.best is not None and self.best.clear and self.best.count >= self.fewest
 
     def _scan(self, grid: np.ndarray, trial: Callable[[Sequence[float]], list[BuzzTrain]]) -> None:
-        """Simulate a grid of trains; unless the best is good enough, add finer grids around the best."""
+        """Simulate a grid of trains; add finer grids around the best trains unless the search is done."""
         trains = {train.interval: train for train in trial(grid.tolist())}
         step, known = float(grid[1] - grid[0]), set(grid.tolist())
         for _ in range(_ZOOMS):

@@ -32,7 +32,7 @@ _WINDOWS: Final = 2.0  # Shortest duration of the simulation, in windows (`print
 _SPACING: Final = 1e-6  # Spacing of the samples, s; arbitrary
 _BISECTIONS: Final = 40  # Bisections of the settling time, down to rounding error
 _SAMPLES: Final = 4001  # Number of samples of a motion from which the time of exact rest is found; arbitrary
-_MARGIN: Final = 0.99  # Reduction of the undisturbed rate, since integration errors shift the rest; arbitrary
+_MARGIN: Final = 0.99  # Safety factor on the rate, since integration errors shift the time of rest; arbitrary
 
 
 class Wear(Declared):

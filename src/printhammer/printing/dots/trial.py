@@ -1,4 +1,4 @@
-"""Trial printing: simulate patterns under a strategy as one ensemble, and compare the dots with limits."""
+"""Trial printing: simulate patterns under a strategy, and compare the dots with limits."""
 
 from __future__ import annotations
 

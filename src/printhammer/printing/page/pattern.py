@@ -41,8 +41,9 @@ from printhammer.support.files import read_text, write_file
 FORMAT: Final = 1  # Version of the pattern file format
 
 BITMAPS: Final = {".png": "PNG", ".pbm": "PPM", ".bmp": "BMP"}
+"""File suffixes of bitmaps."""
 SUFFIXES: Final = (".toml", *BITMAPS)
-"""File suffixes of bitmaps (`BITMAPS`), and of all pattern files (`SUFFIXES`)."""
+"""File suffixes of all pattern files, bitmaps included."""
 
 _KEYS: Final = ("format", "name", "wires", "rows")
 _DOT, _EMPTY = "#", "."
@@ -181,8 +182,9 @@ def write_pattern(path: str | Path, name: str, dots: BoolArray) -> None:
 
 
 MOST_WIRES: Final = 1000
+"""Largest number of wires of a head; arbitrary."""
 MOST_CELLS: Final = 50_000_000
-"""Limits on the number of wires of a head, and on the number of cells of a pattern; arbitrary."""
+"""Largest number of cells of a pattern; arbitrary."""
 
 _TITLE: Final = 60  # Largest length of a title in a picture; arbitrary
 

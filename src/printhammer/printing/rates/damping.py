@@ -128,8 +128,9 @@ CURRENT: Final = 2.0  # Default current limit, A: the range of the paper's Fig. 
 STEP: Final = 25.0  # Default step of the rate grid, Hz; arbitrary
 
 LEAST: Final = 0.6
+"""Smallest amplitude factor in the search for the nominal print force; arbitrary."""
 MOST: Final = 1.6
-"""Range of the amplitude factors searched for the nominal print force; arbitrary."""
+"""Largest amplitude factor in the search for the nominal print force; arbitrary."""
 
 _COARSE: Final = 41  # Number of amplitude factors of the first grid; arbitrary
 _FINE: Final = 9  # Number of amplitude factors of each refinement; arbitrary

@@ -36,10 +36,12 @@ MOST: Final = 100_000  # Largest number of hammers in a yield; arbitrary
 
 Judged = Literal["own", "design"]
 GAP: Final = "pack.front"
-"""Position whose spread is relative to its distance from the backstop, as the origin of x is arbitrary."""
+"""Key of the position whose spread is relative to its distance from the backstop, since x = 0 is
+arbitrary."""
 
 FIXED: Final = ("backstop.position", "platen")
-"""Constants without a default spread, since no force depends on them: the origin of x, and the platen."""
+"""Keys of the constants without a default spread, since no force depends on the origin of x and the
+platen."""
 
 
 _SHARES: Final = (0.95, 0.5)
@@ -295,7 +297,7 @@ def spreads_of(hammer: Hammer, asked: float | Mapping[str, float]) -> dict[str, 
 
 
 def draw(spreads: Mapping[str, float], number: int, seed: int) -> FloatArray:
-    """Draw factors that multiply the constants, shape (number, constants), uniform within relative spreads.
+    """Draw factors on the constants, uniform within relative spreads, shape (number, constants).
 
     The points are a scrambled Sobol sequence (A. B. Owen, J. Complexity 14 (1998) 466).
     """

@@ -83,7 +83,7 @@ the number of integers returned, and whether they use names of the kernel or pac
 
 Numbers = dict[str, tuple[tuple[str | None, ...], tuple[float, ...]]]
 """Constants of a hammer as named arrays: for each array, the dotted keys of the constants that set its
-elements (None where no constant does), and the elements, SI (NaN where missing)."""
+elements (None for an element that no constant sets), and the elements, SI (NaN where missing)."""
 
 
 def numbers_of(hammer: Hammer) -> Numbers:

@@ -1,4 +1,4 @@
-"""Scales of a run, coil circuit, and window (from the last firing to the end of a run), as plain functions.
+"""Scales, coil circuit and window (last firing to end) of a run, as plain functions.
 
 `printhammer.run.problem`, `printhammer.run.supply` and `printhammer.run.window` call these functions, and so
 do the entry points of a page in `printhammer.run.plain.page`.
@@ -86,8 +86,9 @@ class Coil(NamedTuple):
     """Functions and constants of a voltage-driven coil."""
 
     magnet_linkage: Any
+    """Law function of the flux linkage, Wb."""
     magnet_inductance: Any
-    """Law functions of the magnet."""
+    """Law function of the differential inductance, H."""
     magnet: Any
     """Packed constants of the magnet."""
     coupled: bool
@@ -160,7 +161,7 @@ def falling_place(low: float, high: float, current: float, coil: Coil) -> tuple[
 
 
 def largest_force(x: float, current: float, push: float, s: Statics) -> float:
-    """Return the larger absolute static force, without or with a current, plus the drive force `push`, N."""
+    """Return the larger of the absolute static forces without and with a current, plus `push`, N."""
     largest = 0.0
     for i in (0.0, current):
         size = abs(free_force(x, i, s))

@@ -30,7 +30,7 @@ _NOT_SEEN: Final = "None if the contact does not switch in the run"
 
 
 class Timing(Declared):
-    """Switching times and forces of a contact in one firing; the next firing, or the run, ends the firing."""
+    """Switching times and forces of a contact from one firing to the next, or to the end of the run."""
 
     contact: str = part("name of the contact")
     kind: Literal["make", "break"] = part("kind of the contact")
