@@ -203,6 +203,12 @@ def test_a_unit_in_capital_letters_is_asked_for(ask: Any) -> None:
     assert found["data"]["current"] == pytest.approx([0.0, 0.8])
 
 
+def test_an_empty_cell_between_tabs_shifts_no_cell(ask: Any) -> None:
+    rows = "time [us]\tcurrent [A]\tdisplacement [um]\n0\t0\t50\n10\t1\t51\n"
+    assert ask("table", rows, None)["found"]["data"]["current"] == [0.0, 1.0]
+    assert "line 4" in ask("table", f"{rows}20\t\t52\t\n", None)["refused"]
+
+
 def test_times_come_from_a_column_or_from_the_file(ask: Any) -> None:
     text = "CH1 [V]\n0\n1\n2\n"
     told = [["displacement", "20 um/V"]]

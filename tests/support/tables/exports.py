@@ -116,6 +116,19 @@ SIGROK: Final = (
     "; Samplerate: 1 MHz\nCH1,CH2\n"
 )
 RIGOL: Final = "X,CH1,CH2,Start,Increment\nSequence,Volt,Volt,-4.000000e-06,1.000000e-06\n"
+YOKOGAWA: Final = (
+    '"Header Size",16\n"Model Name","DLM2024"\n"Comment",""\n"BlockNumber",1\n"TraceName","CH1","CH2"\n'
+    '"BlockSize",30,30\n"VUnit","V","V"\n"SampleRate",1000000,1000000\n"HResolution",1.0E-06,1.0E-06\n'
+    '"HOffset",-4.0E-06,-4.0E-06\n"HUnit","s","s"\n"Date","2022/05/10","2022/05/10"\n'
+    '"Time","10:20:30.00","10:20:30.00"\n\n'
+)
+LABVIEW: Final = (
+    "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t2\nSeparator\tTab\nDecimal_Separator\t,\n"
+    "X_Columns\tNo\nTime_Pref\tAbsolute\nDate\t2022/05/10\nTime\t10:20:30,123\n***End_of_Header***\t\n\t\n"
+    "Channels\t2\t\t\nSamples\t30\t30\t\nDate\t2022/05/10\t2022/05/10\t\nTime\t10:20:30,1\t10:20:30,1\t\n"
+    "Y_Unit_Label\tVolts\tVolts\t\nX_Dimension\tTime\tTime\t\nX0\t-4,0E-6\t-4,0E-6\t\n"
+    "Delta_X\t1,0E-6\t1,0E-6\t\n***End_of_Header***\t\t\t\nX_Value\tVoltage\tVoltage (0)\tComment\n"
+)
 OURS: Final = "time [us],current [A],displacement [um]\n"
 _PLAIN: Final = (US, CURRENT, PLACES * 1e6)
 
@@ -156,6 +169,21 @@ EXPORTS: Final[dict[str, Callable[[], Export]]] = {
         (",time [us],current [A],displacement [um]\n" + table(NUMBERS, *_PLAIN, form="{:.6g}")).encode()
     ),
     "bars": lambda: Export(ours(OURS.replace(",", " | "), between=" | ").encode()),
+    "separator in the first line": lambda: Export(
+        ("\ufeffsep=;\r\n" + ours(OURS.replace(",", ";"), between=";", decimal=",", end="\r\n")).encode()
+    ),
+    "Rigol DS1000E": lambda: scope("X,CH1,CH2,\nSecond,Volt,Volt,\n", end=",\n"),
+    "Yokogawa": lambda: Export((YOKOGAWA + table(SHUNT, SENSOR, end=",\n")).encode(), said("", 1)),
+    "Yokogawa, empty column": lambda: Export(
+        (YOKOGAWA + "".join(f",{line}\n" for line in table(SHUNT, SENSOR).splitlines())).encode(), said("")
+    ),
+    "LabVIEW": lambda: Export(
+        (
+            LABVIEW
+            + "".join(f"\t{line}\n" for line in table(SHUNT, SENSOR, between="\t", decimal=",").splitlines())
+        ).encode(),
+        said(""),
+    ),
     "Rigol DS1000Z": lambda: scope(RIGOL, said(""), first=NUMBERS, form="{:.6g}", end=",,\n"),
     "Rigol MSO5000": lambda: scope("Time(s),CH1(V),CH2(V),t0 = -4e-06, tInc = 1e-06,\n", end=",,\n"),
     "Rigol DHO": lambda: Export(

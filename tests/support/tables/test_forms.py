@@ -119,6 +119,50 @@ def test_lines_are_those_of_the_file(tmp_path: Path) -> None:
         read(tmp_path, text)
 
 
+@pytest.mark.parametrize(
+    ("row", "key"), [("#N/A,2", "time"), ("#NUM!,2", "time"), ("####,2", "time"), ("2,#VALUE!", "current")]
+)
+def test_an_error_value_of_a_spreadsheet_is_no_comment(tmp_path: Path, row: str, key: str) -> None:
+    with refused(key, file="trace.csv: line 3"):
+        read(tmp_path, f"time [us],current [A]\n0,1\n{row}\n4,3\n")
+    shows(read(tmp_path, "time [us],current [A]\n#### noon\n0,1\n# N/A: 2,2\n"), [0.0], current=[1.0])
+
+
+def test_the_time_of_day_is_no_heading(tmp_path: Path) -> None:
+    text = "Date,10.05.2022\nTime,10:20:30\n0,0\n1,0.5\n"
+    shows(read(tmp_path, text, "time=1*1 us, current=2*1 A"), [0.0, 1e-6], current=[0.0, 0.5])
+    with refused("") as caught:
+        read(tmp_path, text)
+    assert str(caught.value).endswith("--columns 'time=1*1 s, current=2*1 A'")
+
+
+@pytest.mark.parametrize("step", ["2,5E-6", "2.5e-6", "2,5 us", "2.5 us"])
+def test_start_and_step_with_a_decimal_comma(tmp_path: Path, step: str) -> None:
+    text = f"t0;-1,5E-6\ndt;{step}\nI [A];U [V]\n0;0,5\n1;0,25\n"
+    shows(read(tmp_path, text), [-1.5e-6, 1e-6], current=[0.0, 1.0], voltage=[0.5, 0.25])
+
+
+@pytest.mark.parametrize(
+    ("fact", "key"),
+    [
+        ("t0;1.000.000", "start"),
+        ("dt;1,000.5", "step"),
+        ("dt;1'000", "step"),
+        ("Sample rate;1.000.000", "sampling rate"),
+        ("Zero index;1,000.5", "index of time zero"),
+        ("Sample rate;0", "time"),
+    ],
+)
+def test_sampling_that_is_unclear_is_refused(tmp_path: Path, fact: str, key: str) -> None:
+    with refused(key, file="trace.csv"):
+        read(tmp_path, f"t0;0\n{fact}\nI [A];U [V]\n0;0\n1;1\n")
+
+
+def test_a_heading_that_begins_with_the_sampling_is_refused(tmp_path: Path) -> None:
+    with refused("line 1", "Start"):
+        read(tmp_path, "Start\tCH1 (V)\tA\n0\t1\t2\n")
+
+
 def test_a_name_with_brackets_is_no_unit(tmp_path: Path) -> None:
     with refused("i(t)"):
         read(tmp_path, "time [us],i(t)\n0,0\n1,1\n")

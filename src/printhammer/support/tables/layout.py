@@ -1,8 +1,8 @@
 """Layout of a table of numbers: separator, heading, units, surrounding metadata, and sample times.
 
 Supported are the exports of oscilloscopes (Rigol, Tektronix, Keysight, PicoScope, LeCroy, Siglent, Rohde &
-Schwarz, GW Instek), of logic analysers (Saleae, sigrok), of LTspice, and of spreadsheets. No number is
-skipped: a row of numbers outside the table is an error that names its line.
+Schwarz, GW Instek, Yokogawa), of logic analysers (Saleae, sigrok), of LabVIEW and LTspice, and of
+spreadsheets. No number is skipped: a row of numbers outside the table is an error that names its line.
 
 The heading of a column contains its name and unit; the name denotes a quantity.
 """
@@ -29,7 +29,7 @@ from printhammer.support.tables.text import (
     split_cells,
     with_points,
 )
-from printhammer.units import parse, to_si
+from printhammer.units import is_unit_of, parse, to_si
 
 ALIASES: Final = {
     "time": ("time", "t", "x-axis", "sec", "second", "seconds", "zeit", "temps"),
@@ -64,6 +64,8 @@ class Heading(NamedTuple):
     def quantity(self) -> str:
         """Quantity that the column name denotes, such as "current"; empty if the name is unknown."""
         name = self.name.lower()
+        if name == "x" and is_unit_of(self.unit, "s"):
+            return "time"  # The horizontal axis of an oscilloscope.
         return next((what for what, names in ALIASES.items() if name in names), "")
 
 
@@ -150,6 +152,7 @@ _ZERO: Final = ("zeroindex", "triggerpoint")
 _TIME_UNIT: Final = ("horizontalunits", "xunits", "hunit", "timeunits", "timeunit")
 _VALUE_UNIT: Final = ("verticalunits", "yunits", "vunit")
 _NUMBERING: Final = ("x", "no", "no.", "nr", "n", "#", "index", "sample", "sequence", "point")
+_STAMP: Final = re.compile(r"\s*\d{1,4}([:/.-])\d{1,2}\1\d{1,4}")  # Time of day or date, never a heading
 _ASSIGNED: Final = re.compile(r"\s*([^=:]+?)\s*[=:]\s*([^=:]+?)\s*")
 
 
@@ -227,7 +230,24 @@ def layout_of(text: str, where: str, words: Collection[str] = ()) -> Table:
         line, units = above[-1]
         # Columns without a unit, at the right of the table.
         above[-1] = line, [*units, *[""] * (min(whole[line], len(above[-2][1])) - len(units))]
-    width = _width(data, above)
+    if (
+        above
+        and data
+        and above[-1][1][-1].strip() == "Comment"
+        and all(len(row) < len(above[-1][1]) for _, row in data)
+    ):
+        above[-1] = above[-1][0], above[-1][1][:-1]  # LabVIEW writes no cell for an empty comment.
+    named = [] if above and any(map(_STAMP.match, above[-1][1])) else above
+    width = _width(data, named)
+    if not width:
+        line, row = above[-1]
+        raise InputError(
+            f"{where}: line {line}: {row[0].strip()[:40]!r} states the sampling",
+            file=where,
+            key=f"line {line}",
+            value=row[0],
+            expected="the names of the columns left of it",
+        )
     for line, row in data:
         if not len(row) <= width <= whole[line]:
             raise InputError(
@@ -237,8 +257,8 @@ def layout_of(text: str, where: str, words: Collection[str] = ()) -> Table:
                 expected=f"{width}",
             )
     if not above and not beside:
-        above = _commented(split.notes, separator, width, data[0][0])
-    heading = _heading_rows(where, above, width)
+        above = named = _commented(split.notes, separator, width, data[0][0])
+    heading = _heading_rows(where, named, width)
     for line, row in above[: len(above) - len(heading)]:
         facts |= _facts_of(row) if line else {}
     extra = [row[width:] for _line, row in heading]
@@ -252,7 +272,7 @@ def layout_of(text: str, where: str, words: Collection[str] = ()) -> Table:
     if any("sigrok" in note for _line, note in split.notes):
         facts.setdefault("start", ["0 s"])
     clock = _clock(where, facts, columns, cells, numbered=any(extra))
-    if clock and clock.numbers is None and lines[-1] - lines[0] >= len(lines):
+    if clock and lines and clock.numbers is None and lines[-1] - lines[0] >= len(lines):
         # Rows may be missing, so times follow from the sample numbers.
         clock = None
     head = heading[0][0] if heading else 0
@@ -405,14 +425,14 @@ def _clock(
     written = _fact(facts, _START, [""])[0]
     # Above the numbers, a start without a unit may be a sample index.
     plain = not numbered and is_number(written) and not any(key in facts for key in _START[:-2])
-    start = None if plain else _seconds(where, "start", written)
-    step = _seconds(where, "step", _fact(facts, _STEP, [""])[0])
+    start = None if plain else _stated(where, "start", written, "s")
+    step = _stated(where, "step", _fact(facts, _STEP, [""])[0], "s")
     rate, zero = (_fact(facts, keys, [""])[0] for keys in (_RATE, _ZERO))
-    if step is None and rate:
-        with located(f"{where}: sampling rate", file=where, key="rate"):
-            step = 1.0 / (float(rate) if is_number(rate) else parse(rate, "Hz"))
-    if start is None and step is not None and is_number(zero):
-        start = -float(zero) * step
+    if step is None and (frequency := _stated(where, "sampling rate", rate, "Hz")):
+        step = 1.0 / frequency
+    index = _stated(where, "index of time zero", zero, "1") if is_number(zero) else None
+    if start is None and step is not None and index is not None:
+        start = -index * step
     if start is None or step is None:
         return None
     if columns[0].name.lower() not in (_NUMBERING if numbered else _NUMBERING[1:]):
@@ -422,9 +442,14 @@ def _clock(
     return Clock(start, step, 0) if counted else None
 
 
-def _seconds(where: str, name: str, text: str) -> float | None:
-    """Parse a time, in seconds or with its unit; None for an empty text."""
+def _stated(where: str, name: str, text: str, si: str) -> float | None:
+    """Parse a number of the metadata, in SI or with its unit; None for an empty text."""
     if not text:
         return None
     with located(f"{where}: {name}", file=where, key=name):
-        return float(text) if is_number(text) else parse(text.replace(",", "."), "s")
+        pointed = text.replace(",", ".")
+        if not is_number(text):
+            return parse(pointed, si)
+        with suppress(ValueError):
+            return float(pointed)
+        raise InputError(repr(text), value=text, expected="a number without thousands separators")

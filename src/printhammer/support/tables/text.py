@@ -1,7 +1,8 @@
 """Text of table files: encodings, line ends, comments, and cells.
 
 Blank lines are skipped. Lines that begin with #, or with ; (sigrok) or % (Matlab), are comments; a comment
-such as ``# sampling rate: 1 MHz`` is stored as key and text.
+such as ``# sampling rate: 1 MHz`` is stored as key and text. A row whose first cell is an error value of a
+spreadsheet, such as #N/A, is no comment.
 
 Cells are classified as numbers, gaps or out-of-range readings; decimal marks and thousands separators are
 converted.
@@ -21,7 +22,8 @@ from typing import Final
 
 from printhammer.errors import InputError
 
-_COMMENT: Final = re.compile(r"\s*(#|//|[%;]\s*[^\W\d_][^;]*$)")
+_FAULT: Final = r"#(?:#+|N/A|NUM!|VALUE!|DIV/0!|REF!|NAME\?|NULL!|WERT!|ZAHL!|NV)\s*[,;|\t]"
+_COMMENT: Final = re.compile(rf"\s*((?!{_FAULT})#|//|[%;]\s*[^\W\d_][^;]*$)")
 
 
 @dataclass(frozen=True)

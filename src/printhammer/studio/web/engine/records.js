@@ -12,7 +12,7 @@ const BEFORE = 0.1; // of the peak, that a drive may have before time 0
 
 /** The quantity of each column by its name, or by a unit that occurs once. */
 function quantitiesOf({ headings, clock }) {
-  const found = headings.map(({ name }, k) => (k === clock?.numbers ? "" : quantityOfName(name)));
+  const found = headings.map(({ name, unit }, k) => (k === clock?.numbers ? "" : quantityOfName(name, unit)));
   for (const [what, si] of Object.entries(BY_UNIT)) {
     const same = headings.flatMap(({ unit }, k) => (!found[k] && unit && factorOf(unit, si) !== null ? [k] : []));
     if (!found.includes(what) && same.length === 1) found[same[0]] = what;

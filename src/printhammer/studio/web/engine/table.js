@@ -17,7 +17,8 @@ const FIRST = 100; // lines that are always read
 const LEFT_OUT = "#\u2026"; // a line of a long table that is not read
 const GAPS = ["", "nan", "-nan", "na", "n/a", "#n/a", "null", "none", "1.#qnan", "-1.#ind"];
 const OVER = ["inf", "-inf", "+inf", "infinity", "-infinity", "\u221e", "-\u221e", "1.#inf", "-1.#inf"];
-const COMMENT = /^\s*(#|\/\/|[%;]\s*[\p{L}][^;]*$)/u;
+// An error value of a spreadsheet in the first cell begins no comment.
+const COMMENT = /^\s*((?!#(?:#+|N\/A|NUM!|VALUE!|DIV\/0!|REF!|NAME\?|NULL!|WERT!|ZAHL!|NV)\s*[,;|\t])#|\/\/|[%;]\s*[\p{L}][^;]*$)/u;
 const NUMBER = /^[+-]?(\d+(?:\.\d*)?|\.\d+|\d*,\d+|\d{1,3}([.,'\u2019\u00a0\u202f]\d{3})+([.,]\d*)?)([eE][+-]?\d+)?$/;
 const GROUPED = { ".": /^[+-]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?$/, ",": /^[+-]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?$/ };
 // Names of metadata entries, without spaces and signs.
@@ -28,6 +29,7 @@ const RATE = ["samplerate", "samplingrate"];
 const ZERO = ["zeroindex", "triggerpoint"];
 const TIME_UNIT = ["horizontalunits", "xunits", "hunit", "timeunits", "timeunit"];
 const VALUE_UNIT = ["verticalunits", "yunits", "vunit"];
+const STAMP = /^\s*\d{1,4}([:/.-])\d{1,2}\1\d{1,4}/; // time of day or date, never a heading
 const NUMBERING = ["x", "no", "no.", "nr", "n", "#", "index", "sample", "sequence", "point"];
 
 export const isNumber = (cell) => NUMBER.test(cell);
@@ -73,8 +75,12 @@ function headingOf(cell) {
   if (beside && (beside[1] || whole.startsWith("in ")) && unitOf(beside[2])) return { name: beside[1], unit: unitOf(beside[2]) };
   return { name: whole, unit: "" };
 }
-export const quantityOfName = (name) => Object.keys(ALIASES).find((what) => ALIASES[what].includes(name.toLowerCase())) ?? "";
-const isNamed = (cell) => { const { name, unit } = headingOf(cell); return Boolean(unit || quantityOfName(name)); };
+export function quantityOfName(name, unit) {
+  const word = name.toLowerCase();
+  if (word === "x" && unit && factorOf(unit, "s") !== null) return "time"; // the horizontal axis of an oscilloscope
+  return Object.keys(ALIASES).find((what) => ALIASES[what].includes(word)) ?? "";
+}
+const isNamed = (cell) => { const { name, unit } = headingOf(cell); return Boolean(unit || quantityOfName(name, unit)); };
 
 const spaced = (line) => line.trim().replace(/\s+(?=[[(])/g, "").split(/\s+/);
 
@@ -82,7 +88,7 @@ const spaced = (line) => line.trim().replace(/\s+(?=[[(])/g, "").split(/\s+/);
 function cellsOf(line, separator) {
   if (separator === " ") return spaced(line);
   const cells = [];
-  const cell = new RegExp(`\\s*(?:"((?:[^"]|"")*)"\\s*|([^\\${separator}]*))(\\${separator}|$)`, "y");
+  const cell = new RegExp(`[^\\S\\${separator}]*(?:"((?:[^"]|"")*)"[^\\S\\${separator}]*|([^\\${separator}]*))(\\${separator}|$)`, "y");
   for (let at = 0; at <= line.length;) {
     cell.lastIndex = at;
     const found = cell.exec(line);
@@ -193,7 +199,7 @@ function headingsOf(rows, { width, separator, facts, above, isBeside }) {
   const stated = factOf(facts, VALUE_UNIT, [isLecroy ? "V" : ""]).filter((value) => value).map((value) => inBrackets(value.split(":").at(-1)));
   let channel = 0;
   const whole = columns.map(({ name, unit }) => {
-    if (quantityOfName(name) === "time") return { name, unit: unit || inBrackets(time) };
+    if (quantityOfName(name, unit) === "time") return { name, unit: unit || inBrackets(time) };
     const own = stated[stated.length > 1 && channel < stated.length ? channel : 0] ?? "";
     channel += 1;
     return { name, unit: unit || (name || columns.length === 1 ? own : "") };
@@ -255,7 +261,12 @@ export function layoutOf(text, where) {
     const missing = Math.min(whole, above.at(-2).cells.length) - cells.length;
     above = [...above.slice(0, -1), { ...row, whole, cells: [...cells, ...Array(Math.max(missing, 0)).fill("")] }];
   }
-  const width = widthOf(data, above.at(-1)?.cells ?? []);
+  const titles = above.at(-1)?.cells ?? [];
+  // LabVIEW writes no cell for an empty comment.
+  if (titles.at(-1) === "Comment" && data.every(({ cells }) => cells.length < titles.length)) titles.pop();
+  let named = above.at(-1)?.cells.some((cell) => STAMP.test(cell)) ? [] : above;
+  const width = widthOf(data, named.at(-1)?.cells ?? []);
+  if (!width) throw new Refusal(`${where}: line ${above.at(-1).line}: '${above.at(-1).cells[0].slice(0, 40)}' states the sampling: expected the names of the columns left of it`);
   if (width > MOST_COLUMNS) throw new Refusal(`${where}: ${width} columns: expected at most ${MOST_COLUMNS}`);
   for (const { line, cells, whole } of data) {
     if (cells.length > width || whole < width) throw new Refusal(`${where}: line ${line} has ${cells.length} cells: expected ${width}`);
@@ -265,9 +276,9 @@ export function layoutOf(text, where) {
     // NumPy writes the heading in a comment.
     const last = notes.filter(({ line }) => line < data[0].line).at(-1);
     const cells = last ? (separator === " " ? spaced(last.note) : last.note.split(separator)) : [];
-    if (cells.length === width && width > 1) above = [{ line: last.line, cells }];
+    if (cells.length === width && width > 1) named = above = [{ line: last.line, cells }];
   }
-  const heading = headingRows(above, width, where);
+  const heading = headingRows(named, width, where);
   const facts = Object.assign({}, comments, beside, ...above.slice(0, above.length - heading.length).map(({ cells }) => factsOf(cells)));
   const extra = heading.map(({ cells }) => cells.slice(width));
   const pairs = extra.length ? extra[0].slice(0, Math.min(...extra.map((cells) => cells.length))) : [];
