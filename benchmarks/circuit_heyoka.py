@@ -39,7 +39,7 @@ class Pulse:
         stiffness = c["spring.Bs"] / c["spring.As"]
         force = c["magnet.F0"] + c["spring.Bs"] - flux * flux / root
         force -= stiffness * (_LENGTH * x - c["backstop.position"])
-        # Depth to the power 1.5 is q cubed there.
+        # In the backstop, the depth to the power 1.5 is q cubed.
         depth = p["contact"] * _LENGTH**1.5 * q * q * q
         force += depth * (c["backstop.stiffness"] - c["backstop.damping"] * _LENGTH / _TIME * v)
         emf = 2.0 * c["magnet.Bm"] * flux / root
@@ -51,7 +51,7 @@ class Pulse:
             (t, pace),
             (i, pace * _TIME * p["closed"] * rate),
         ]
-        # An event that does not apply is a constant.
+        # The guard function of an inactive event is constant.
         gaps = [q - p["place"], p["edge"] - t, 1.0 - p["decaying"] + p["decaying"] * i]
         switches = [
             hy.t_event(gap, callback=_Switch(self, k), direction=hy.event_direction.negative)
@@ -95,7 +95,7 @@ class Pulse:
         phase = self.phases[self.phase]
         later = [p.start / _TIME for p in self.phases[self.phase + 1 :]]
         edge = min([*later, self.end])
-        # The clock is set, since an edge is met to rounding only.
+        # Set the time exactly, since the event is located only up to rounding.
         self.state[2] = phase.start / _TIME
         self._set(
             u=-phase.voltage if phase.decay else phase.voltage,

@@ -38,7 +38,7 @@ def entries(task: Task, quick: bool, members: int) -> list[Entry]:
     name = f"diffrax {diffrax.__version__} on JAX {jax.__version__}"
 
     def positions(tolerance: float) -> FloatArray:
-        # The whole ensemble, so that it is compiled once.
+        # Integrate the whole ensemble, so that the loop is compiled only once.
         return np.array([_run(task, tolerance, tasks, end)[some] for end in ENDS.tolist()])
 
     def entry(tolerance: float) -> Entry:

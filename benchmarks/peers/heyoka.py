@@ -43,7 +43,7 @@ _MODAL = len(_PARAMETERS) + len(_EVENTS) - 1
 
 
 class Lane:
-    """Switches of one run: changes of the integrator's state and parameters in a callback."""
+    """Switching of one run: callbacks that change the integrator's state and parameters."""
 
     def __init__(self, task: Task, end: float) -> None:
         c = hammer_constants(task)
@@ -180,7 +180,7 @@ class Single:
             rates, [0.0] * 4, pars=[0.0] * len(_NAMES), t_events=switches, tol=tolerance
         )
 
-        # Views of the integrator's memory, made once: making them costs as much as a switch.
+        # Cached views of the integrator's memory: creating a view costs as much as a switch.
         self.state, self.parameters = self.integrator.state, self.integrator.pars
 
     def switch(self, which: int, _lane: int) -> bool:
@@ -267,7 +267,7 @@ class Batch:
             state[:], parameters[:] = self.members[following].begin()
             self.next += 1
             return True
-        # An idle lane stands still.
+        # Zero derivatives keep an idle lane at rest.
         parameters[:] = 0.0
         parameters[[_PLACE["c0"], _PLACE["e10"], _PLACE["e20"], _PLACE["edge"]]] = 1.0, 1.0, 1.0, 1e30
         self.running -= 1
@@ -301,7 +301,7 @@ def entries(task: Task, quick: bool) -> list[Entry]:
         found: list[Single] = []
 
         def single() -> Single:
-            # Made, which compiles, where it is first needed.
+            # Build the integrator at first use, since the construction compiles code.
             if not found:
                 found.append(Single(hy, task, tolerance))
             return found[0]

@@ -244,5 +244,5 @@ def _functions() -> tuple[Any, Any, list[Any]]:
         out[done:] = state[0]
         return out
 
-    # The addresses are those of functions that must live as long.
+    # Return the functions, too, since the loops refer to their addresses.
     return numba.njit(split), numba.njit(naive), functions

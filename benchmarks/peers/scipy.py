@@ -62,7 +62,7 @@ def naive(task: Task, end: float, grid: FloatArray, **options: Any) -> FloatArra
         x, v = y
         r = (x - c[7]) / c[8]
         if r > 0.0:
-            # As one would write it; the trial stages of rejected steps leave their mark, too.
+            # The naive form: stages of rejected steps also change the peak.
             peak = max(peak, r)
             mode = LOADING if v >= 0.0 else UNLOADING
         else:
@@ -72,7 +72,7 @@ def naive(task: Task, end: float, grid: FloatArray, **options: Any) -> FloatArra
         return v, acceleration(t, x, v, mode, peak, c, piece)
 
     with warnings.catch_warnings():
-        # What a solver warns of shows in its error.
+        # A numerical problem of the solver shows in its error.
         warnings.simplefilter("ignore")
         found = solve_ivp(rates, (0.0, end), (task.rest, 0.0), t_eval=grid, **options)
     out = np.full(grid.size, np.nan)

@@ -70,7 +70,7 @@ def _adams(
         first_step=min(1e-9, 0.5 * (end - begin)),
         max_num_steps=1_000_000,
     )
-    # It refuses times that are a rounding apart.
+    # The solver rejects times that differ only by rounding.
     times = np.where(abs(times - begin) < _CLOSE, begin, np.where(abs(times - end) < _CLOSE, end, times))
     wanted = np.unique(np.concatenate(([begin], times, [end])))
     found = solver.solve(wanted, state)

@@ -178,7 +178,7 @@ def _errors(
     errors = []
     for row, wanted in zip(strobes.x, true, strict=True):
         before = np.isfinite(wanted)
-        # A run that was lost has no error, and is worse than any that has one.
+        # A failed run has no error and ranks below every other run.
         gap = np.abs(row - wanted)[before]
         errors.append(math.inf if np.isnan(gap).any() else float(gap.max(initial=0.0)) / stroke)
     return np.array(errors)

@@ -13,7 +13,7 @@ from printhammer.support.threads import thread_count
 
 
 def machine() -> dict[str, str]:
-    """Return processor, number of cores, present load, system and package versions as text."""
+    """Return processor, number of cores, current load, system and package versions as text."""
     processor, wide, busy = platform.processor() or platform.machine(), "", "unknown"
     with suppress(OSError):
         info = Path("/proc/cpuinfo").read_text("utf-8")

@@ -128,7 +128,7 @@ class Report(Declared):
         """Render the documentation page with all tables."""
         from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-        # Markdown, not HTML: nothing is escaped.
+        # The output is Markdown, not HTML, so that nothing is escaped.
         pages = Environment(
             loader=FileSystemLoader(Path(__file__).parent),
             undefined=StrictUndefined,

@@ -82,10 +82,10 @@ def measure(
         try:
             x = solver.positions()
             first = time.perf_counter() - began + building.get(i, 0.0)
-            # What is compiled for the work that is timed must not be timed.
+            # Compile the timed function before the timing.
             solver.integrate()
         except Exception as failure:
-            # A peer that breaks here says nothing about the others.
+            # A failure of one solver must not stop the benchmark of the others.
             if solver.ours:
                 raise
             absent[solver.name] = f"failed: {type(failure).__name__}: {failure}".splitlines()[0]
@@ -103,7 +103,7 @@ def _largest(x: np.ndarray, true: np.ndarray) -> float:
     """Return the largest deviation from the reference, m; NaN if a run was lost or nothing is comparable."""
     wanted = np.ones(true.shape, bool)
     if true.ndim == 2:
-        # An ensemble may be compared at some of the times only.
+        # Some ensembles are available only at a part of the times.
         wanted &= ~np.isnan(x).all(axis=1, keepdims=True)
     return float(np.abs(x - true)[wanted].max()) if wanted.any() else math.nan
 

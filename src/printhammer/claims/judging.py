@@ -121,7 +121,7 @@ class JudgedClaim(Declared):
 
     @property
     def statements(self) -> tuple[int, int]:
-        """Numbers of statements that hold and of all statements; a list in a band counts one per entry."""
+        """Number of statements that hold, and of all statements; a list in a band counts one per entry."""
         value = self.value or {}
         lists = {name: band for name, band in self.claim.band.items() if _is_texts(band)}
         if not lists:

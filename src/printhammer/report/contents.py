@@ -163,7 +163,7 @@ class Report(Declared):
 
     @property
     def statements(self) -> tuple[int, int]:
-        """Numbers of statements of the paper that hold, and of all; a panel of Fig. 11 is a statement."""
+        """Number of statements of the paper that hold, and of all; a panel of Fig. 11 counts as one."""
         pairs = [result.statements for result in self.results]
         return sum(held for held, _ in pairs), sum(made for _, made in pairs)
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 APART: Final = 0.1  # Relative difference from which two values of a constant count as different; arbitrary
 
-CONSTANTS_APART: Final = 3  # Least number of constants in which two hammers differ by that much; arbitrary
+CONSTANTS_APART: Final = 3  # Number of constants in which clearly different hammers differ; arbitrary
 
 FORCE_POWERS: Final[dict[str, float]] = {
     "kg": 1.0,

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
-LEAST: Final = 20  # Least number of hammers of a family
+LEAST: Final = 20  # Smallest number of hammers of a family
 
 COUNT: Final = 24  # Default number of hammers of the family
 

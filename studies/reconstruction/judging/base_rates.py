@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 STROKE: Final = "single_pulse_stroke"
 MASSES: Final = (0.05e-3, 2e-3)
-"""Range of the random masses, kg."""
+"""Smallest and largest random mass, kg."""
 
 _BATCH: Final = 64
 _NEAR: Final = 1e-6
@@ -45,7 +45,7 @@ def draw(count: int, seed: int) -> list[dict[str, float]]:
         ends = [CYCLE] * len(printing)
         table = run_all(printing, drives, ends, 1, strobes=[np.array([end]) for end in ends]).strobes
         assert table is not None
-        # Keep those that are near the rest position again one cycle after a single pulse.
+        # Select hammers that return to the rest position within one cycle of a single pulse.
         for candidate, x in zip(printing, table.x[:, 0].tolist(), strict=True):
             if abs(x - candidate.rest) < _NEAR:
                 drawn.append(candidate.constants)

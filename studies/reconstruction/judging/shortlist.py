@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
     from pathlib import Path
 
-APART: Final = 0.01  # Least distance between candidates of a shortlist, as a fraction of a variable's range
+APART: Final = 0.01  # Smallest distance of candidates of a shortlist, as a fraction of a variable's range
 
 DIGITS: Final = 6  # Significant digits of the constants that are judged and shipped
 
@@ -61,9 +61,10 @@ def judge_candidates(
 ) -> list[dict[str, Any]]:
     """Judge candidates and append them to a log; candidates already logged are not judged again.
 
-    `every` lists constants of hammer files, SI. In addition to Fig. 11, the claims in `names` are judged, by
-    default the stated claims. `tell` is called with the number of judged candidates, the total and the row.
-    The rows of these candidates are returned; see `judged.row_of`.
+    `every` lists the constants of the candidates, SI, by key of a hammer file. In addition to Fig. 11, the
+    claims in `names` are judged, by default the stated claims. `tell` is called with the
+    number of judged candidates, the total and the row. The rows of these candidates are returned; see
+    `judged.row_of`.
     """
     wanted = [dict(constants) for constants in every]
     known = {key_of(row["constants"]): row for row in read_judged(path)}

@@ -73,7 +73,7 @@ _PULSES: Final = 9
 
 
 def hinge(excess: float, scale: float) -> float:
-    """Return the excess over the scale, clipped to the range 0 to 1; 1 for an unknown excess (NaN)."""
+    """Compute the hinge loss excess / scale, clipped to the range 0 to 1; 1 if the excess is NaN."""
     if math.isnan(excess):
         return 1.0
     return min(max(excess / scale, 0.0), 1.0)

@@ -98,7 +98,7 @@ def panels(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
 
 
 def _wait(candidate: Candidate, losses: dict[float, float], names: dict[float, str]) -> None:
-    """Simulate correctly strange panels for longer; replace the losses of panels that settle late."""
+    """Simulate panels correctly found strange for longer; replace the losses of panels that settle late."""
     periods = [
         period for period, wanted in printed_verdicts().items() if names[period] == wanted == "strange"
     ]

@@ -31,7 +31,7 @@ NEEDED = {
     "family": ("a.jsonl",),
     "ship": ("a.jsonl", "b.jsonl"),
 }
-# Examples that take minutes, and the tests that stand in for them.
+# Examples that take minutes, with the tests that replace them.
 ELSEWHERE = {
     "schemes": "test_verbs.py, and the count in judging/test_schemes.py",
     "search": "the example of predictions begins with a shorter one",

@@ -56,9 +56,9 @@ def test_most_claims_ship_and_panels_decide_among_equals() -> None:
     more = row(4.0, panels=9, settle_out=True)
     assert best_of([lost, few, many, more]) is more
     assert best_of([lost, few, many]) is few
-    # As many claims and panels: one of them is a stated one.
+    # At equal counts of claims and panels, more stated claims rank higher.
     assert best_of([lost, many]) is many
-    # Equal ones: the first.
+    # Of equal candidates, the first is the best.
     assert best_of([many, dict(many)]) is many
 
 
@@ -75,7 +75,7 @@ def test_the_hammer_file_comes_back_the_same(tmp_path: Path) -> None:
     for key, value in constants.items():
         assert back.constants[key].si == value
         assert back.constants[key].status == "reconstructed"
-    # It moves like the one that was judged, whatever it is called.
+    # The renamed hammer has the same motion as the judged hammer.
     drive = ph.PulseTrain(hammer.waveform)
     motions = [ph.simulate(one, drive, duration=2e-3) for one in (hammer, back)]
     assert (motions[0].x == motions[1].x).all()
@@ -111,7 +111,7 @@ def test_what_the_report_tells_can_be_read(some_fail: None, tmp_path: Path) -> N
         ("stated", 1, 7),
     ]
     assert found.core_hours == 1.23
-    # What the search ran at, not what the claims are judged at.
+    # The tolerance is that of the search, not that of the claims.
     assert found.tolerance == TOLERANCE
     assert found.waveform == "rectangle"
     assert found.gauge == gauge()
@@ -123,9 +123,9 @@ def test_what_the_report_tells_can_be_read(some_fail: None, tmp_path: Path) -> N
     assert settled.best.constants == {"mass": 2.0}
     assert settled.best.value == {"rebounds": 7}
     assert settled.best.holds
-    # Of what holds for the hammer that ships.
+    # Claims that hold for the shipped hammer, but not for the best hammer.
     assert settled.best.costs == ["weak_prints_when_hung_up"]
-    # None holds for it.
+    # No candidate satisfies the claim.
     assert found.failing["release_margin"].best is None
     chaos = found.failing[FIGURE_11].best
     assert chaos is not None

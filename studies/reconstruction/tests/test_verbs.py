@@ -102,7 +102,7 @@ def test_a_search_begins_from_another(cli: Callable, here: Path, cheap: None) ->
     done = cli("search", "stated.jsonl", "--aim", "stated", *BRIEF)
     assert done.status == 0
     assert cli("search", "all.jsonl", "--from", "stated.jsonl", *BRIEF).status == 0
-    # What did not lead is no loss.
+    # Claims that do not guide the search have no loss.
     assert "least loss" in done.out
     assert "settle_out" not in done.out
     with (here / "all.jsonl").open() as file:
@@ -113,7 +113,7 @@ def test_a_search_begins_from_another(cli: Callable, here: Path, cheap: None) ->
         heading, *rows = map(json.loads, file)
     assert heading["starts"] == [list(start) for start in known_starts("all")]
     assert [row["point"] for row in rows[: len(heading["starts"])]] == heading["starts"][: len(rows)]
-    # What leads to a prediction must not have been led by what is predicted.
+    # Predicted claims must not have guided the search on which the predictions are based.
     done = cli("search", "more.jsonl", "--aim", "stated", "--from", "all.jsonl", *BRIEF)
     assert done.status == 2
     assert "all.jsonl: aim = 'all', expected the log of a search on stated claims" in done.err
@@ -134,16 +134,16 @@ def test_the_best_are_judged_once(cli: Callable, here: Path, cheap: None) -> Non
     rows = [json.loads(line) for line in (here / "judged.jsonl").read_text().splitlines()]
     assert len(rows) == 6
     assert set(rows[0]["verdicts"]) == {*STATED, FIGURE_11}
-    # Only what was not known.
+    # The last row contains only the new verdicts.
     assert set(rows[-1]["verdicts"]) == set(claims()) - {*STATED, FIGURE_11}
-    # Judged twice, counted once.
+    # A candidate judged twice counts once.
     done = cli("predictions", "stated.jsonl", "judged.jsonl", "predictions.json")
     assert done.status == 0
     table = Predictions.model_validate_json((here / "predictions.json").read_text())
     assert table.hammers == 3
     assert table.candidates == 128
     assert table.claims[SHAPE].measured == 3
-    # All have as many panels and claims, so that none is beaten.
+    # All hammers have equal counts of panels and claims, so that all are on the front.
     done = cli("front", "judged.jsonl", "--core-hours", "2", "--out", "front.csv")
     assert done.status == 0
     assert "3 judged hammers, 3 on the front" in done.out
@@ -285,7 +285,7 @@ def test_ctrl_c_leaves_a_log_that_is_gone_on_with(tmp_path: Path, monkeypatch: p
     try:
         while run.poll() is None and not (log.exists() and log.read_bytes().count(b"\n") > 1):
             time.sleep(0.2)
-        # As a terminal does: to all processes.
+        # A terminal sends Ctrl-C to all processes of the group.
         os.killpg(run.pid, signal.SIGINT)
         _, told = run.communicate()
     finally:
@@ -301,7 +301,7 @@ def test_ctrl_c_leaves_a_log_that_is_gone_on_with(tmp_path: Path, monkeypatch: p
 @pytest.mark.slow
 def test_from_the_search_to_the_hammer(cli: Callable, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(search, "_TOGETHER", 8)
-    # Some claims take minutes for a hammer that is far from the one of the paper.
+    # Some claims take minutes for a hammer unlike that of the paper.
     monkeypatch.setattr(shipping, "judge_all", lambda hammer, progress: judge_all(hammer, STATED, progress))
     words = ("search", "stated.jsonl", "--aim", "stated", *BRIEF)
     assert cli(*words).status == 0
@@ -314,7 +314,7 @@ def test_from_the_search_to_the_hammer(cli: Callable, here: Path, monkeypatch: p
     hammer = ph.load(here / "build" / "hammer" / "first.toml")
     assert found.shipped == hammer.fingerprint
     (row,) = [json.loads(line) for line in (here / "judged.jsonl").read_text().splitlines()]
-    # Judged once more as it ships, with the same verdicts.
+    # The shipped hammer is judged again, with the same verdicts.
     assert set(found.failing) == {name for name in STATED if not row["verdicts"][name]}
     assert Predictions.model_validate_json((here / "p.json").read_text()).hammers == int(
         all(row["verdicts"][name] for name in STATED)

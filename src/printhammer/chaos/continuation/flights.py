@@ -107,7 +107,7 @@ def fly(
 
 
 def _acceleration(problem: Problem, time: float) -> float:
-    """Compute the acceleration of the armature, m/s^2, at the start of a run that lasts `time`, s."""
+    """Compute the acceleration of the armature, m/s^2, at the start of a run of length `time`, s."""
     record = problem.run(problem.start + time)
     (row,) = problem.resample(record, np.array([problem.start]))
     push = row[2] if problem.drive.quantity == "force" else 0.0
@@ -254,7 +254,7 @@ _NEAR: Final = 1e-2  # Arbitrary
 _STEEP: Final = 10.0  # Arbitrary
 """Multiplier above which an orbit is so close to its grazing that no bifurcation lies in between."""
 _CLOSER: Final = 0.7
-"""Factor on the impact speed of the last attempt, below which a grazing is sought again; arbitrary."""
+"""Ratio of impact speeds, present to last attempt, below which a grazing is sought again; arbitrary."""
 _ON_CURVE: Final = 1e-5
 """Largest scaled closing error of an orbit that is appended to a branch before its grazing; arbitrary."""
 

@@ -367,7 +367,7 @@ def _earlier_fits(tables: dict[str, Path], known: Hammer, robust: bool) -> list[
 def _run_fit(
     job: Job, hammer: str | None, strict: bool, fitted: Callable[[Hammer | None], Fit], zero: str = ""
 ) -> Answer:
-    """Run a fit; return its summary and files. `zero` is a remark that states the time 0 of the records."""
+    """Run a fit; return its summary and files. `zero` is a remark that defines time 0 of the records."""
     from printhammer.hammer.hammer import load
     from printhammer.support.files import write_file
 

@@ -27,10 +27,10 @@ from printhammer.support.tables.readings import Readings, read_table
 from printhammer.units import from_si
 
 _TURN: Final = 0.05  # Arbitrary
-"""Smallest reversal that is a change of direction, as a fraction of the largest indentation."""
+"""Smallest reversal that counts as a change of direction, as a fraction of the largest indentation."""
 
 _FALL: Final = 0.05  # Arbitrary
-"""Smallest drop of the loading force that is a decrease, as a fraction of the largest force."""
+"""Smallest drop of the loading force that counts as a decrease, as a fraction of the largest force."""
 
 
 class Cycles(Declared, eq=False):

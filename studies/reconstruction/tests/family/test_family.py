@@ -129,7 +129,7 @@ def test_the_table_says_the_same_as_the_json(log: Path, tmp_path: Path, calls: l
                 assert text == entry["verdicts"][heading.removeprefix("claim ")]
         assert row["chaos onset [s]"] == ("" if entry["conclusions"]["chaos_onset_s"] is None else "0.0012")
         assert float(row["safe rate [Hz]"]) == entry["conclusions"]["safe_rate_Hz"]
-    # What the search found of claims that are not judged again is kept.
+    # For claims that are not judged again, the verdicts of the search are stored.
     assert {entry["verdicts"]["settle_out"] for entry in document["hammers"]} <= {"holds", "fails"}
 
 

@@ -32,7 +32,7 @@ def test_any_two_of_the_chosen_are_clearly_different(rows: np.ndarray, wide: boo
     assert len(set(chosen)) == len(chosen)
     for i, j in itertools.combinations(chosen, 2):
         assert clearly_different(rows[i], rows[j])
-    # No other one could have been taken as well.
+    # No rejected candidate is clearly different from all members.
     for left in set(range(len(rows))) - set(chosen):
         assert any(not clearly_different(rows[left], rows[i]) for i in chosen)
 
@@ -83,7 +83,7 @@ CONSTANTS = {
 
 @pytest.mark.parametrize(("force", "current"), [(2.0, 1.0), (1.0, 1.5), (3.0, 0.5)])
 def test_a_common_scale_makes_no_other_hammer(force: float, current: float) -> None:
-    # Written out, not taken from the program: roots of force scale with the root of the factor.
+    # Independent of the program: square roots of forces scale with the square root of the factor.
     powers = {"magnet.Am": (0.5, 0.0), "magnet.Bm": (0.5, -1.0), "waveform.amplitude": (0.0, 1.0)}
     powers |= {"waveform.width": (0.0, 0.0)}
     same = {}

@@ -15,7 +15,7 @@ def si(hammer: ph.Hammer) -> tuple[dict[str, float], dict[str, str]]:
 
 @pytest.mark.parametrize(("force", "current"), [(4.0, 1.0), (1.0, 2.0), (0.25, 0.5)])
 def test_the_motion_is_the_same(hammer: ph.Hammer, force: float, current: float) -> None:
-    # Powers of two and of four, whose roots are exact, so that only rounding in the kernel is left.
+    # Powers of two and four have exact roots, so that only the kernel rounds.
     other = hammer.replace(scaled(*si(hammer), force, current))
     motions = [
         ph.simulate(h, ph.PulseTrain(h.waveform, period=1.5e-3, pulses=3), duration=6e-3)

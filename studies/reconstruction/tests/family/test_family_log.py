@@ -41,7 +41,7 @@ def test_hammers_come_in_the_order_of_the_files_with_where_they_are_from(tmp_pat
 
 
 def test_what_was_judged_later_does_not_hide_what_was_known(tmp_path: Path) -> None:
-    # As `judge --every-claim` notes it: only what was not known.
+    # `judge --every-claim` logs only the new verdicts.
     later = {**GOOD, "verdicts": {"release_margin": True}, "panels": None}
     for paths in (
         [log(tmp_path, GOOD, later, name="both")],

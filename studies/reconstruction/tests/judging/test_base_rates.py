@@ -45,7 +45,7 @@ def test_random_hammers_print_the_stroke_and_are_those_of_the_seed(
 ) -> None:
     monkeypatch.setattr(module, "_BATCH", 8)
     drawn = draw(3, 5)
-    # The first of many are those of few.
+    # A larger sample begins with the hammers of a smaller sample.
     assert draw(2, 5) == drawn[:2]
     assert draw(1, 6) != drawn[:1]
     for constants in drawn:
@@ -61,7 +61,7 @@ def test_random_hammers_print_the_stroke_and_are_those_of_the_seed(
 def test_every_claim_is_counted_for_every_hammer(judged: list[tuple[float, tuple[str, ...], bool]]) -> None:
     told: list[tuple[int, int]] = []
     table = base_rates(6, 2, slow=4, tell=lambda done, of: told.append((done, of)))
-    # What ships can be read.
+    # The table has the format of the shipped file.
     BaseRates.model_validate(table)
     assert set(table["claims"]) == set(claims())
     for name, entry in table["claims"].items():
@@ -90,7 +90,7 @@ def test_the_stroke_is_judged_with_a_random_mass(
     assert [mass for mass, _ in others] == [constants["mass"] for constants in drawn_at_no_cost(6, 2)]
     assert all(STROKE not in names and FIGURE_11 not in names for _, names in others)
     assert all(set(SLOW) <= set(names) for _, names in others)
-    # By the logarithm evenly over the range, whatever the mass of the hammer.
+    # The masses are log-uniform over the range, independent of the hammer's mass.
     assert all(MASSES[0] <= mass <= MASSES[1] for mass in strokes)
     assert len(set(strokes)) == 6
     many = np.random.default_rng([2, 1]).random(6)
@@ -120,6 +120,6 @@ def test_a_random_hammer_judged() -> None:
     for name, entry in table["claims"].items():
         assert 0 <= entry["holds"] <= entry["measured"]
         assert entry["measured"] == (0 if name in SLOW else 1)
-    # By choice of the space: the paper's geometry, and its print force.
+    # Every hammer of the search space has the geometry and the print force of the paper.
     assert table["claims"]["geometry"]["holds"] == 1
     assert table["claims"]["print_force"]["holds"] == 1

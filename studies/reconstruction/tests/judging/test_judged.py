@@ -63,7 +63,7 @@ def test_a_row_has_the_verdicts_and_values_of_the_claims() -> None:
 
 
 def test_a_claim_that_cannot_be_measured_fails_without_values() -> None:
-    # So strong a magnet that no current releases the armature.
+    # The magnet is so strong that no current releases the armature.
     constants = constants_in(CRUDE)
     constants["magnet.Am"] *= 3.0
     row = row_of(constants, ["settle_out", "print_force"], panels=False)
@@ -135,7 +135,7 @@ def test_a_candidate_comes_once_with_all_that_is_known_of_it(tmp_path: Path) -> 
     assert first["values"] == {**ROW["values"], "settle_out": {}}
     assert first["panels"] == 7
     assert joined(None, ROW) is ROW
-    # The last word on a claim counts.
+    # The last verdict on a claim counts.
     assert joined(ROW, {**ROW, "verdicts": {"geometry": False}})["verdicts"] == {"geometry": False}
 
 
@@ -220,5 +220,5 @@ def test_panels_of_the_shipped_hammer_are_those_of_the_claim(monkeypatch: pytest
     assert value is not None
     for name, printed, whole in zip(found, some.values(), value["verdicts"], strict=True):
         assert found[name][1] == printed
-        # With all changes of constants and tolerance, the plain verdict is one of those found.
+        # The plain verdict is among the verdicts under all changes of constants and tolerance.
         assert found[name][0] in whole.split(" or ")

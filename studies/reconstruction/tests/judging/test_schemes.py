@@ -27,7 +27,7 @@ def test_changes_are_counted_with_panels_of_a_hammer_as_one(monkeypatch: pytest.
     first = rows[0]
     assert (first["panels"], first["differ"]) == (24, 6)
     assert (first["periodic_to_strange"], first["strange_to_periodic"]) == (6, 0)
-    # Shares of the hammers: a half and none; the error of their mean is a quarter.
+    # The fractions of the two hammers are 0.5 and 0, with mean 0.25 and standard error 0.25.
     assert first["share"] == pytest.approx(0.25)
     assert first["share_error"] == pytest.approx(2.0 * math.sqrt(0.125) / math.sqrt(2.0))
     assert rows[-1]["differ"] == 0
@@ -40,10 +40,10 @@ def test_what_ships_can_be_made_again_and_is_about_all_ways(monkeypatch: pytest.
 
     monkeypatch.setattr(module, "family_hammers", list)
     monkeypatch.setattr(module, "changes", lambda *_, **__: [])
-    # Those that take whole scans of rates are left out.
+    # Claims that require scans over the rate are omitted, since they are slow.
     quick = [name for name in COMPUTED if name not in ("order_of_onset", "second_dot_lost")]
     monkeypatch.setattr(claims_of_1983, "COMPUTED", quick)
-    # The table that ships is about the former hammer.
+    # The shipped table belongs to the former hammer.
     hammer = ph.load("hendriks-1983-1")
     made = Schemes.model_validate(schemes_json(hammer, 1, 1))
     assert set(made.panels) == {named(way) for way in (EXACT, *PLAIN)}
@@ -54,7 +54,7 @@ def test_what_ships_can_be_made_again_and_is_about_all_ways(monkeypatch: pytest.
     assert shipped is not None
     assert shipped.shipped == hammer.fingerprint
     assert list(shipped.panels) == list(made.panels)
-    # Last bits decide when a train that a scheme computes locks, so that only exact verdicts are the same.
+    # With a scheme, rounding decides when a train locks, so that only the exact verdicts agree.
     assert sum(map(str.__eq__, made.panels["exact"], shipped.panels["exact"])) >= 11
     assert {name: shipped.claims[name] for name in quick} == made.claims
     assert set(shipped.claims) == set(COMPUTED)

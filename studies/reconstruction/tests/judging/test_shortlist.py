@@ -40,7 +40,7 @@ def test_the_best_that_are_not_next_to_each_other(
     points = [np.array(row["point"]) for row in chosen]
     for k, point in enumerate(points):
         assert all(np.abs(point - other).max() >= apart for other in points[:k])
-    # Whoever is left out lies next to a better one, or comes after the last.
+    # An omitted candidate lies close to a better candidate, or ranks below the last.
     for row in rows:
         if row not in chosen and len(chosen) < count:
             better = [one for one in chosen if one["total"] <= row["total"]]
@@ -103,7 +103,7 @@ def test_more_claims_are_judged_where_they_were_not(
     (more,) = judge_candidates(masses(1.0), path, names=[STATED[0], "settle_out", FIGURE_11])
     assert judged == [(1.0, (*STATED, FIGURE_11)), (1.0, ("settle_out",))]
     assert more["panels"] == 12
-    # Earlier verdicts are kept.
+    # The row contains the earlier verdicts.
     assert set(more["verdicts"]) == {*STATED, "settle_out", FIGURE_11}
     judge_candidates(masses(1.0), path, names=list(STATED))
     assert len(judged) == 2
@@ -124,7 +124,7 @@ def test_judging_goes_on_after_an_interruption(
     with pytest.raises(KeyboardInterrupt):
         judge_candidates(masses(1.0, 2.0, 3.0), path)
     assert path.read_bytes().count(b"\n") == 2
-    # As if the second had been written in part.
+    # The second row is incomplete, as after an interruption.
     path.write_bytes(path.read_bytes()[:-9])
     monkeypatch.setattr(module, "row_of", plain)
     judge_candidates(masses(1.0, 2.0, 3.0), path)
@@ -157,9 +157,9 @@ def test_standing_counts_claims_and_twelfths_for_panels() -> None:
     assert standing(row(None)) == (0, 0)
     assert standing(row(6, geometry=True, settle_out=True, print_force=True)) == (2.5, 1)
     assert standing(row(3, geometry=False, poincare=True)) == (0.25, 0)
-    # All twelve are one claim, and it counts once.
+    # Twelve correct panels are one claim, which counts once.
     assert standing(row(12, poincare=True)) == standing(row(12, poincare=False)) == (1, 0)
-    # Of as many, those with more stated ones.
+    # At equal counts, more stated claims rank higher.
     assert standing(row(0, geometry=True)) > standing(row(0, settle_out=True))
     typical = dict.fromkeys((name for name, kind in kinds.items() if kind == "typical"), True)
     assert standing(row(4, geometry=True, **typical)) == standing(row(4, geometry=True))

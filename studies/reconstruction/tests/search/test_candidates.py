@@ -16,13 +16,13 @@ def test_candidates_print_the_stroke_of_the_paper() -> None:
     found = some_candidates()
     assert len(found) > 6
     for candidate in found:
-        # At the default tolerance, ten times tighter than that of the search.
+        # Judged at the default tolerance, ten times tighter than in the search.
         context = Context(candidate.hammer)
         value = judge(context, claim).value
         assert value is not None
         assert within(value["max_displacement_m"], claim.band["max_displacement_m"])
         assert value["max_displacement_m"] == pytest.approx(geometry()["top"], abs=0.2e-6)
-        # Equation (5): 0.2 of the 81 um of indentation are 0.7 % of the force.
+        # By equation (5), 0.2 um of the indentation of 81 um is 0.7 % of the force.
         assert context.print_force == pytest.approx(PRINT_FORCE, rel=0.007)
         assert candidate.rest == pytest.approx(rest_state(candidate.hammer), abs=1e-12)
 
@@ -59,7 +59,7 @@ def test_none_where_the_current_cannot_release_the_armature() -> None:
 
 def test_none_where_there_is_no_hammer_file_for_a_point() -> None:
     point = near_points(1, 0, apart=0.0)[0]
-    # Without the force F0.
+    # The point has no force F0.
     point[1] = 0.0
     assert candidates([point]) == [None]
 

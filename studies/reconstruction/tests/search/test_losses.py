@@ -28,7 +28,7 @@ QUICK = (
     "two_pulses_660us",
     "two_pulses_700us",
 )
-# Where a measured value is so near the end of its band that a coarser grid and tolerance may decide.
+# Margins at the end of a band within which the coarser grid and tolerance may change the verdict.
 NEAR = {
     "return_from_everywhere": ("largest_net_force_N", 0.05),
     "settle_out": ("largest_excursion_over_stroke", 0.002),
@@ -71,11 +71,11 @@ def test_what_is_not_known_counts_in_full() -> None:
 
 def test_only_stated_claims_lead_one_search_and_typical_ones_neither() -> None:
     known = claims()
-    # What clouds look like is no claim, and leads no search alone.
+    # The appearance of clouds is not a claim and guides no search alone.
     kinds = {aim: {known[name].kind for name in weights if name in known} for aim, weights in WEIGHTS.items()}
     led = {"stated", "shape"}
     assert kinds == {"stated": {"stated"}, "all": led, "panels": led, "buzz": led, "claims": led}
-    # What leads the first search leads the second too, with the same weight.
+    # Claims that guide the first search guide the second with the same weight.
     assert WEIGHTS["stated"].items() <= WEIGHTS["all"].items()
 
 
@@ -98,7 +98,7 @@ def test_no_loss_where_the_claim_holds_and_some_where_it_fails() -> None:
     scores = looked_at(chosen)
     assert check(chosen, QUICK, scores) > 0.8 * len(QUICK) * len(chosen)
     for name in QUICK[1:3]:
-        # Either way, so that something was compared.
+        # The claim holds for some candidates and fails for others, so that both cases are compared.
         assert len({score.losses[name] == 0.0 for score in scores}) == 2
 
 
@@ -194,7 +194,7 @@ def test_losses_are_between_zero_and_one_and_go_into_the_log(aim: str) -> None:
         assert (candidate is None) == (row["constants"] is None)
         assert all(0.0 <= loss <= 1.0 for loss in score.losses.values())
         assert 0.0 <= row["total"] <= sum(WEIGHTS[aim].values())
-        # Numbers that JSON has.
+        # JSON represents all numbers of the row.
         assert json.loads(json.dumps(row, allow_nan=False)) == row
         if candidate is None:
             assert row["total"] == sum(WEIGHTS[aim].values())
@@ -212,13 +212,13 @@ def test_losses_that_follow_whole_scans_of_rates() -> None:
         context = Context(candidate.hammer)
         lost = judge(context, claims()["second_dot_lost"])
         verdicts.append(lost.verdict)
-        # The claim looks at every hertz, the search at intervals of ten microseconds and more.
+        # The claim scans in steps of 1 Hz, the search in steps of 10 us or more.
         if lost.verdict == "holds":
             assert score.losses["second_dot_lost"] < 0.5
         hung = (judge(context, claims()["hang_up_at_high_rate"]).value or {}).get("hang_up_rate_Hz")
         must = claims()["hang_up_at_high_rate"].band["hang_up_rate_Hz"]["at_most"]
         if hung is not None:
-            # From 2 kHz on, every 250 Hz or so.
+            # The search scans from 2 kHz in steps of about 250 Hz.
             assert score.measured["hang_up"] <= max(hung, 2000.0) + 600.0
             if hung < must - 600.0:
                 assert score.losses["hang_up_at_high_rate"] == 0.0
@@ -229,7 +229,7 @@ def test_losses_that_follow_whole_scans_of_rates() -> None:
 def test_panels_of_short_trains_are_mostly_those_of_the_claim() -> None:
     from studies.reconstruction.judging.judged import plain_panels
 
-    # One with losses so large that most panels are not computed, and two with all panels.
+    # One candidate has losses so large that most panels are not computed; two have all panels.
     near = some_candidates(5, 5, 9)[-5:]
     chosen = [near[k] for k in (0, 1, 3)]
     scores = [Score() for _ in chosen]
@@ -250,8 +250,8 @@ def test_panels_of_short_trains_are_mostly_those_of_the_claim() -> None:
         assert share is not None
         if len(looked_at) == len(found):
             off.append(abs(score.measured["least_share"] - share))
-    # Where a strange train goes depends on the tolerance, and the search looks at fewer firings than the
-    # claim: within two standard errors of a share among so many.
+    # The points of a strange train depend on the tolerance, and the search simulates fewer firings than
+    # the claim: allow two standard errors of a fraction of this number of firings.
     assert np.median(off) < 2.0 * math.sqrt(0.25 / FIRINGS)
     # A short train distinguishes period from chaos in most panels; the claim alone decides.
     assert right > 0.75 * seen
@@ -272,7 +272,7 @@ def test_the_looks_of_map_and_cloud_are_about_those_of_the_claims() -> None:
         assert (score.losses["successive_points_apart"] == 0.0) == (apart.verdict == "holds")
         value = judge(context, claims()["map_sensitivity"]).value
         assert value is not None
-        # A few bursts make most of it, and the claim looks at twice as many.
+        # A few bursts dominate the sensitivity, and the claim simulates twice as many rates.
         assert score.measured["sensitivity"] == pytest.approx(value["erratic_over_low"], rel=0.6)
 
 

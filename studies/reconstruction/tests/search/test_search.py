@@ -178,7 +178,7 @@ def test_a_search_goes_on_where_it_was_stopped(bowl: list[int], tmp_path: Path, 
     run(path, LONG)
     whole = path.read_bytes()
     heading = whole.index(b"\n") + 1
-    # Mostly in the middle of a line.
+    # The cut usually falls in the middle of a line.
     cut = whole[: heading + round(share * (len(whole) - heading))]
     path.write_bytes(cut)
     bowl.clear()
@@ -320,7 +320,7 @@ def inside(point: Any, total: float = 0.0, **losses: float) -> dict[str, Any]:
 def test_the_explorer_stays_in_the_region_it_knows() -> None:
     rng = np.random.default_rng(1)
     explorer = Explorer(evaluation.WEIGHTS["all"], rng)
-    # A narrow region: two of the numbers follow a third.
+    # A narrow region: the first three coordinates are equal.
     points = [np.full(len(VARIABLES), 0.5) for _ in range(40)]
     for number, point in enumerate(points):
         point[:3] = 0.3 + 0.01 * number
@@ -366,7 +366,7 @@ def test_rows_come_in_the_order_of_the_points(
 def test_hammers_are_searched_stopped_and_gone_on_with(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # Cut where a piece that is computed together breaks in two.
+    # The log is cut in the middle of a block that is evaluated together.
     monkeypatch.setattr(evaluation, "PIECE", 4)
     path = tmp_path / "a.jsonl"
     run(path, SAMPLED + ROUND)

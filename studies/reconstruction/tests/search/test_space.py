@@ -91,7 +91,7 @@ def test_the_shipped_hammer_is_in_the_space(hammer: str | Path) -> None:
     assert ((point >= 0.0) & (point <= 1.0)).all()
     constants = constants_in(hammer)
     back = constants_at(values_in(hammer), constants["mass"], constants["pack.stiffness"])
-    # At its current, which may be another than that of the search.
+    # The current of the hammer may differ from that of the search.
     ratio = constants["waveform.amplitude"] / back["waveform.amplitude"]
     back["waveform.amplitude"] *= ratio
     back["magnet.Bm"] /= ratio
@@ -123,7 +123,7 @@ def test_the_stiffness_gives_five_pounds_at_the_printed_stroke() -> None:
 @given(POINTS, MASSES)
 def test_the_variables_are_what_they_say(point: np.ndarray, mass: float) -> None:
     values = values_at(point)
-    # A hammer file wants a force F0.
+    # A hammer file requires a force F0.
     assume(values["bias"] > 0.0)
     hammer = hammer_of(constants_at(values, mass, 200.0))
     force, b = StaticForce(hammer), geometry()["b"]
