@@ -382,4 +382,4 @@ def test_a_chart_has_a_limit_that_its_branch_does_not_meet() -> None:
     exact = [BouncingBall(GRAVITY, e, FREQUENCY).doubling for e in doubling.second]
     np.testing.assert_allclose(doubling.first / (MASS * GRAVITY), exact, rtol=1e-6)
     assert doubling.second.max() == pytest.approx(0.9)
-    assert "others are not in the chart" in chart.message
+    assert "other limits are not in the chart" in chart.message

@@ -48,7 +48,7 @@ def test_forces_of_both_alone_give_combinations(tmp_path: Path) -> None:
     }
     assert_found(fit, truth)
     assert list(fit.constants) == list(truth)
-    assert "cannot be told apart" in fit.indistinct[0]
+    assert "cannot be separated" in fit.indistinct[0]
     assert set(fit.for_file) == {"magnet.Am", "magnet.Bm"}
 
 

@@ -272,7 +272,7 @@ def buzz_search(context: Context) -> BuzzSearch:
 
 
 def _described(train: BuzzTrain) -> str:
-    how = "one every" if train.kind == "uniform" else "each after the leaving of the pack by"
+    how = "one every" if train.kind == "uniform" else "each fired after the departure from the pack by"
     return f"{len(train.times)} pulses, {how} {train.interval * 1e6:.1f} us"
 
 
@@ -283,7 +283,7 @@ def buzz_printing(context: Context, claim: Claim) -> Measured:
     train = search.best
     if train is None or not train.count:
         nothing = {**dict.fromkeys(claim.band), "dots": 0, "trains_tried": search.tried}
-        return Measured(nothing, f"No train does: {search.reason}.")
+        return Measured(nothing, f"No train prints in buzz mode: {search.reason}.")
     motion = context.run(PulseTrain(context.waveform, at=train.times), train.times[-1] + TAIL)
     dots = motion.dots[train.first : train.first + train.count]
     returns = [contact.t_in for contact in touches(motion)]

@@ -197,7 +197,7 @@ def no_period_doubling_cascade(context: Context, claim: Claim) -> Measured:
     return Measured(
         value,
         f"Before the first strange train, at {periods[start] * 1e3:.3f} ms: {way}; between it and the last,"
-        f" at {periods[stop - 1] * 1e3:.3f} ms, {wide}; periods 2, 4, 8 one after the other in {len(falling)}"
+        f" at {periods[stop - 1] * 1e3:.3f} ms, {wide}; periods 2, 4, 8 in succession at {len(falling)}"
         f" places with falling and {len(rising)} with rising strobe time; {short}.",
     )
 

@@ -151,8 +151,8 @@ def fit_coil(
         averaged = Averaged(law, plateaus(solution.fitted, data.series, step), solution.fitted, step)
         if averaged.count >= len(space.start) + _SPARE:
             notes.append(
-                f"the readings have steps of {step:.3g} A, more than their noise: {len(data.values)} rows"
-                f" count as {averaged.count}, their means from step to step"
+                f"the quantisation step of {step:.3g} A exceeds the noise: {len(data.values)} rows count as"
+                f" {averaged.count}, their means over each step"
             )
             data, terms = averaged.data(data), {why: averaged.mean(term) for why, term in terms.items()}
             final = averaged

@@ -211,7 +211,7 @@ class Fit(Result):
             ("law", f"{verdict}, p = {self.p_value:.2g}" if math.isfinite(self.p_value) else None),
             ("because", self.rejected or None),
             *repeated("taken as known", (f"{name} = {value}" for name, value in self.given.items())),
-            *repeated("not told apart", self.indistinct),
+            *repeated("not separated", self.indistinct),
             *repeated("notes", self.remarks),
         ]
         texts = list(zip(*(constant.texts for constant in self.constants.values()), strict=True)) or [()] * 4

@@ -97,8 +97,8 @@ def content_of(shelf: Shelf) -> Any:
             "modules": list(modules.values()),
             "limits": _limits(),
             "sentences": {
-                "kinds": "this page has no kernel for such a drive of this hammer: expected one whose first"
-                " hammer it is, made with the extra `page`",
+                "kinds": "this page has no kernel for this drive of the hammer: expected a page whose first"
+                " hammer is this hammer, written with the extra `page`",
             },
             "stateFile": {"kind": KIND, "format": FORMAT},
         }

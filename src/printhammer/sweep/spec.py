@@ -116,7 +116,7 @@ def _spec(content: dict[str, Any], text: str, where: str, folder: Path) -> Spec:
     )
     for i, axis in enumerate(axes):
         if any(axis.name == other.name for other in axes[:i]):
-            raise InputError.of(f"axis[{i}].key", axis.key, "another key, this one has an axis")
+            raise InputError.of(f"axis[{i}].key", axis.key, "a key without an axis")
         if axis.key in table.constants:
             raise InputError(
                 f"constants: {axis.key!r} is replaced by an axis",

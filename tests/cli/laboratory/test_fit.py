@@ -74,7 +74,7 @@ def test_covariance_is_a_table(cli: Callable, tables: dict[str, Path], tmp_path:
 def test_without_the_spring_it_is_said_what_is_missing(cli: Callable, tables: dict[str, Path]) -> None:
     done = cli("fit", "magnet", tables["magnet"])
     assert done.status == 0
-    assert "not told apart" in done.out
+    assert "not separated" in done.out
     assert "table of the spring alone" in " ".join(done.out.split())
 
 

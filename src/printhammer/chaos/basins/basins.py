@@ -240,7 +240,7 @@ class Basins(Result, rows="v x"):
             )
         if len(rows) > _ROWS:
             rows[_ROWS:] = [("", f"and {len(rows) - _ROWS} more")]
-        after = f" after {self.firings.max()} firings, more rounds may tell" if self.counts[UNDECIDED] else ""
+        after = f" after {self.firings.max()} firings; more may decide" if self.counts[UNDECIDED] else ""
         rows += [
             (name, f"{self.counts[label]} of {self.labels.size} cells{after if label == UNDECIDED else ''}")
             for label, name in ((UNDECIDED, "undecided"), (FAILED, "ended early"), (NO_STATE, "no state"))

@@ -97,7 +97,7 @@ class StabilityChart(Result):
         )
         return (
             f"curves on which the period-{self.firings} orbit loses its stability: {counts}{missed};"
-            f" limits were sought {sought.removesuffix(' 1')}, others are not in the chart;"
+            f" limits were sought {sought.removesuffix(' 1')}, other limits are not in the chart;"
             f" from rest {100.0 * share:.0f} % of the grid settles to period {self.firings}"
         )
 

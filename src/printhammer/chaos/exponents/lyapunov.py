@@ -126,7 +126,7 @@ class Lyapunov(Result, rows="firing exponent"):
         agree = {
             True: "the exponent and the 0-1 test agree",
             False: styled("bad", "the exponent and the 0-1 test disagree"),
-            None: "the exponent and the 0-1 test do not both decide",
+            None: "the exponent or the 0-1 test is undecided",
         }
         kink = "the motion passes a touch without velocity, where it has no derivative"
         rows += [

@@ -246,11 +246,14 @@ def _classify(k: float, cycle: int, rest: FloatArray, resolution: float) -> tupl
     if early > resolution and late < SETTLING * early:
         return "undecided", "the series has not settled: discard a longer transient"
     if k < CHAOTIC:
-        return "undecided", f"K = {k:.2f} lies between {REGULAR:g} and {CHAOTIC:g}: a longer series may tell"
+        return (
+            "undecided",
+            f"K = {k:.2f} is between {REGULAR:g} and {CHAOTIC:g}: a longer series may decide",
+        )
     if rest.size // _CUT < CYCLES * cycle:
         return "undecided", (
-            f"the series nearly repeats itself every {cycle} numbers; whether the rest is chaotic takes"
-            f" at least {_CUT * CYCLES * cycle} to tell"
+            f"the series nearly repeats itself every {cycle} numbers; a test of the remainder requires at"
+            f" least {_CUT * CYCLES * cycle} numbers"
         )
     return "chaotic", ""
 

@@ -96,7 +96,7 @@ class Measurement(Result):
         for name, words in self.words.items():
             entries[name] = Column("", name, ("row",)), list(words)
         wrong = np.isin(np.arange(len(next(iter(self.values.values())))), self.outliers)
-        return entries | {"wrong": (Column("1", "whether the reading is wrong", ("row",)), wrong)}
+        return entries | {"wrong": (Column("1", "whether the reading has a gross error", ("row",)), wrong)}
 
     def to_csv(self) -> str:
         """Render the table as CSV: comments, a heading with units, and one line per row."""

@@ -288,7 +288,7 @@ def _never(table: Readings, place: float, force: float) -> str:
     largest = table.values["current"].max()
     return (
         f"{table.path}: the force never releases the armature, at {place:.4g} m it is {force:.3g} N at best,"
-        f" expected a positive one at a current measured (up to {largest:.4g} A)"
+        f" expected a positive force at a measured current (up to {largest:.4g} A)"
     )
 
 
@@ -322,7 +322,7 @@ def _indistinct(with_spring: bool, levels: int) -> list[str]:
     sentences = []
     if not with_spring:
         sentences.append(
-            "F0, Bs and As cannot be told apart by forces of magnet and spring together: only"
+            "F0, Bs and As cannot be separated by forces of magnet and spring together: only"
             f" {_COMBINED} and {_SLOPE} are determined; add a table of the spring alone"
         )
     if levels == 2:
