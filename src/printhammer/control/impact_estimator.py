@@ -222,7 +222,7 @@ class ImpactEstimator:
         return ImpactEstimate(shown - self.sampling.delay, flag, clearness)
 
     def _is_clipped(self, windows: FloatArray) -> BoolArray:
-        """Mask of the windows that contain readings at the upper end of the converter's range."""
+        """Return a mask of the windows that contain readings at the upper end of the converter's range."""
         full_scale = self.sampling.full_scale or math.inf
         return np.asarray((windows >= full_scale - self.sampling.step).any(axis=-1))
 

@@ -223,5 +223,5 @@ def _is_possible(hammer: Hammer, state: FloatArray) -> bool:
 
 
 def _with_memory(strobes: Strobes) -> BoolArray:
-    """Mask of the strobes at which the pack has a memory, so that (x, v) is not the complete state."""
+    """Return a mask of the strobes with a pack memory, at which (x, v) is not the complete state."""
     return np.array([[components(mode) > 2 for mode in row] for row in strobes.branch.tolist()])

@@ -51,7 +51,7 @@ NO_REST: Final = {
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """Equilibrium at a constant current."""
+    """Equilibrium of the armature at a constant current."""
 
     x: float
     """Displacement of the armature, m."""

@@ -50,7 +50,7 @@ def coil_packed(q: Any, origin: float, c: Any) -> int:
 
 @register
 class Winding(CoilPart):
-    """Constants of the winding: resistance, inductance, shorted turn and temperature."""
+    """Winding of the coil, with resistance, inductance, shorted turn and temperature."""
 
     law: ClassVar[str] = "winding"
 

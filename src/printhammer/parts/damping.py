@@ -31,7 +31,7 @@ def damping_packed(q: Any, origin: float, c: Any) -> int:
 
 @register
 class ViscousDamping(DampingPart):
-    """Coefficient of the viscous damping."""
+    """Viscous damping of the armature, with its coefficient."""
 
     law: ClassVar[str] = "viscous"
 

@@ -378,7 +378,7 @@ def _force_and_loss(
 
 
 def _closed_steps(inside: FloatArray, inward: FloatArray) -> BoolArray:
-    """Mask of the steps in which a contact is closed, from indentation and inward velocity at the nodes.
+    """Return a mask of the steps with closed contact, from indentation and inward velocity at the nodes.
 
     No step crosses the position of the contact. In a step that begins and ends at this position, the contact
     is closed if the initial velocity points inward.

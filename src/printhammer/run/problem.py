@@ -264,7 +264,7 @@ class Problem:
         return float(self.constants[layout.LINKAGE_SCALE])
 
     def room(self, count: int) -> FloatArray:
-        """Allocate an array for a number of nodes."""
+        """Allocate an array for `count` nodes of the record."""
         return np.empty((count, node_width(self.laws)))
 
     def run(self, end: float) -> Record:
@@ -330,7 +330,7 @@ class Problem:
                 contacts[0] = contacts[touched - 1]
 
     def resample(self, record: Record, times: FloatArray) -> FloatArray:
-        """Return states and forces at ascending times, s, shape (times, `columns`); see the kernel."""
+        """Return states and forces at ascending times, s, shape (times, `columns`), from the kernel."""
         out = np.empty((times.size, self.columns))
         self.kernel.resample(times, record.nodes, self.drive_arrays(), self.constants, out)
         return out

@@ -239,7 +239,7 @@ class Regime(Declared):
 
     @property
     def at_firings(self) -> Self:
-        """Copy with the section at the firing, phase 0."""
+        """Copy of the regime with the section at the firing, i.e. at phase 0."""
         return self if self.phase == 0.0 else replace(self, phase=0.0)
 
     def pulses(self, count: int) -> Drive:

@@ -84,7 +84,7 @@ def windows_of(
 
 
 def longest_waveforms(drives: Sequence[Drive]) -> list[Waveform]:
-    """Return, for each drive, the waveform with the longest duration."""
+    """Return the waveform with the longest duration of each drive."""
     if isinstance(drives, PulseTrains):
         return [drives.pulses[number].waveform for number in drives.pulse_of.tolist()]
     return [longest_of(drive) for drive in drives]

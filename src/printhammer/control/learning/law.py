@@ -449,7 +449,7 @@ def better_loop(shares: FloatArray, usual: int) -> tuple[int, float]:
 
 
 def order_loops(press: Press, entries: Adjustable) -> Printing[list[BoolArray]]:
-    """Compute, for each open loop, the mask of good dots of `PRINTED`, shape (M, dots), as a coroutine."""
+    """Compute masks of the good dots of `PRINTED`, shape (M, dots), one per open loop, as a coroutine."""
     count = len(press.hammers)
     return (
         yield from together(

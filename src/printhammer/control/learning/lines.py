@@ -233,7 +233,7 @@ class Printed(NamedTuple):
 
 @dataclass(frozen=True)
 class Press:
-    """Simulator of test pulses and test lines, printed with several hammers at a slot rate in Hz."""
+    """Simulator of test pulses and test lines, which several hammers print at a slot rate in Hz."""
 
     task: Task
     rate: float
@@ -272,7 +272,7 @@ class Press:
         return np.asarray(np.fmax.reduce(np.abs(growth).reshape(len(_STEPS), count)))
 
     def order_ladder(self, rungs: Sequence[Rung]) -> Printing[tuple[FloatArray, FloatArray]]:
-        """Coroutine version of `ladder`: yields the print job, and computes the readings from its result."""
+        """Coroutine form of `ladder`: yield the print job, receive its result, and compute the readings."""
         task, count = self.task, len(self.hammers)
         drives = []
         for rung in rungs:
@@ -298,7 +298,7 @@ class Press:
         slots: Sequence[int] = LINE,
         pulses: Sequence[Waveform] | None = None,
     ) -> Printing[tuple[DotTable, Judgement]]:
-        """Coroutine version of `line`: yields the print job, and computes the dots from its result."""
+        """Coroutine form of `line`: yield the print job, receive its result, and compute the dots."""
         task, due = self.task, slot_times(slots, self.rate)
         fired = [task.pulse] * len(settings) if pulses is None else pulses
         known: dict[int, dict[tuple[float, float, float], Waveform]] = {id(pulse): {} for pulse in fired}

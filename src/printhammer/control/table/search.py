@@ -104,7 +104,7 @@ def chosen(task: Task, periods: FloatArray) -> tuple[FloatArray, Ways]:
 
 
 def _is_barred(task: Task, ways: Ways) -> BoolArray:
-    """Mask of the pulse candidates that failed in a previously tuned table."""
+    """Return a mask of the pulse candidates that failed in a previously tuned table."""
     mask = np.zeros(ways.size, np.bool_)
     for period, delay, brake in task.barred:
         mask |= np.isclose(ways.period, period, 1e-9) & (ways.delay == delay) & (ways.brake == brake)
@@ -130,7 +130,7 @@ def _refine_groups(task: Task, tried: Sequence[Ways]) -> list[Ways]:
 
 
 def _look_closely(task: Task, periods: FloatArray, groups: list[Ways]) -> None:
-    """Search brake pulses between the grid values, at periods whose best candidate is poor (in place).
+    """Search brake pulses between the grid values, in place, at periods with a poor best candidate.
 
     New candidates are added to the groups of the periods.
     """

@@ -121,7 +121,8 @@ SPREAD: Final = (
 # Deviation, as a fraction of the limits, up to which a rate is kept in an automatic grid; arbitrary
 _USABLE: Final = 0.9
 _GAP: Final = 6
-"""Largest number of successive unusable rates that are tuned again; arbitrary: a rate takes some seconds."""
+"""Largest number of successive unusable rates that are tuned again; arbitrary, as the tuning of a rate takes
+seconds."""
 _TRIES: Final = 4
 """Maximum number of times to search a rate again, without the candidates that failed; arbitrary."""
 _POOR: Final = 0.5

@@ -180,7 +180,7 @@ def ways_of(cells: Sequence[tuple[float, float, float, float, float]]) -> Ways:
 
 
 def fits(task: Task, ways: Ways) -> BoolArray:
-    """Mask of the candidates whose firing time lies between the earliest and the latest possible time."""
+    """Return a mask of the candidates whose firing times are between the earliest and the latest time."""
     first, last = task.earliest(ways.delay, ways.brake), ways.period + task.latest(ways.width)
     return np.asarray((ways.fired >= first - _ROUNDING) & (ways.fired <= last + _ROUNDING))
 

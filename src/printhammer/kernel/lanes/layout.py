@@ -59,7 +59,7 @@ LOADING_POOL = 1
 UNLOADING_POOL = 2
 CONTACT_POOL = 3
 POOLS = 4
-"""Number of pools."""
+"""Number of pools of lanes, one per mode of motion."""
 
 # Rows of a block.
 T = 0

@@ -46,8 +46,8 @@ TRANSITIONS: Final = (
 FOLLOWING = np.full((len(M.MODE_NAMES), M.PUSH_BEGAN + 1), -1)
 """Next mode, indexed by mode and switching event; for a reversal in the pack, the mode of outward motion."""
 JUMPS = np.full((len(M.MODE_NAMES), len(M.MODE_NAMES)), NO_JUMP)
-"""Kind of jump of a variation, indexed by the modes before and after an event; from unloading to unloading it
-applies only if the reversal is a new local maximum."""
+"""Kind of jump of a variation, indexed by the modes before and after an event; from unloading to unloading,
+the jump applies only if the reversal is a new local maximum."""
 
 for _mode, _switch, _following, _jump in reversed(TRANSITIONS):
     FOLLOWING[_mode, _switch] = _following

@@ -1,6 +1,7 @@
 """Sums of the columns of a table: correctly rounded, and pairwise in the order of NumPy.
 
-As in the other modules of this folder, the functions are undecorated Python, which the page runs compiled.
+As in the other modules of this folder, the functions are undecorated Python, which is compiled for the web
+page.
 """
 
 from __future__ import annotations

@@ -62,10 +62,10 @@ def force_slopes(
     Returns
     -------
     tuple of float
-        Derivative of magnet and spring force with displacement, at fixed flux linkage in a coil circuit;
-        derivatives of the contact force with displacement, velocity and latest local maximum; derivatives of
-        the dissipative contact force with displacement and velocity. In the backstop, all derivatives with
-        displacement except the first are multiplied by 2 w.
+        Derivative of magnet and spring force with respect to displacement, at fixed flux linkage in a coil
+        circuit; derivatives of the contact force with respect to displacement, velocity and latest local
+        maximum; derivatives of the dissipative contact force with respect to displacement and velocity. In
+        the backstop, all derivatives with respect to displacement except the first are multiplied by 2 w.
     """
     scales, hammer = setting.scales, setting.hammer
     if HAS_BACKSTOP and mode == BACKSTOP:

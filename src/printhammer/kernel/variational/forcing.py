@@ -186,7 +186,7 @@ def field_changes(
 
 @inlined
 def damping_change(x: float, v: float, k: int, setting: Setting) -> float:
-    """Return the derivative of damping and dissipative spring force with constant k, at a fixed state."""
+    """Return the derivative of the damping and dissipative spring forces with respect to constant k."""
     forcing = setting.forcing
     total = 0.0
     if HAS_DAMPING and forcing.of_hammer[k] & V.DAMPING_MOVES:
@@ -210,7 +210,7 @@ def damping_change(x: float, v: float, k: int, setting: Setting) -> float:
 
 @inlined
 def friction_change(rests: float, k: int, forcing: Forcing) -> float:
-    """Return the derivative of the kinetic (`rests` = 0) or static (1) friction force with constant k."""
+    """Return the derivative of the kinetic (`rests` 0) or static (1) friction with respect to constant k."""
     total = 0.0
     if forcing.of_hammer[k] & V.DAMPING_MOVES:
         for i in range(POINTS[CENTRAL]):

@@ -135,7 +135,7 @@ def field_slope(x: float, v: float, value: float, scales: Any, bounds: Any, hamm
 
 @compiled
 def damping_slope(x: float, v: float, scales: Any, hammer: Hammer) -> float:
-    """Return the derivative of damping force and dissipative spring force with velocity [N s/m]."""
+    """Return the derivative of damping and dissipative spring forces with respect to velocity [N s/m]."""
     if not HAS_DAMPING:
         return 0.0
     spacing = SPEED_SPACING * scales[1]

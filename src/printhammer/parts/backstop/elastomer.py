@@ -57,7 +57,7 @@ def backstop_packed(q: Any, origin: float, c: Any) -> int:
 
 @register
 class ElastomerBackstop(BackstopPart):
-    """Constants of the viscoelastic Hertz contact: stiffness k and relaxation time A."""
+    """Elastomer backstop: viscoelastic Hertz contact with stiffness k and relaxation time A."""
 
     law: ClassVar[str] = "elastomer"
 

@@ -77,7 +77,7 @@ _REBOUND = "expected damping, or instead of it restitution and restitution_speed
 
 @register
 class HertzBackstop(BackstopPart):
-    """Constants of equations (6) and (7).
+    """Hard backstop of equations (6) and (7): Hertz contact with viscoelastic loss.
 
     The stiffness k is given by `stiffness`, or by `radius1` and the Young's moduli and Poisson ratios of both
     bodies (without `radius2`, the second is flat). The damping l is given by `damping`, or by the

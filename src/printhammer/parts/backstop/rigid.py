@@ -32,7 +32,7 @@ def backstop_packed(q: Any, origin: float, c: Any) -> int:
 
 @register
 class RigidBackstop(BackstopPart):
-    """Position and coefficient of restitution of a rigid backstop."""
+    """Rigid backstop, with a position and a coefficient of restitution."""
 
     law: ClassVar[str] = "rigid"
 

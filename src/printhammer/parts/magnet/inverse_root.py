@@ -7,7 +7,8 @@ currents. The same coenergy, W' = F0 x - 2 (Am - Bm I)^2 sqrt(x), links the flux
 
     lambda = dW'/dI = 4 Bm (Am - Bm I) sqrt(x),
 
-whose slope with the current is negative: the coil needs a constant inductance above 4 Bm^2 sqrt(x).
+whose derivative with respect to the current is negative: the coil needs a constant inductance above
+4 Bm^2 sqrt(x).
 Validity: the measured range of x and I, which the paper does not print; state the range of x as `range_min`
 and `range_max`.
 Weakness: singular at x = 0, where the origin is arbitrary (the backstop sits at 0.002 in); the pull grows
@@ -95,7 +96,7 @@ def magnet_domain(q: Any, ends: Any) -> None:
 
 @register
 class InverseRootMagnet(MagnetPart):
-    """Constants of equation (3): F0, Am and Bm."""
+    """Magnet of equation (3), with the constants F0, Am and Bm."""
 
     law: ClassVar[str] = "inverse-root"
 

@@ -64,7 +64,7 @@ def magnet_packed(q: Any, origin: float, c: Any) -> int:
 
 @register
 class MovingCoilMagnet(MagnetPart):
-    """Force constant k of a moving coil."""
+    """Moving coil in a permanent field, with the force constant k."""
 
     law: ClassVar[str] = "moving-coil"
 

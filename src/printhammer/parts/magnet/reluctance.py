@@ -167,7 +167,7 @@ def magnet_domain(q: Any, ends: Any) -> None:
 
 @register
 class ReluctanceMagnet(MagnetPart):
-    """Constants of a magnetic circuit with one gap."""
+    """Magnetic circuit with one gap, a saturating core and leakage."""
 
     law: ClassVar[str] = "reluctance"
 

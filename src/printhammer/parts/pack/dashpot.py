@@ -32,7 +32,7 @@ def pack_loading(c: Any, x: float, v: float) -> float:
 
 
 def pack_unloading(c: Any, x: float, v: float, q: float) -> float:
-    """Return the force of spring and dashpot, N; a pack without memory unloads along its loading curve."""
+    """Return the force of spring and dashpot, N; without memory, the pack unloads along its loading curve."""
     depth = x - c[2]
     if depth < 0.0:
         return 0.0
@@ -57,7 +57,7 @@ def pack_packed(q: Any, origin: float, c: Any) -> int:
 
 @register
 class DashpotPack(PackPart):
-    """Stiffness and damping of a Kelvin-Voigt pack."""
+    """Kelvin-Voigt pack, with a stiffness and a damping."""
 
     law: ClassVar[str] = "dashpot"
 

@@ -62,7 +62,7 @@ def pack_packed(q: Any, origin: float, c: Any) -> int:
 
 @register
 class PowerPack(PackPart):
-    """Constants of equation (5): stiffness S, front xp and thickness d."""
+    """Ribbon and paper pack of equation (5), with stiffness S, front xp and thickness d."""
 
     law: ClassVar[str] = "power"
 

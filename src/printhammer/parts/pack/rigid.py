@@ -34,7 +34,7 @@ def pack_packed(q: Any, origin: float, c: Any) -> int:
 
 @register
 class RigidFront(PackPart):
-    """Position and coefficient of restitution of a rigid stop on the paper side."""
+    """Rigid stop on the paper side, with a position and a coefficient of restitution."""
 
     law: ClassVar[str] = "rigid"
 

@@ -38,7 +38,7 @@ def spring_packed(q: Any, origin: float, c: Any) -> int:
 
 @register
 class CubicSpring(SpringPart):
-    """Stiffness, coefficient of the cubic term, and relaxed position of the spring."""
+    """Spring with a linear and a cubic term about a relaxed position."""
 
     law: ClassVar[str] = "cubic"
 

@@ -42,7 +42,7 @@ def spring_packed(q: Any, origin: float, c: Any) -> int:
 
 @register
 class LinearSpring(SpringPart):
-    """Constants of equation (4): Bs and As."""
+    """Linear spring of equation (4), with the constants Bs and As."""
 
     law: ClassVar[str] = "linear"
 
@@ -52,7 +52,7 @@ class LinearSpring(SpringPart):
 
 @register
 class PreloadSpring(SpringPart):
-    """Preload and stiffness of a linear spring."""
+    """Linear spring defined by preload and stiffness."""
 
     law: ClassVar[str] = "preload"
     variant: ClassVar[int] = 1

@@ -37,7 +37,7 @@ class Term(BaseModel):
 
 
 class ConstantForce(Term):
-    """Constant force."""
+    """Constant force on the armature."""
 
     law: ClassVar[str] = "constant"
 

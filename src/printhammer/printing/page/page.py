@@ -319,7 +319,7 @@ class Page(Result, rows="dot"):
 
     @property
     def fault_counts(self) -> dict[str, int]:
-        """Number of dots for each first fault, by name."""
+        """Number of dots by the name of their first fault."""
         return {name: int((self.fault == number).sum()) for number, name in enumerate(FAULTS)}
 
     def worst_place(self, slots: int) -> tuple[int, int]:
