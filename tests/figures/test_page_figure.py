@@ -111,6 +111,9 @@ def test_the_page_shows_every_dot_and_every_lost_one(page: Page) -> None:
     assert {"Wanted", "Difference"} <= set(titles)
     assert any("Region of largest error: print line" in title for title in titles)
     assert any(summary(page) == text.get_text() for text in figure.texts)
+    # A page may look perfect with most dots out of limits.
+    assert page.good.sum() < page.printed.sum()
+    assert f"{page.good.sum()} within limits" in summary(page)
 
 
 def test_the_printed_picture_is_darker_where_dots_are(page: Page) -> None:

@@ -24,6 +24,35 @@ def test_a_motion_that_has_died_out_goes_on_to_its_end() -> None:
     assert abs(motion.x[-1]) < 1e-100
 
 
+VOICE_COIL = {
+    "magnet": {"law": "moving-coil", "constant": 5.0},
+    "spring": {"law": "preload", "preload": 0.0, "stiffness": 250.0},
+    "damping": {"law": "viscous", "coefficient": 1.0},
+    "coil": {"resistance": "8 ohm", "inductance": "1 mH"},
+    "waveform": {"shape": "rail", "voltage": "12 V", "width": "2 ms", "decay": "diode"},
+}
+
+
+def test_a_voice_coil_that_has_come_to_rest_goes_on_to_its_end() -> None:
+    # The damping of 1 N s/m and a time constant of at most 4 ms leave nothing of 1e-150 after 1.4 s.
+    hammer = ph.Hammer.build(1e-3, **VOICE_COIL)
+    with hammers.interpreted():
+        motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform), duration=2.0, points=2)
+        assert motion.status == "ok"
+        assert motion.end == 2.0
+        assert abs(motion.x[-1]) < 1e-150
+        assert abs(motion.current[-1]) < 1e-150
+
+
+def test_a_shorted_turn_whose_current_has_died_out_goes_on_to_its_end() -> None:
+    relay = ph.load("relay-5v").replace({"coil.turn_resistance": "200 ohm", "coil.leakage": "5 mH"})
+    with hammers.interpreted():
+        motion = ph.simulate(relay, ph.PulseTrain(relay.waveform), duration=0.6, points=2)
+        assert motion.status == "ok"
+        assert motion.end == 0.6
+        assert abs(motion.current[-1]) < 1e-100
+
+
 @pytest.mark.parametrize("samples", [41, 401])
 @pytest.mark.parametrize("rate", [800.0, 1000.0, 1200.0])
 def test_knots_of_overlapping_records_may_coincide(rate: float, samples: int) -> None:
@@ -50,3 +79,15 @@ def test_a_gap_that_closes_behind_a_shorted_turn_is_a_status(turn: str, leakage:
     assert np.isfinite(motion.x).all()
     assert np.isfinite([motion.end, motion.v[-1], motion.current[-1]]).all()
     assert relay.magnet.domain[1] == pytest.approx(motion.x[-1], abs=1e-9)
+
+
+@pytest.mark.parametrize(("turn", "leakage"), [("50 ohm", "1 mH"), ("200 ohm", "5 mH")])
+def test_a_gap_that_closes_without_a_pack_is_a_status(turn: str, leakage: str) -> None:
+    changed = {"coil.turn_resistance": turn, "coil.leakage": leakage, "pack": None}
+    relay = ph.load("relay-5v").replace(changed)
+    # Machine code divides by zero without a warning.
+    with hammers.interpreted(), np.errstate(divide="ignore", invalid="ignore"):
+        motion = ph.simulate(relay, ph.PulseTrain(relay.waveform), duration=0.05)
+        assert motion.status == "range left"
+        assert np.isfinite(motion.x).all()
+        assert relay.magnet.domain[1] == pytest.approx(motion.x[-1], abs=1e-9)

@@ -72,6 +72,19 @@ def test_a_chopper_of_two_thresholds_has_the_closed_form_s_instants() -> None:
     assert times[:-1] == pytest.approx([t for t in expected if t < width], abs=1e-12)
 
 
+@pytest.mark.parametrize("ulps", [-50, -1, 0, 1, 50])
+def test_a_threshold_that_is_reached_at_the_end_of_the_pulse_switches_once(ulps: int) -> None:
+    """Pulse and threshold end the supply together: the current falls through the diode, switched once."""
+    upper, voltage, diode, tau = 1.0, 24.0, 0.7, L / R
+    width = -tau * math.log1p(-upper * R / voltage)
+    width += ulps * math.ulp(width)
+    end = 5e-3
+    motion = driven(Chopper(voltage=voltage, width=width, upper=upper, lower=0.8), end)
+    assert len(motion.switchings[0]) <= 1
+    expected = (upper + diode / R) * math.exp(-(end - width) / tau) - diode / R
+    assert motion.current[-1] == pytest.approx(expected, abs=1e-11)
+
+
 def test_a_fixed_off_time_and_a_current_that_ends_in_it() -> None:
     motion = driven(Chopper(voltage=24.0, width=6e-3, upper=0.05, off_time=3e-3), 5e-3)
     times, paths = motion.switchings

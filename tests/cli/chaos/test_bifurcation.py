@@ -1,6 +1,7 @@
 import re
 from collections.abc import Callable
 from importlib import import_module
+from inspect import signature
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 import xarray as xr
 
 import printhammer as ph
-from printhammer.chaos.bifurcation.bifurcation import InterruptedDiagram
+from printhammer.chaos.bifurcation.bifurcation import FIRINGS, InterruptedDiagram
 
 SHORT = ("--firings", "60", "--transient", "30", "--refine", "0")
 
@@ -70,6 +71,13 @@ def test_without_exponents_it_is_said_how_to_tell(cli: Callable) -> None:
 def test_a_transient_leaves_points_to_judge(cli: Callable) -> None:
     words = ("--from", "1.3 ms", "--to", "1.31 ms", "--values", "2", "--refine", "0")
     assert cli("bifurcation", *words, "--firings", "90").status == 0
+
+
+def test_defaults_are_those_of_the_library() -> None:
+    """With fewer firings more trains would be undecided in Python than on the command line."""
+    verb = import_module("printhammer.cli.verbs.bifurcation").bifurcation
+    assert int(signature(verb.call).parameters["firings"].default) == FIRINGS
+    assert signature(ph.bifurcation).parameters["firings"].default == FIRINGS
 
 
 def test_another_constant(cli: Callable) -> None:

@@ -1,11 +1,13 @@
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 import xarray as xr
 from tests.control.least_work.test_burst import let_go, thrown
 from tests.hammers import CRUDE
 
+import printhammer as ph
 from printhammer.control.least_work import search
 
 
@@ -27,6 +29,27 @@ def test_a_burst_and_its_files(cli: Callable, tmp_path: Path, unsearched: None) 
     assert "\ntime [us],current [A]\n" in paths["csv"].read_text("utf-8")
     assert paths["png"].read_bytes().startswith(b"\x89PNG")
     assert b"<svg" in paths["svg"].read_bytes()
+
+
+def test_the_sensitivity_stands_beside_the_result_and_the_interpolation_in_the_file(
+    cli: Callable, tmp_path: Path, unsearched: None
+) -> None:
+    """The weakest dot has hardly more than the force that is asked for: 0.1 % less current is too little."""
+    asked: dict[str, Any] = {"rate": "400 Hz", "dots": 2, "largest": "1.2 A"}
+    hammer, current = ph.load(CRUDE), tmp_path / "current.csv"
+    burst = ph.least_work(hammer, force=0.3, **asked)
+    least = float(burst.forces.min()) * (1.0 - 1e-6)
+    counts = []
+    for factor in (0.999, 1.001):
+        motion = ph.simulate(hammer, burst.drive.scaled(factor), duration=burst.motion.end)
+        peaks = [contact.peak_force or 0.0 for contact in motion.contacts if contact.surface == "pack"]
+        counts.append(sum(peak >= least * burst.single.force for peak in peaks))
+    assert counts[0] < 2
+    words = ("--rate", "400 Hz", "--dots", "2", "--largest", "1.2 A", "--least-force", repr(least))
+    done = cli("energy", CRUDE, *words, "--out", current)
+    assert done.status == 0
+    assert f"{counts[0]} and {counts[1]} of 2 dots adequate at 0.1 % less and more current" in done.out
+    assert "linear between nodes" in current.read_text("utf-8")
 
 
 def test_inadequate_dots_end_with_status_1(cli: Callable, unsearched: None) -> None:

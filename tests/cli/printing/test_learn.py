@@ -30,6 +30,21 @@ def test_a_unit_learns_its_table(cli: Callable, tmp_path: Path, monkeypatch: pyt
     assert cli(*report).status == 2
 
 
+def test_the_offset_of_a_sensor_is_stated(cli: Callable, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sensor that is late by a time, and a production of sensors that are late by different times."""
+    seen: list[ph.ImpactSensor] = []
+
+    def stopped(_hammer: ph.Hammer, _unit: object, *, sensor: ph.ImpactSensor, **_more: object) -> None:
+        seen.append(sensor)
+        raise ph.InputError.of("rate", 0.0, "no learning here")
+
+    monkeypatch.setattr("printhammer.control.learning.learn.learn", stopped)
+    for words in (("--offset", "20 us"), ("--offset-spread", "0.03 ms"), ()):
+        assert cli("learn", "hendriks-1983-1", *words).status == 2
+    assert [each.delay for each in seen] == [pytest.approx(20e-6), 0.0, 0.0]
+    assert [each.offset for each in seen] == [None, pytest.approx(30e-6), None]
+
+
 def test_bad_sensors_are_refused(refused: Callable) -> None:
     refused("learn", "hendriks-1983", "--missed", "2", said="sensor: missed = 2.0")
     refused("learn", "hendriks-1983", "--signal", "current", said="--signal-noise")
