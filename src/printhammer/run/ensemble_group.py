@@ -131,7 +131,7 @@ class Group:
 
 
 class _Posed(NamedTuple):
-    """Distinct initial-value problems of the members; `by` assigns each member the row of its problem."""
+    """Distinct initial-value problems of the members; `by` is the row of each member's problem."""
 
     constants: FloatArray
     controls: FloatArray

@@ -7,9 +7,9 @@ hammer, with a flight time of 0.28 ms, is 4 ms. For many devices, see `printhamm
 
 An armature is at rest when its distance from the rest position is below a fraction of a length. The length is
 the distance from rest to the pack if the armature rests clear of a pack, otherwise the reach of the pulse:
-the largest distance from rest at the steps of the integrator after a single pulse. An armature that stands
-still throughout the second half of a window, as dry friction can hold it, is at rest at any displacement.
-`unsettled` describes an armature that is not at rest at the end of a run.
+the largest distance from rest at the steps of the integrator after a single pulse. An armature that does not
+move during the second half of a window, for instance if dry friction holds the armature, counts as at rest at
+any displacement. `unsettled` describes an armature that is not at rest at the end of a run.
 
 The same pulse gives the time scale of a device: default times, stated for the paper's hammer, are multiplied
 by the time scale, and default rates are divided by it.

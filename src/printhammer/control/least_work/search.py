@@ -48,11 +48,11 @@ def descend(
 ) -> tuple[FloatArray, float]:
     """Minimise an objective by SLSQP, with optional constraints; `measured` evaluates all functions.
 
-    `measured` maps points (places, n) to rows (1 or 3, places). With `conditions` there are three rows: the
-    objective, an equality constraint (second row = 0) and an inequality constraint (third row >= 0). `bounds`
-    apply to every variable. `linear`, an offset and a matrix, are linear inequality constraints, offset +
-    matrix @ y >= 0. With `inward`, the difference step points away from the nearer of the bounds 0 and 1.
-    Returns the final point and its objective.
+    `measured` maps k points, shape (k, n), to rows, shape (1 or 3, k). With `conditions` there are three
+    rows: the objective, an equality constraint (second row = 0) and an inequality constraint (third row >=
+    0). `bounds` apply to every variable. `linear`, an offset and a matrix, are linear inequality constraints,
+    offset + matrix @ y >= 0. With `inward`, the difference step points away from the nearer of the bounds 0
+    and 1. Returns the final point and its objective.
     """
     from scipy import optimize
 

@@ -92,8 +92,8 @@ def field_force(t: float, x: float, v: float, hammer: Hammer, drive: Drive) -> f
 def slip(mode: int, memory: float) -> float:
     """Return the direction in which the armature slides under dry friction, 1 or -1; 0 at rest.
 
-    The direction belongs to a step: the friction is smooth while a step is extended beyond its reversal.
-    Outside a pack with memory the direction is the `memory` of the mode.
+    The direction is constant within a step, so that friction is smooth even if the step extends beyond a
+    reversal. Outside a pack with memory the direction is the `memory` of the mode.
     """
     if mode >= RESTING:
         return 0.0

@@ -78,7 +78,8 @@ NEAR = 1e-9
 reversal is differentiable."""
 
 RELEASED = 1e-9
-"""Largest relative difference of force and static friction at a release that no edge of the drive caused."""
+"""Largest relative difference of force and static friction at a release not caused by an edge of the
+drive."""
 RELEASE_SPACING = 1e-3
 """Step size of the time for the rate of the force at a release, as a fraction of the rest."""
 
@@ -209,8 +210,8 @@ def pass_level(
 def pass_release(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
     """Propagate the columns through the end of a rest under dry friction; return whether differentiable.
 
-    The rest ends at a time that depends on the place of the armature and on constants, or at an edge of the
-    drive, see `leave_at_edge`.
+    The rest ends at a time that depends on the position of the armature and on constants, or at an edge of
+    the drive, see `leave_at_edge`.
     """
     hammer, drive = setting.hammer, driven(setting.drive, electric_at_node(after))
     mode, t = int(node[3]), after[0]
@@ -261,7 +262,7 @@ def pass_friction(node: Any, after: Any, columns: Any, setting: Setting) -> tupl
     """
     mode, following = int(node[3]), int(after[3])
     if MEMORY and (is_held(mode) or is_held(following)) and branch_of(following) == M.UNLOADING:
-        # The armature stands at the maximum at which a new unloading branch begins.
+        # The armature is at rest at the maximum at which a new unloading branch begins.
         for k in range(columns.shape[1]):
             columns[PEAK, k] = columns[0, k] if after[4] == after[1] else columns[PEAK, k]
     if is_held(following):
@@ -341,7 +342,8 @@ def is_departure(before: Any, node: Any) -> bool:
 def leave_at_edge(node: Any, pulse: int, piece: int, columns: Any, setting: Setting) -> None:
     """Propagate the columns through an edge of the drive, just passed, that ended a rest.
 
-    Until the edge, stop or friction balance the other forces: if the edge moves, the motion moves with it.
+    Until the edge, stop or friction balance the other forces: a shift of the edge shifts the motion by the
+    same time.
     """
     hammer, drive, forcing = setting.hammer, driven(setting.drive, electric_at_node(node)), setting.forcing
     a = acceleration_at(node, int(node[3]), node[4], 0.0, hammer, drive)
