@@ -14,6 +14,7 @@ import pytest
 from PIL import Image
 from tests.test_docs_commands import CELL, PAGES, ROOT, SHELL
 
+import printhammer as ph
 from printhammer.control.learning.law import RUNS
 
 TOML = re.compile(r"^```toml\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -102,8 +103,6 @@ def _two_stages(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture(scope="module")
 def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with what the pages call by name, apart from what their own commands write."""
-    import printhammer as ph
-
     folder = tmp_path_factory.mktemp("desk")
     hammer = ph.load("hendriks-1983")
     for name in ("my-hammer", "base", "known"):
@@ -193,3 +192,9 @@ def test_the_commands_of_a_tutorial_run(
         else:
             done = subprocess.run(["sh", "-ec", step], capture_output=True, text=True, check=False)
             assert done.returncode == 0, f"{step}\n{done.stderr}"
+    if name == "oscilloscope":
+        found, truth = (ph.load(path) for path in ("relay.toml", "relay-5v"))
+        assert found.uncertainty is not None
+        for key in ("mass", "coil.resistance"):
+            off = found.constants[key].si - truth.constants[key].si
+            assert abs(off) < 3.0 * found.uncertainty.error(key)

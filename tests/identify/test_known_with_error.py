@@ -1,4 +1,4 @@
-"""What a static fit takes as known with an error widens its intervals, and stays correlated with them."""
+"""What a fit takes as known with an error widens its intervals, and stays correlated with them."""
 
 import math
 from pathlib import Path
@@ -68,3 +68,24 @@ def test_of_the_position_of_the_backstop(tmp_path: Path) -> None:
     assert fit["spring.Bs"].standard_error == pytest.approx(
         math.hypot(exact["spring.Bs"].standard_error, added), rel=1e-6
     )
+
+
+def test_of_a_coil_on_a_rail(tmp_path: Path) -> None:
+    """The resistance that an earlier fit found, two standard errors off, moves the mass no less."""
+    relay = ph.load("relay-5v")
+    error = 2e-4 * true_value(relay, "coil.resistance")
+    known = relay.replace("coil.resistance", true_value(relay, "coil.resistance") + 2.0 * error)
+    known = known.replace(
+        "uncertainty", {"constants": ["coil.resistance"], "standard_errors": [f"{error!r} ohm"]}
+    )
+    record = tmp_path / "motion.csv"
+    sensor = {"sampling_rate": "200 kHz", "bandwidth": "1 MHz"}
+    ph.measure("motion", relay, seed=2, sensor=sensor, duration=9e-3).write(record)
+    exact, fit = (
+        ph.fit("motion", record, hammer=each, free=["mass"], bandwidth="1 MHz")
+        for each in (known.replace("uncertainty", None), known)
+    )
+    mass = true_value(relay, "mass")
+    assert abs(exact["mass"].value - mass) > 4.0 * exact["mass"].standard_error
+    assert abs(fit["mass"].value - mass) < 2.5 * fit["mass"].standard_error
+    assert fit["coil.resistance"].standard_error < error

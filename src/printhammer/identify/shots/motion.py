@@ -310,8 +310,10 @@ def _plain(hammer: Hammer, keys: Sequence[str]) -> Hammer:
 def _known(hammer: Hammer, *, own_waveform: bool) -> Uncertainty:
     """Return the uncertainty of the constants that affect the motion."""
     known = hammer.uncertainty or Uncertainty((), np.empty((0, 0)))
-    idle = ("platen", "coil.") if own_waveform else ("platen", "coil.", "waveform.")
-    return known.without([key for key in known.keys if key.startswith(idle)])
+    idle = ["platen"] if own_waveform else ["platen", "waveform."]
+    if not own_waveform or hammer.waveform is None or hammer.waveform.quantity != "voltage":
+        idle.append("coil.")  # With a driver, the coil determines the current.
+    return known.without([key for key in known.keys if key.startswith(tuple(idle))])
 
 
 def _check_unused(paths: Sequence[str | Path], hammer: Hammer) -> tuple[str, ...]:
