@@ -1,4 +1,4 @@
-"""Waiting times of a new user: nothing is compiled; medians over rounds, each with its own cache folder.
+"""Waiting times of a new user, without compiled code: medians over rounds with empty cache folders.
 
     python benchmarks/first_minutes.py [HAMMER] [--rounds N] [--only run|studio]
 

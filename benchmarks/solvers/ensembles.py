@@ -1,4 +1,4 @@
-"""Timings of ensembles: Figure 9 in one frame, thousands of long trains, growth with members, errors."""
+"""Timings of ensembles: Figure 9, thousands of long trains, growth with the number of members, errors."""
 
 from __future__ import annotations
 

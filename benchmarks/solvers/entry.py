@@ -22,7 +22,7 @@ class Absent(Exception):
 
 @dataclass
 class Entry:
-    """One solver with one method and tolerance."""
+    """Entry of the table of solvers: one solver with one method and tolerance."""
 
     name: str
     """Solver, method and tolerance."""

@@ -1,4 +1,4 @@
-"""Pool of worker processes of a verb, which are terminated when it is interrupted."""
+"""Pool of worker processes of a verb, which are terminated if the verb is interrupted."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def worker_pool(workers: int) -> Iterator[Executor | None]:
-    """Yield a pool of `workers` processes; None for one worker, where this process does the work."""
+    """Yield a pool of `workers` processes; None for a single worker, whose work this process does."""
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import active_children, get_context
 

@@ -80,7 +80,7 @@ class Option:
         return Annotated[type_ | None if self.default is None else type_, entry]
 
     def typer_default(self) -> Any:
-        """Return the default value for typer; as text if the option has a parser of its own, `read`."""
+        """Return the default value for typer; as text if the option has its own parser, `read`."""
         if self.read is None or self.default in (None, ...):
             return self.default
         return format(self.default, "g") if isinstance(self.default, float) else str(self.default)

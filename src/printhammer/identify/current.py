@@ -140,7 +140,7 @@ class Trace(Declared, eq=False):
 def read_trace(
     path: str | Path, hammer: Hammer, locked: float | None, has_offset: bool, columns: str | None = None
 ) -> Trace:
-    """Read a current record; `locked` is the displacement of a locked armature, m (None: as in a comment)."""
+    """Read a current record; `locked` is the locked displacement, m (None: stated in the record, or free)."""
     table = read_table(path, {"time": "s", "current": "A"}, optional={"voltage": "V"}, columns=columns)
     table.check_times()
     t = table.values["time"]

@@ -108,7 +108,7 @@ def typeset(text: str) -> str:
 
 
 def percent(part: float) -> str:
-    """Format a fraction in percent, such as "3.1 %"; 100 % and 0 % are reserved for all and none."""
+    """Format a fraction in percent, such as "3.1 %"; 100 % and 0 % are printed only if exact."""
     if part in (0.0, 1.0):
         return f"{part:.0%}".replace("%", "\N{NO-BREAK SPACE}%")
     shown = 100.0 * part

@@ -34,10 +34,10 @@ FORCE_POWERS: Final[dict[str, float]] = {
     "N^0.5 m^0.25": 0.5,
     "N^0.5 m^0.25/A": 0.5,
 }
-"""Exponent, by SI unit of a constant, with which it scales with mass and all forces; 0 for other units."""
+"""Exponents, by SI unit, with which constants scale with mass and all forces; 0 for other units."""
 
 CURRENT_POWERS: Final[dict[str, float]] = {"A": 1.0, "N^0.5 m^0.25/A": -1.0}
-"""Exponent, by SI unit of a constant, with which it scales with all currents; 0 for other units."""
+"""Exponents, by SI unit, with which constants scale with all currents; 0 for other units."""
 
 
 def scaled(

@@ -36,7 +36,7 @@ class Front(Result):
 
     @property
     def title(self) -> str:
-        """Summary in one line."""
+        """Title of the front: number of judged hammers, and number of hammers on the front."""
         return f"{len(self.panels)} judged hammers, {int(self.on_front.sum())} on the front"
 
     def plot(self, **options: Any) -> Figure:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from studies.reconstruction.search.candidates import Candidate
 
 _FIRST: Final = 100
-"""Number of first points excluded from a cloud, the transient from rest: half of those plotted."""
+"""Number of initial points excluded from a cloud as a transient: half of the plotted points."""
 
 _ORBIT_TIME: Final = 3e-3
 _ORBIT_POINTS: Final = 1501

@@ -44,7 +44,7 @@ class Explorer:
         self._nearest: list[dict[str, Any]] = []
 
     def note(self, rows: list[dict[str, Any]]) -> None:
-        """Store the points in the region and, while it has few points, the points with the smallest loss."""
+        """Store points in the region; while the region has few points, also store those of smallest loss."""
         for row in rows:
             if row["constants"] is None:
                 continue

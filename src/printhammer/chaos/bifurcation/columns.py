@@ -23,7 +23,7 @@ from printhammer.run.supply import current_scale
 from printhammer.support.arrays import FloatArray, IntArray, TextArray
 
 TOLERANCE: Final = 1e-9
-"""Default tolerance of diagrams and basins; its errors are far below `AGREEMENT`, which decides a period.
+"""Default tolerance of diagrams and basins; its errors are far below `AGREEMENT`, the period criterion.
 
 Tuned: with `DISPLAY_TOLERANCE` of `printhammer.run.ensemble`, weakly stable orbits never settle to within
 1e-6 of the half-width of the strobe window.

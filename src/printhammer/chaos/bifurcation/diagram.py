@@ -36,7 +36,7 @@ from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArra
 from printhammer.units import from_si
 
 SERIES: Final = (2, 4, 8)
-"""Orbit periods, in firings, of the windows of a period-doubling cascade: by definition, doublings of 1."""
+"""Orbit periods, in firings, of the first windows of a period-doubling cascade, by definition."""
 
 _WHOLE_DIGITS: Final = 6  # Number of digits up to which whole parameter values are written out; arbitrary
 MOST_UNDECIDED: Final = 32

@@ -384,7 +384,7 @@ class Branch(Result):
         return branches_table([self], self.attributes).drop(columns="branch")
 
     def orbit(self, number: int) -> Orbit:
-        """Converge one orbit of the branch again, at its value of the parameter.
+        """Recompute one orbit of the branch by Newton's method, at its value of the parameter.
 
         Parameters
         ----------

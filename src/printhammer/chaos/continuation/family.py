@@ -191,7 +191,7 @@ def has_rigid_backstop(regime: Regime) -> bool:
 
 
 def _touches(hammer: Hammer, record: Record, zero: float, length: float) -> tuple[Touch, ...]:
-    """List the touches of an orbit that begin in a run; contacts open at its end close one period later."""
+    """List the touches of an orbit in a run; a contact open at the end closes in the next period."""
     position, front = hammer.position, hammer.front
     touches = []
     open_at_start = {int(row[0]): float(row[3]) for row in record.contacts if row[6]}

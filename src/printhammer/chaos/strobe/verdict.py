@@ -265,7 +265,7 @@ def _without_period(exponent: Exponent | None) -> tuple[str, str]:
     if exponent.value == -math.inf:
         if int((exponent.factors == -math.inf).sum()) > 1:
             return SUPERSTABLE, ""
-        return name, "no period, and the motion comes to rest on the backstop only once; more firings tell"
+        return name, "no period, and the motion comes to rest on the backstop only once; more firings decide"
     if not exponent.smooth:
         return name, "no period, and no exponent, since the motion passes a touch without velocity"
     if is_positive(exponent):

@@ -213,7 +213,7 @@ def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, st
 
 
 def applicable(sensor: Sensor, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Select the settings that apply to a sensor: all but the sampling settings if there are no records."""
+    """Select the settings that apply to a sensor; sampling settings apply only to records."""
     kept = dict(settings)
     for role in PARTS:
         if role in kept:

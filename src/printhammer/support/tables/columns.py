@@ -50,7 +50,7 @@ class Source:
     place: int
     """Number of the column in the table, counted from 1."""
     factor: float = 1.0
-    """Factor by which a number in the table is multiplied to get the quantity, in `unit`."""
+    """Factor by which a number in the table is multiplied to obtain the quantity, in `unit`."""
     unit: str = ""
     """Unit of the factor, such as "A/V" or "A"; empty where the factor is a pure number."""
     offset: str = ""

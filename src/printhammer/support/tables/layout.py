@@ -280,7 +280,7 @@ def layout_of(text: str, where: str, words: Collection[str] = ()) -> Table:
 
 
 def _separator(text: str) -> str:
-    """Determine the separator that makes most lines rows of numbers, or else splits most lines."""
+    """Determine the separator that turns most lines into rows of numbers, or else splits most lines."""
     lines = [line for line in text.split("\n", _LINES)[:_LINES] if line.strip() and line.strip()[0] != "#"]
     best, chosen = 0, ""
     for sign in _SEPARATORS:

@@ -29,7 +29,7 @@ _NONE: Final[Mapping[str, str]] = MappingProxyType({})
 _NO_WORDS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType({})
 
 LARGEST: Final = 1e9  # Arbitrary
-"""Largest magnitude accepted for a value in SI; instruments write numbers such as 9.9e37 for no reading."""
+"""Largest magnitude accepted for a value in SI; instruments write 9.9e37 for a missing reading."""
 
 BEFORE: Final = 0.1
 """Largest drive value before time 0 that is treated as noise, as a fraction of the peak; arbitrary."""

@@ -17,7 +17,7 @@ const STOPPED = "the run ended before firing";
 const FORGETS = "no exponent: the motion comes to rest and forgets its past";
 const REASONS = {
   "-1": "the states still move, and Newton's method needs a derivative that does not exist",
-  "-3": "no period, and the motion comes to rest on the backstop only once; more firings tell",
+  "-3": "no period, and the motion comes to rest on the backstop only once; more firings decide",
   "-4": "no period, and no exponent, since the motion passes a touch without velocity",
   "-6": `no period up to ${PERIODS}, and the largest exponent is not positive by 3 standard errors`,
 };
