@@ -22,7 +22,7 @@ OVERLAPS: Final = get_args(Overlap)
 
 
 class Drive:
-    """Drive: a waveform and its firing times, immutable; `printhammer.drive.trains` has the subclasses.
+    """Waveform with its firing times, immutable; most subclasses are in `printhammer.drive.trains`.
 
     Two drives are equal if their segment tables, firing times, overlap rules and quantities are equal.
     """

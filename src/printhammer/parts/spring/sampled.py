@@ -87,7 +87,7 @@ def spring_packed(q: Any, origin: float, c: Any) -> int:
 
 
 Curve = tuple[bool, tuple[tuple[float, float], ...]]
-"""Whether the lines between samples are straight, and displacements, m, with forces, N."""
+"""Sampled curve: whether its pieces are straight lines, and its displacements, m, and forces, N."""
 
 
 class SampledSum(ForceSum):

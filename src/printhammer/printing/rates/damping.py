@@ -41,8 +41,9 @@ KINDS: Final = ("as it is", "hard", "elastomer", "pack")
 """Kinds of material: as built, hard backstop with changed constants, elastomer backstop, changed pack."""
 
 STIFFNESSES: Final = (1.0 / 9.0, 1.0 / 3.0, 3.0)
+"""Factors on the stiffness of a hard backstop; arbitrary."""
 DAMPINGS: Final = (0.25, 0.5, 2.0, 4.0, 16.0)
-"""Factors on stiffness and damping of a hard backstop; arbitrary."""
+"""Factors on the damping of a hard backstop; arbitrary."""
 
 ELASTOMERS: Final = (8e7, 8e8)
 """Stiffnesses of the elastomers, N/m^1.5: about as in the paper (10 N at 25 um), and ten times as much."""
