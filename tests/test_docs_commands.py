@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 import typer
 
-from printhammer.cli.main import VERBS, app
+from printhammer.cli.main import MODULES, program_of
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted(path for path in (ROOT / "docs").rglob("*.md") if "gallery" not in path.parts)
@@ -20,7 +20,8 @@ SHELL = re.compile(r"^```sh\n(.*?)^```", re.MULTILINE | re.DOTALL)
 # A command in the cell of a table, as on the cheat sheet.
 CELL = re.compile(r"\| `(printhammer (?!.*\.widget)[^`]+)` \|")
 COMMAND = re.compile(r"^printhammer .*$", re.MULTILINE)
-VERB_NAMES = sorted((verb.name.split() for verb in VERBS), key=len, reverse=True)
+PROGRAM: Any = typer.main.get_command(program_of())
+VERB_NAMES = sorted((name.split() for name in MODULES), key=len, reverse=True)
 
 
 def commands_of(page: Path) -> list[list[str]]:
@@ -38,7 +39,7 @@ def commands_of(page: Path) -> list[list[str]]:
 )
 def test_the_commands_on_a_page_can_be_read(page: Path) -> None:
     for words in commands_of(page):
-        command: Any = typer.main.get_command(app)
+        command = PROGRAM
         name = next((name for name in VERB_NAMES if words[: len(name)] == name), None)
         assert name is not None, words
         for part in name:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from printhammer.cli.main import GROUPS, VERBS
+from printhammer.cli.main import MODULES, groups_of, verb_of
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src/printhammer"
@@ -134,9 +134,9 @@ def test_a_phrase_is_found_across_lines(tmp_path: Path) -> None:
 def test_help_texts_begin_with_a_noun_or_a_verb() -> None:
     helps = {
         f"{verb.name} {name}": option.help
-        for verb in VERBS
+        for verb in map(verb_of, MODULES)
         for name, option in {**verb.options, **verb.files}.items()
-    } | {name: text for name, (text, _example) in GROUPS.items()}
+    } | {name: text for name, (text, _example) in groups_of(MODULES).items()}
     assert len(helps) > 400
     assert {name: text for name, text in helps.items() if FIRST_WORDS.match(text)} == {}
     assert {name: text for name, text in helps.items() if FORBIDDEN.search(text)} == {}
@@ -144,6 +144,6 @@ def test_help_texts_begin_with_a_noun_or_a_verb() -> None:
 
 
 def test_heads_of_verbs_are_sentences_with_a_verb_of_the_field() -> None:
-    heads = {verb.name: (verb.call.__doc__ or "").strip().split("\n")[0] for verb in VERBS}
+    heads = {verb.name: (verb.call.__doc__ or "").strip().split("\n")[0] for verb in map(verb_of, MODULES)}
     assert {name: head for name, head in heads.items() if not re.fullmatch(r"[A-Z].*\.", head)} == {}
     assert {name: head for name, head in heads.items() if re.match(r"(?:Tell|Let|Have|Get)\b", head)} == {}

@@ -5,6 +5,7 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +13,13 @@ import pytest
 import typer
 
 import printhammer as ph
-from printhammer.cli.main import GROUPS, VERBS, app
+from printhammer.cli.main import MODULES, groups_of, program_of, verb_of
 from printhammer.cli.options import Files, read_plain, read_whole
 from printhammer.cli.runner import Verb
 
-NAMES = [verb.name for verb in VERBS]
+NAMES = list(MODULES)
+VERBS = [verb_of(name) for name in NAMES]
+PROGRAM: Any = typer.main.get_command(program_of())
 # Required arguments of each verb, so that a test reaches the bad option.
 NEEDED = {
     "curve": ("--second", "backstop.damping"),
@@ -55,8 +58,26 @@ def words_of(verb: Verb, *more: object) -> list[object]:
     return [*verb.name.split(), *NEEDED.get(verb.name, ()), *more]
 
 
-def test_names_are_told_apart() -> None:
-    assert len(set(NAMES)) == len(NAMES)
+@pytest.mark.parametrize("module", sorted(set(MODULES.values())))
+def test_every_declared_verb_is_listed(module: str) -> None:
+    values = vars(import_module(f"printhammer.cli.verbs.{module}")).values()
+    declared = sorted(value.name for value in values if isinstance(value, Verb))
+    assert declared == sorted(name for name, home in MODULES.items() if home == module)
+
+
+@pytest.mark.parametrize(("words", "homes"), [("run --help", {"run"}), ("fit coil --help", {"fit"})])
+def test_a_verb_imports_its_own_module_alone(words: str, homes: set[str]) -> None:
+    code = f"""
+import sys
+from printhammer.cli.main import main
+try:
+    main({words.split()})
+except SystemExit:
+    homes = [name for name in sys.modules if name.startswith("printhammer.cli.verbs.")]
+    print(*homes, file=sys.stderr)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert {name.rpartition(".")[2] for name in done.stderr.split()} == homes
 
 
 def printed(cli: Callable[..., Any], words: list[str]) -> str:
@@ -79,14 +100,14 @@ def test_help_carries_an_example_that_can_be_read(cli: Callable[..., Any], verb:
     assert shown.replace("\\\n", "") == verb.example
     for words in commands_of(shown):
         assert words.pop(0) == "printhammer"
-        command: Any = typer.main.get_command(app)
+        command = PROGRAM
         while hasattr(command, "commands"):
             command = command.commands[words.pop(0)]
         if ">" not in words:
             command.make_context(verb.name, words)
 
 
-@pytest.mark.parametrize("group", [name for name, (_help, example) in GROUPS.items() if example])
+@pytest.mark.parametrize("group", [name for name, (_help, example) in groups_of(NAMES).items() if example])
 def test_a_group_has_the_example_of_a_verb(cli: Callable[..., Any], group: str) -> None:
     assert printed(cli, [group]).replace("\\\n", "") in {verb.example for verb in VERBS}
 

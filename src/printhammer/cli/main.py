@@ -3,7 +3,8 @@
 Exit status: 0 for success; 1 if a run stopped early, or with ``--strict`` a claim fails; 2 for bad input,
 described in one sentence on the standard error; 130 after Ctrl-C.
 
-`VERBS` lists all verbs of the command line, in the order of the help.
+`MODULES` lists all verbs of the command line, in the order of the help. A command line that begins with the
+name of a verb imports the module of this verb alone.
 """
 
 from __future__ import annotations
@@ -13,7 +14,9 @@ import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import Annotated, Final, NoReturn
 
 import typer
@@ -21,34 +24,51 @@ import typer
 from printhammer import __version__
 from printhammer.cli.runner import INTERRUPTED, Verb
 from printhammer.cli.terminal import allow_any_text, complain
-from printhammer.cli.verbs import fit, hammer
-from printhammer.cli.verbs.bifurcation import basins, bifurcation
-from printhammer.cli.verbs.coil import dead_time, duty, impact_time
-from printhammer.cli.verbs.continuation import continue_, curve
-from printhammer.cli.verbs.drives import energy, feedback
-from printhammer.cli.verbs.hammer import from_datasheet
-from printhammer.cli.verbs.map import map_
-from printhammer.cli.verbs.measure import measure
-from printhammer.cli.verbs.paper import figure, paper
-from printhammer.cli.verbs.quality import print_, quality
-from printhammer.cli.verbs.run import run
-from printhammer.cli.verbs.strobe import lyapunov, orbits, strobe
-from printhammer.cli.verbs.studio import studio, warm
-from printhammer.cli.verbs.sweep import sweep
-from printhammer.cli.verbs.tune import learn, tune
 from printhammer.errors import PrinthammerError
 
-VERBS: Final[tuple[Verb, ...]] = (
-    *(run, figure, paper, map_, strobe, orbits, bifurcation, basins, continue_, curve, lyapunov),
-    *(print_, energy, feedback, quality, tune, learn, dead_time, impact_time, duty),
-    *(studio, sweep, measure, warm),
-    *(hammer.show, hammer.check, hammer.schema, hammer.list_shipped, from_datasheet),
-    *(fit.magnet, fit.solenoid, fit.spring, fit.pack, fit.backstop, fit.motion, fit.coil),
-)
+MODULES: Final = {
+    "run": "run",
+    "figure": "paper",
+    "paper": "paper",
+    "map": "map",
+    "strobe": "strobe",
+    "orbits": "strobe",
+    "bifurcation": "bifurcation",
+    "basins": "bifurcation",
+    "continue": "continuation",
+    "curve": "continuation",
+    "lyapunov": "strobe",
+    "print": "quality",
+    "energy": "drives",
+    "feedback": "drives",
+    "quality": "quality",
+    "tune": "tune",
+    "learn": "tune",
+    "dead-time": "coil",
+    "impact-time": "coil",
+    "duty": "coil",
+    "studio": "studio",
+    "sweep": "sweep",
+    "measure": "measure",
+    "warm": "studio",
+    "hammer show": "hammer",
+    "hammer check": "hammer",
+    "hammer schema": "hammer",
+    "hammer list": "hammer",
+    "hammer from-datasheet": "hammer",
+    "fit magnet": "fit",
+    "fit solenoid": "fit",
+    "fit spring": "fit",
+    "fit pack": "fit",
+    "fit backstop": "fit",
+    "fit motion": "fit",
+    "fit coil": "fit",
+}
+"""Module in `printhammer.cli.verbs` of each verb.
 
-GROUPS: Final = {"hammer": (hammer.GROUP, None), "fit": (fit.GROUP, fit.EXAMPLE)}
-"""Help text and example of each group of two-word verbs, by the first word of the verb."""
-
+The first word of a verb with two words is its group, which has a module of the same name, with a help text
+`GROUP` and optionally an `EXAMPLE`.
+"""
 
 BAD_INPUT: Final = 2  # Exit status, by convention of command lines
 _COLUMNS: Final = 76
@@ -57,6 +77,7 @@ _COLUMNS: Final = 76
 HELP: Final = (
     "A laboratory for impact print hammers: motion, contacts, dots, and the claims of Hendriks (1983)."
 )
+EXAMPLE: Final = "printhammer run hendriks-1983 --rate '1.2 kHz' --pulses 9"
 
 # Exception of typer for an invalid command line; not every version of typer gives it a public name.
 _REFUSED: Final[type[Exception]] = typer.BadParameter.__mro__[2]
@@ -89,6 +110,28 @@ def _shown(example: str | None) -> str | None:
     return " \\\n".join(lines)
 
 
+def _module(name: str) -> ModuleType:
+    return import_module(f"printhammer.cli.verbs.{name}")
+
+
+def verb_of(name: str) -> Verb:
+    """Return the verb with the given name, a key of `MODULES`."""
+    values = vars(_module(MODULES[name])).values()
+    return next(value for value in values if isinstance(value, Verb) and value.name == name)
+
+
+def groups_of(names: Iterable[str]) -> dict[str, tuple[str, str | None]]:
+    """Return help text and example of each group of the named verbs, by the name of the group."""
+    groups = dict.fromkeys(name.partition(" ")[0] for name in names if " " in name)
+    return {group: (_module(group).GROUP, getattr(_module(group), "EXAMPLE", None)) for group in groups}
+
+
+def program_of(names: Iterable[str] = MODULES) -> typer.Typer:
+    """Build the program with the named verbs, by default with all of them."""
+    names = list(names)
+    return build_program("printhammer", HELP, EXAMPLE, map(verb_of, names), groups_of(names))
+
+
 def build_program(
     name: str, text: str, example: str, verbs: Iterable[Verb], groups: Mapping[str, tuple[str, str | None]]
 ) -> typer.Typer:
@@ -113,14 +156,12 @@ def build_program(
     return program
 
 
-app: Final = build_program(
-    "printhammer", HELP, "printhammer run hendriks-1983 --rate '1.2 kHz' --pulses 9", VERBS, GROUPS
-)
-
-
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run a command line, by default the arguments of the process, and exit."""
-    run_program(app, "printhammer", arguments)
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    # Help, and the answer to an unknown word, need all verbs.
+    known = [name for name in (" ".join(words[:count]) for count in (1, 2)) if name in MODULES]
+    run_program(program_of(known or MODULES), "printhammer", words)
 
 
 def _advice(message: str, error: Exception) -> str:

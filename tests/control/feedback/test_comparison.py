@@ -10,7 +10,7 @@ from tests import hammers
 from tests.errors import refused
 
 import printhammer as ph
-from printhammer.cli.main import VERBS, main
+from printhammer.cli.main import main, verb_of
 from printhammer.control.feedback.closed_loop import FeedbackStrategy
 from printhammer.control.feedback.comparison import Feedback
 from printhammer.control.feedback.controller import Controller
@@ -236,7 +236,7 @@ def test_the_example_in_the_help_runs(
 
     monkeypatch.setattr("printhammer.control.feedback.comparison.Controller", controller)
     monkeypatch.chdir(tmp_path)
-    (example,) = [verb.example for verb in VERBS if verb.name == "feedback"]
+    example = verb_of("feedback").example
     with pytest.raises(SystemExit) as end:
         main(shlex.split(example)[1:])
     assert end.value.code == 0

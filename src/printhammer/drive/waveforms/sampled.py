@@ -19,7 +19,6 @@ from printhammer.drive.waveforms.base import QUANTITY_UNITS, QuantityName, Wavef
 from printhammer.errors import InputError
 from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import folder_of
-from printhammer.support.tables.readings import read_table
 
 _UNITS: Final[dict[str, str]] = {name: si for si, name in QUANTITY_UNITS.items()}
 _HEADINGS: Final = "'time [us],current [A]' or 'time [us],force [N]'"
@@ -96,6 +95,9 @@ def read_csv(path: Path) -> Samples:
         The file cannot be read, is empty, lacks units, contains something other than finite numbers at
         increasing times, or the drive is not zero before time 0.
     """
+    # Most hammers have no table; the reader of tables takes time to import.
+    from printhammer.support.tables.readings import read_table
+
     what = str(path)
     table = read_table(path, {"time": "s"}, optional=_UNITS, what="the sampled waveform")
     table.check_times()

@@ -14,7 +14,6 @@ from printhammer.errors import InputError
 from printhammer.parts.base import MagnetPart
 from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import folder_of
-from printhammer.support.tables.readings import read_table
 
 UNITS: Final = {"force": "N", "linkage": "Wb"}
 """SI unit of each quantity that a table may hold."""
@@ -100,6 +99,9 @@ def read_csv(path: Path, quantity: str) -> Grid:
         The file cannot be read, is empty, lacks a unit, contains anything but finite numbers, or does not
         contain a complete grid.
     """
+    # Most hammers have no table; the reader of tables takes time to import.
+    from printhammer.support.tables.readings import read_table
+
     columns = {"displacement": "m", "current": "A", quantity: UNITS[quantity]}
     table = read_table(path, columns, what=f"the {quantity} table")
     points = zip(*(table.values[name].tolist() for name in columns), strict=True)

@@ -18,7 +18,6 @@ from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationInfo, 
 from printhammer.errors import InputError
 from printhammer.parts.spring.forces import BACK, FRONT, MOST_SAMPLES, Row
 from printhammer.support.constants import folder_of, quantity
-from printhammer.support.tables.readings import read_table
 
 GRAVITY: Final = 9.80665
 """Standard acceleration of free fall, m/s^2: 3rd General Conference on Weights and Measures (1901)."""
@@ -148,6 +147,9 @@ def _samples_of(path: Path) -> tuple[tuple[float, float], ...]:
     Raises InputError if the table cannot be read, or has fewer than two samples, more than `MOST_SAMPLES`, or
     two samples at the same displacement.
     """
+    # Most hammers have no table; the reader of tables takes time to import.
+    from printhammer.support.tables.readings import read_table
+
     where = str(path)
     table = read_table(path, {"displacement": "m", "force": "N"}, what="the sampled force")
     x, force = table.values["displacement"], table.values["force"]
