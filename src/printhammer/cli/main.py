@@ -111,7 +111,7 @@ def _shown(example: str | None) -> str | None:
 
 
 def _module(name: str) -> ModuleType:
-    return import_module(f"printhammer.cli.verbs.{name}")
+    return import_module(f".verbs.{name}", __package__)
 
 
 def verb_of(name: str) -> Verb:
