@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 import pytest
-from tests.truth.impact_orbits import BouncingBall, LinearImpacts
+from tests.truth.impact_orbits import BouncingBall, DampedImpacts, LinearImpacts
 
 import printhammer as ph
 from printhammer.chaos import BifurcationCurve, Branch
@@ -179,6 +179,48 @@ def test_grazing_of_an_undamped_oscillation_at_a_rigid_stop() -> None:
         ("resonant grazing", 3): pytest.approx(1.5, abs=1e-8),
     }
     assert [point.message for point in curve.points].count("resonant grazing of 2 passages") == 1
+
+
+def fold_of(omega: float) -> float:
+    """The fold of the orbits of `shaw-holmes-1983` with one impact in two periods of the force.
+
+    The squared amplitude of the force is quadratic in the A of an orbit; the fold is its minimum.
+    """
+    case = DampedImpacts(omega, -0.1, 0.8, 0.1, 2)
+    gain = 0.1 / case.grazing
+    square = (gain * case.orbit(1.0)[0]) ** 2 - 1.1**2
+    return 0.1 * math.sqrt(square / (1.0 + square)) / gain
+
+
+@pytest.mark.slow
+def test_a_fold_of_two_periods_has_no_cusp_and_ends_at_the_resonant_grazing() -> None:
+    """Within wide bounds of the force a cusp was listed that the closed form has not."""
+    rate = 2.6 / TURN
+    assert fold_of(2.6) == pytest.approx(0.087142997638, abs=1e-12)
+    branch = ph.continuation(
+        ph.load("shaw-holmes-1983"),
+        "drive.amplitude",
+        (0.0863, 0.0880),
+        drive=ph.SineForce(0.08715, rate, phase=0.5 * math.pi),
+        state=(0.06975, 0.1598),
+        firings=2,
+        phase=0.2649,
+    )
+    curve = ph.bifurcation_curve(branch, "rate", (1.2 / TURN, 2.9 / TURN), event="fold", first=(0.0005, 50.0))
+    assert sorted(stop.reason for stop in curve.stops) == ["bound", "grazing"]
+    (point,) = curve.points
+    # Two periods of the force are one free oscillation there.
+    own = math.sqrt(1.0 - 0.25 * 0.1**2)
+    assert (point.kind, TURN * point.second) == ("resonant grazing", pytest.approx(2.0 * own, abs=1e-7))
+    omega = TURN * curve.second
+    inner = omega > 2.0 * own + 2e-3
+    assert inner.sum() > 20
+    np.testing.assert_allclose(curve.first[inner], [fold_of(each) for each in omega[inner]], rtol=1e-8)
+    np.testing.assert_allclose(
+        np.prod(curve.multipliers, axis=1).real, 0.64 * np.exp(-0.2 * TURN / omega), rtol=1e-6
+    )
+    # No two points are the same.
+    assert np.hypot(np.diff(curve.first), np.diff(omega)).min() > 1e-7
 
 
 def test_grazing_of_a_pack() -> None:

@@ -134,6 +134,21 @@ def test_a_dot_by_itself_is_that_of_the_single_pulse(hammer: ph.Hammer) -> None:
     assert found.good.all()
 
 
+@pytest.mark.slow
+def test_a_slow_device_prints_the_last_dot_of_every_wire() -> None:
+    """HAMMER has 107 dots in the font of nine wires; the window of a fast device lost seven of them."""
+    embosser = ph.load("braille-embosser")
+    pattern = Pattern.from_text("HAMMER")
+    assert pattern.wanted == int(pattern.dots.sum()) == 107
+    found = print_page(embosser, pattern, 20.0)
+    assert found.printed.all()
+    assert not found.lost.any()
+    # Each dot by itself is that of a single run: the device is at rest long before the next slot.
+    (dot,) = ph.simulate(embosser, ph.PulseTrain(embosser.waveform)).dots
+    assert dot.flight_time is not None
+    np.testing.assert_allclose(found.flight_time, dot.flight_time, rtol=1e-3)
+
+
 def test_darkness_follows_the_force() -> None:
     np.testing.assert_allclose(darkness([0.0, 1.0, 2.0]), [0.0, 0.9, 0.99])
 
