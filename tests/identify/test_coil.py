@@ -330,12 +330,25 @@ def test_saturation_and_resistance_from_two_places_of_a_locked_armature(tmp_path
 
 
 @pytest.mark.slow
-def test_a_shipped_magnet_gives_its_resistance(tmp_path: Path) -> None:
-    wire = ph.load("impact-wire")
-    options = {"sensor": {"sampling_rate": "100 kHz"}, "duration": "1 ms"}
-    fit = ph.fit("coil", record(wire, tmp_path / "wire.csv", **options), hammer=wire)
+@pytest.mark.parametrize(
+    ("name", "ohms", "options"),
+    [
+        ("impact-wire", 6.0, {"duration": "1 ms"}),
+        ("dot-peen", 5.0, {"duration": "12 ms"}),
+        ("braille-embosser", 6.0, {"duration": "20 ms"}),
+    ],
+)
+def test_a_shipped_magnet_gives_its_resistance(
+    tmp_path: Path, name: str, ohms: float, options: dict[str, str]
+) -> None:
+    """From a guess 10 % off; the magnet has an inductance of its own, beside which none is fitted."""
+    hammer = ph.load(name)
+    path = record(hammer, tmp_path / "locked.csv", sensor={"sampling_rate": "100 kHz"}, **options)
+    fit = ph.fit("coil", path, hammer=hammer.replace("coil.resistance", 1.1 * ohms))
     assert list(fit.constants) == ["coil.resistance"]
-    assert abs(fit["coil.resistance"].value - 6.0) < 3.0 * fit["coil.resistance"].standard_error < 0.3
+    assert (
+        abs(fit["coil.resistance"].value - ohms) < 3.0 * fit["coil.resistance"].standard_error < 0.05 * ohms
+    )
     assert not fit.rejected
 
 
