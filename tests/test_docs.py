@@ -1,5 +1,6 @@
 """The documentation: what it names exists, it builds without a warning, it fetches nothing from elsewhere."""
 
+import os
 import re
 import subprocess
 import sys
@@ -118,6 +119,23 @@ def test_the_code_on_a_page_runs(page: Path, tmp_path: Path, monkeypatch: pytest
         run_apart(path, tmp_path)
     else:
         run_here(path, tmp_path, monkeypatch)
+
+
+@pytest.mark.slow
+def test_the_code_in_the_readme_passes_mypy(tmp_path: Path) -> None:
+    path = tmp_path / "snippet.py"
+    path.write_text("\n".join(BLOCK.findall((ROOT / "README.md").read_text("utf-8"))), "utf-8")
+    assert "import printhammer" in path.read_text("utf-8")
+    options = ["--strict", "--follow-imports=silent", "--cache-dir", str(tmp_path / "cache")]
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", *options, path],
+        cwd=tmp_path,
+        env={**os.environ, "MYPYPATH": str(ROOT / "src")},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 class Requests(HTMLParser):
