@@ -163,6 +163,17 @@ def test_a_heading_that_begins_with_the_sampling_is_refused(tmp_path: Path) -> N
         read(tmp_path, "Start\tCH1 (V)\tA\n0\t1\t2\n")
 
 
+def test_a_long_table_keeps_every_row_and_names_the_line_of_a_fault(tmp_path: Path) -> None:
+    count = 200_000
+    rows = [f"{k};{k % 7},5" for k in range(count)]
+    found = read(tmp_path, "\n".join(["time [us];current [mA]", *rows]))
+    np.testing.assert_allclose(found.values["time"], 1e-6 * np.arange(count), rtol=1e-14)
+    np.testing.assert_allclose(found.values["current"], 1e-3 * (np.arange(count) % 7 + 0.5), rtol=1e-14)
+    rows[-1] = f"{count};"
+    with refused("current", file=f"trace.csv: line {count + 1}"):
+        read(tmp_path, "\n".join(["time [us];current [mA]", *rows]))
+
+
 def test_a_name_with_brackets_is_no_unit(tmp_path: Path) -> None:
     with refused("i(t)"):
         read(tmp_path, "time [us],i(t)\n0,0\n1,1\n")
