@@ -197,7 +197,7 @@ def smoothed(path: Path, seed: int, bandwidth: float) -> Path:
 
 @pytest.mark.slow
 def test_a_bandwidth_is_declared_or_rejects_the_law(tmp_path: Path) -> None:
-    """From 10 to 300 kHz; an interval of 95 % misses 6 of 30 truths once in 700 tries."""
+    """From 10 to 300 kHz; an interval of 95 % misses 6 of 30 truths once in 300 tries."""
     keys, covered, moved, rejected = ("coil.resistance", "coil.inductance"), 0, 0, 0
     for seed in range(15):
         bandwidth = 1e4 * 30.0 ** np.random.default_rng(seed).uniform()
@@ -218,7 +218,7 @@ def test_a_bandwidth_is_declared_or_rejects_the_law(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_records_of_eight_bits_are_not_rejected(tmp_path: Path) -> None:
-    """Fewer than 20 of 24 intervals of 95 % that contain the truth would come once in 180 tries."""
+    """Fewer than 20 of 24 intervals of 95 % that contain the truth would come once in 170 tries."""
     coarse = {**RECORD, "noise": {"current": "1 mA"}, "resolution": {"current": "10 mA"}}
     covered = rejected = 0
     for seed in range(12):
