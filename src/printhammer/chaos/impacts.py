@@ -1,8 +1,9 @@
-"""Impact maps, Poincaré sections at the impacts on backstop or pack, and statistics of impact trains.
+"""Impact maps: Poincaré sections at the impacts on backstop or pack; and statistics of impact trains.
 
 At a touch the displacement is that of the surface, so that the remaining state variables are the velocity and
-the time since the last firing. From touch to touch, these two variables follow an iterated map, like the
-strobe map from firing to firing, with a section that the armature itself defines.
+the time since the last firing. These two variables follow an iterated map from touch to touch. The map is the
+analogue of the strobe map, with a section defined by the position of the armature instead of the time of
+firing.
 
 *Statistics of an impact train.*
 

@@ -169,7 +169,7 @@ class AxisTables:
         return replace(self, tables=tuple(tables))
 
     def size(self, tick: float | str = NANOSECOND) -> int:
-        """Return the size of the C header's arrays, bytes, for a timer tick (s, or text with a unit)."""
+        """Return the size, in bytes, of the C header's arrays for a timer tick (s, or text with a unit)."""
         times = {name: np.stack([getattr(table, name) for table in self.tables]) for name in COLUMNS}
         bits, first = bits_of(times, checked_tick(tick)), self.tables[0]
         return size_of(first.rates.size, times[COLUMNS[0]].shape[-1], bits, len(self.values))

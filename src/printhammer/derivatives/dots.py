@@ -178,7 +178,7 @@ def _acceleration(problem: Problem, row: FloatArray, *without: int) -> float:
 
 
 class Changes(Declared):
-    """Derivatives of the quantities of the dots and of the run with respect to the scaled constants."""
+    """Derivatives of the dot quantities and of the run's energies with respect to the scaled constants."""
 
     dots: FloatArray = part(
         "derivatives of `DOT_QUANTITIES`, shape (dots, quantities, n)",

@@ -50,7 +50,9 @@ _ROUNDS: Final = 9  # Rounds of refinement, so that a maximum is located to 1e-9
 
 
 def table(rows: Iterable[Sequence[float]], end: float) -> FloatArray:
-    """Build a read-only segment table, shape (segments + 1, 6), without segments that are empty by rounding.
+    """Build a read-only segment table, shape (segments + 1, 6).
+
+    Segments that have zero duration due to rounding are removed.
 
     Rows ``(start, kind, p0, p1, p2, p3)`` are in ascending order of start; a first start above 0 gets a zero
     segment before it. The end of the support, s, is ``inf`` for a drive that never ends.

@@ -47,7 +47,10 @@ def put(table: Any, row: int, start: float, kind: float, p0: float, p1: float, p
 
 
 def close(table: Any, rows: int, end: float) -> int:
-    """Remove the segments that are empty by rounding, and append the end, s; return the number of rows."""
+    """Remove segments that have zero duration due to rounding, and append the end time, s.
+
+    Return the number of rows.
+    """
     kept = 0
     for row in range(rows):
         if table[row, 0] < (table[row + 1, 0] if row + 1 < rows else end):

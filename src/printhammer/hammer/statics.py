@@ -68,7 +68,7 @@ class Statics(NamedTuple):
     rigid: bool
     """Whether the backstop is rigid."""
     rigid_front: bool
-    """Whether the front is a rigid stop."""
+    """Whether the front of the pack is a rigid stop."""
     memory: bool
     """Whether the force of the pack depends on its largest past indentation."""
     has_magnet: bool

@@ -1,4 +1,4 @@
-"""Fit the constants of a coil circuit to records of its current under a voltage.
+"""Fit the constants of a coil circuit to records of its current while a voltage is applied.
 
   current(t) = solution of the equation of motion and the coil circuit, as seen by the current probe
 

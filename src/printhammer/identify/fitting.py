@@ -28,7 +28,7 @@ def fit(
         magnetic circuit of the law `reluctance` from forces and inductances over the gap; "spring": Bs, As
         from forces of the spring alone; "pack": the stiffness from load cycles; "backstop": l/k, and l, from
         rebounds; "motion": mass, damping and so on from records of single shots; "coil": resistance,
-        inductance and so on from records of the current under a voltage.
+        inductance and so on from records of the current while a voltage is applied.
     path : path, or sequence of path
         The table, CSV with units in its heading; several for "motion" and "coil", and for "magnet" optionally
         a second table without currents, for the spring alone.

@@ -132,7 +132,7 @@ class Solution(Declared, eq=False):
 
     @property
     def weights(self) -> FloatArray:
-        """Weights proportional to 1 / variance, the largest 1, shape (m,)."""
+        """Weights proportional to 1 / variance, scaled so that the largest is 1, shape (m,)."""
         weights: FloatArray = self.variance.min() / self.variance
         return weights
 

@@ -154,7 +154,7 @@ class Fit(Result):
     )
     residual_scale: float = scalar("", "standard deviation of the noise in the data", more="SI")
     weights: FloatArray = column(
-        "1", "weight, proportional to 1 / variance", "datum", more="the largest is 1"
+        "1", "weight, proportional to 1 / variance", "datum", more="scaled so that the largest is 1"
     )
     outliers: BoolArray = column("1", "whether the datum was excluded as an outlier", "datum")
     condition_number: float = scalar(

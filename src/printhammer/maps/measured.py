@@ -8,8 +8,8 @@ Two layouts of CSV tables are accepted, each with units in the heading, SI or an
 - one row per sample: the columns ``rate [Hz],time [us],displacement [um]``, in any order;
 - one row per time: ``time [us]``, then one column per rate, such as ``500 Hz [um],1.2 kHz [um]``.
 
-Times count from the first firing. Rows may be in any order, and each rate may have different times. An empty
-cell, or nan, is a gap.
+Times are measured from the first firing. Rows may be in any order, and each rate may have different times. An
+empty cell, or nan, is a missing value.
 """
 
 from __future__ import annotations

@@ -168,7 +168,7 @@ class PackPart(Part):
 
     @property
     def rigid(self) -> bool:
-        """Whether the front is a rigid stop, at which the armature rebounds without a pack force."""
+        """Whether the pack's front is a rigid stop, from which the armature rebounds without a pack force."""
         return bool(self.function("RIGID_FRONT"))
 
 

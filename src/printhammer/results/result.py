@@ -272,7 +272,7 @@ def stacked(results: Sequence[Result], dim: str, kind: type[Result]) -> Entries:
     Parameters
     ----------
     results : sequence of Result
-        Results of one class; may be empty.
+        Results of one class, or an empty sequence.
     dim : str
         Name of the new dimension, which is the first dimension of every array.
     kind : type

@@ -52,7 +52,10 @@ _TIMES: Final = "member strobe"
 
 
 class Strobes(Result):
-    """States of all members at requested times, NaN-padded and NaN after the end of a run."""
+    """States of all members at their requested times.
+
+    Entries are NaN after the end of a run, and as padding for members with fewer requested times.
+    """
 
     t: FloatArray = column("s", "time", _TIMES)
     x: FloatArray = column("m", "displacement", _TIMES)

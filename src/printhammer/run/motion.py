@@ -179,7 +179,7 @@ class Motion(Result, fields=False):
 
     @property
     def driven(self) -> Literal["current", "force"]:
-        """Kind of drive: "current" through the coil (also under a voltage), or "force" on the armature."""
+        """Kind of drive: "current" through the coil (also for voltage drives), or "force" on the armature."""
         return "force" if self.drive.quantity == "force" else "current"
 
     def driven_at(self, t: npt.ArrayLike) -> FloatArray:
@@ -358,7 +358,7 @@ class Motion(Result, fields=False):
         return f"motion of {self.hammer.name}, {self.start:.9g} s to {self.end:.9g} s"
 
     def summary(self) -> Summary:
-        """Summarise dots, status, peak, contacts and energies."""
+        """Summarise dots, status, largest displacement, contacts and energies."""
         lost = len(self.dots) - sum(dot.struck for dot in self.dots)
         state = judged(self.ok, "ok" if self.ok else self.status, "bad")
         missing = f", {styled('bad', f'{lost} lost')}" if lost else ""

@@ -192,8 +192,8 @@ class Problem:
     """Hammer under a drive, ready for integration.
 
     `state` is displacement, m, and velocity, m/s, at the time `start`, s. The tolerance is the error of
-    one step, in units of the stroke and of a typical speed. In the pack and under a voltage the state has
-    further components, `beyond`.
+    one step, in units of the stroke and of a typical speed. In the pack, and under a voltage drive, the state
+    has further components, `beyond`.
     """
 
     max_steps: int | None = None

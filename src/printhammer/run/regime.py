@@ -93,7 +93,7 @@ class Firing(TypedDict, total=False):
 
 
 class Fired(Firing, Keywords):
-    """Keyword arguments that specify the firing of a hammer and the effort."""
+    """Keyword arguments for the firing of a hammer, and for tolerance, threads and progress."""
 
 
 class FiredAtFixedTolerance(Firing, AtFixedTolerance):
@@ -206,10 +206,10 @@ class Regime(Declared):
 
     @property
     def is_planar(self) -> bool:
-        """Whether displacement and velocity are the complete state at a section without coil current.
+        """Whether displacement and velocity are the complete state at a section with zero coil current.
 
-        The state has further components under a voltage, if the coil has a shorted turn or the supply a
-        capacitor.
+        Under a voltage drive, the state has further components if the coil has a shorted turn or the supply
+        has a capacitor.
         """
         if self.fired.quantity != "voltage":
             return True

@@ -58,11 +58,12 @@ def simulate(
         End of the run, s, or text with a unit; by default the window of the device after the last firing
         (`printhammer.run.window`), and required for a drive that does not end.
     state : sequence of float or str, optional
-        Displacement, m, and velocity, m/s, or text with units, at time 0; by default the rest state. In the
-        pack, mode and memory follow, as in `printhammer.run.ensemble.Strobes`; under a voltage drive, then
-        the current in the coil, A, or the currents in the coil and in its shorted turn, A, and the voltage of
-        the supply's capacitor, V; by default there is no current, and the capacitor is charged.
-        `Motion.state_at` returns all components.
+        Displacement, m, and velocity, m/s, at time 0, as numbers or text with units; by default the rest
+        state. For a start inside the pack, mode and memory may be added, see
+        `printhammer.run.ensemble.Strobes`. With a voltage drive, the coil current, A, may be added, or three
+        values: the currents in the coil and in its shorted turn, A, and the voltage of the supply's
+        capacitor, V. By default the currents are zero and the capacitor is charged. `Motion.state_at` returns
+        all components.
     tolerance : float, optional
         Error tolerance of one step, in units of the distance from backstop to pack and of a typical speed.
     points : int, optional
@@ -191,8 +192,8 @@ class Touches(Declared):
 def touches_of(problem: Problem, surface: Surface, after: float, end: float, most: int) -> Touches:
     """Integrate up to `most` touches of a surface, or to the end of the run; return the touches.
 
-    Touches count from the time `after`, s, up to the `end` of the run, s; a contact that is open at the start
-    of the run does not count.
+    Only touches between the time `after`, s, and the `end` of the run, s, count; a contact that is already
+    open at the start of the run does not count.
     """
 
     def take(stretches: Iterator[Stretch]) -> Touches:

@@ -1,6 +1,6 @@
 """Initial state of a run: the rest state, or a validated state.
 
-The state includes branch and memory in the pack, and the coil currents under a voltage; see `Beyond`.
+The state includes branch and memory in the pack, and the coil currents for a voltage drive; see `Beyond`.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ _EXPORT: Final = re.compile(r"^export (?=(async )?function|const|let|class)", re
 
 _BLOCK: Final = 16
 _SHORTEST: Final = 32  # Arbitrary
-"""Minimum length of a copy, bytes; shorter copies do not improve the compression."""
+"""Minimum length of a copy, in bytes; shorter copies do not improve the compression."""
 
 
 @lru_cache

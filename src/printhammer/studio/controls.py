@@ -236,7 +236,7 @@ def vocabulary() -> dict[str, Any]:
 
 
 def _field(shape: type[Waveform], name: str) -> dict[str, Any]:
-    """Describe a constant of a pulse shape for its control."""
+    """Describe a constant of a pulse shape for its input field on the page."""
     note = quantities(shape)[name]
     return {
         "name": name,

@@ -1,6 +1,6 @@
-"""Type checks of public functions for arguments that are a hammer, a drive, a waveform or a path.
+"""Type checks for the arguments of public functions: hammer, drive, waveform or path.
 
-A name in place of a hammer, or two arguments swapped, is an `InputError` that names the argument.
+Passing a name instead of a hammer, or swapping two arguments, raises an `InputError` that names the argument.
 """
 
 from __future__ import annotations

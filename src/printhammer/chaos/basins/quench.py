@@ -280,8 +280,8 @@ def quench_map(
 def two_pulse_drives(first: Waveform, seconds: Sequence[Waveform], last: float) -> list[TwoPulseDrive]:
     """Build one drive per second pulse: `first`, then that second pulse; runs last at most `last` s.
 
-    A run begins at the time `begin` of its drive, in the rest state; times, s, count from there. The second
-    pulse is fired after half of `last`; `with_firings` sets other times.
+    A run begins in the rest state at the time `begin` of its drive, from which times, s, are measured. The
+    second pulse is fired after half of `last`; `with_firings` sets other times.
     """
     largest = max(first.peak, *(second.peak for second in seconds))
     # A power of two, so that sums of it with other times are rounded the same way everywhere.

@@ -1,9 +1,9 @@
 """Bifurcation diagram: states at the firings, windows of one classification, and routes to chaos.
 
 A window is an interval of the parameter in which all computed trains have the same classification. A value
-represents the interval half-way to its neighbours, so that the widths of the windows add up to the range. The
-diagram cannot show windows between two neighbouring values. A route is the series of windows before the first
-strange train; it shows whether period doublings lead to chaos.
+represents the interval that reaches halfway to its neighbours, so that the widths of the windows add up to
+the range. The diagram cannot show windows between two neighbouring values. A route is the series of windows
+before the first strange train; it shows whether period doublings lead to chaos.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Window(Declared):
     period: int = part("period q in firings; 0 if aperiodic")
     low: float = part("smallest value")
     high: float = part("largest value")
-    width: float = part("width of the window, up to half-way to the neighbouring values")
+    width: float = part("width of the window, which reaches halfway to the neighbouring values")
     columns: int = part("number of values")
 
 

@@ -188,7 +188,7 @@ def _reversed(nodes: list[Node]) -> list[Node]:
 def _half(
     follower: Corrector, start: Node, bounds: tuple[float, float], steps: Steps, watch: Watch | None
 ) -> tuple[list[Node], Stop]:
-    """Follow a curve in one direction from its start node; return the following nodes and the stop."""
+    """Follow a curve in one direction from its start node; return the further nodes and the `Stop`."""
     nodes: list[Node] = []
     here, length = start, steps.first
     home = follower.point(start)

@@ -4,7 +4,7 @@ A branch is a curve of periodic orbits. Its Floquet multipliers show where and h
 its sequence of contacts shows where a contact appears or vanishes, a grazing. The contact forces of the
 paper's pack and backstop begin smoothly, with the powers 2.7 and 1.5 of the depth, so that the strobe map is
 differentiable at a grazing and the branch continues. With a rigid backstop the map has a kink at a grazing: a
-branch ends at its first grazing, which the stop reports.
+branch ends at its first grazing, which is reported as the reason for stopping.
 """
 
 from __future__ import annotations

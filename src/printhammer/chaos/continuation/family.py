@@ -44,7 +44,10 @@ def cyclic(surfaces: Iterable[str]) -> str:
 
 
 class Touch(Declared):
-    """Contact that begins within the period of an orbit; times count from the firing before the section."""
+    """Contact that begins within one period of an orbit.
+
+    Times are measured from the last firing before the section.
+    """
 
     surface: Surface = part('"pack" or "backstop"')
     t_in: float = scalar("s", "time of touch")

@@ -296,7 +296,7 @@ class Tracer:
         return end is not None and bool(np.abs((end - node.state) / self.scales[:2]).max() < _SHORTER)
 
     def merged(self, shorter: list[RegimeFamily], here: Node, ahead: Node) -> Stop:
-        """Build the stop of a branch whose last step jumped to an orbit of fewer firings.
+        """Build the `Stop` of a branch whose last step jumped to an orbit of fewer firings.
 
         Near a period doubling the curves of both periods are so close that a step may jump between them.
         """

@@ -50,7 +50,10 @@ _ACROSS: Final = (0.02, 0.98)  # Arbitrary
 
 
 class StabilityChart(Result):
-    """Stability chart: curves that bound the stable region of an orbit, and periods of trains from rest."""
+    """Stability chart: curves that bound the stable region of an orbit, and a grid of trains from rest.
+
+    The grid shows, for trains that start from rest, the number of firings after which the motion repeats.
+    """
 
     regime: Regime = part("hammer and periodic drive of the original branch")
     names: tuple[str, str] = scalar("", "names of the two parameters")

@@ -110,10 +110,11 @@ class Orbit(Result):
         more="from one integration of the whole period",
     )
     contacts: Rows[Contact] = part(
-        "all contacts that begin in one period of the orbit; times count from the first firing", repr=False
+        "all contacts that begin in one period of the orbit; times are measured from the first firing",
+        repr=False,
     )
     dots: Rows[Dot] = part(
-        "dot of each firing; times count from the first firing",
+        "dot of each firing; times are measured from the first firing",
         more="empty under a continuous periodic force",
         repr=False,
     )

@@ -25,7 +25,7 @@ def figure(
     out: Path = opt.folder("Output folder for the figure files.", default=Path("build/figures")),
     scheme: str = opt.choice(
         "exact|runge-kutta-4|trapezoid",
-        "Integrator for Fig. 11: exact, or one of the two schemes of 1983.",
+        "Integrator for Fig. 11: exact, or one of the two schemes of the 1983 paper.",
         default="exact",
     ),
     reading: str = opt.choice(

@@ -34,7 +34,7 @@ _record = partial(opt.file, panel=_FILES)
         "tolerance": opt.TOLERANCE,
         "scheme": opt.choice(
             "default|trapezoid|runge-kutta-4",
-            "Integrator: the default, or one of the two schemes of 1983.",
+            "Integrator: the default, or one of the two schemes of the 1983 paper.",
             default="default",
         ),
         "points": opt.whole("Number of time points of the saved motion."),

@@ -69,7 +69,10 @@ _MOST_RATES: Final = 2000  # Largest number of rates of a table; arbitrary
     "tune",
     "printhammer tune hendriks-1983 --rate 1.3kHz --history 2 --out table.csv --out table.h",
     {
-        "rate": opt.text("RATE", "Dot slots per second, e.g. 1.3kHz (default: all rates)."),
+        "rate": opt.text(
+            "RATE",
+            "Dot slots per second, e.g. 1.3kHz (default: a grid up to the highest usable rate).",
+        ),
         "rates": opt.rates_between(
             "Rates of the table, instead of --rate, e.g. '1.2 kHz, 1.4 kHz, 41'.", _MOST_RATES
         ),

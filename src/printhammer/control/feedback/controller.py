@@ -240,7 +240,7 @@ class Controller:
             self._push(loop, pulse, float(release[k]), back)
             pulse.switch(loop.touch + ahead[k].fire, 0.0)
             self._throw(loop, loop.touch, ahead[k])
-            # For a late throw, the contact reveals the front in time to decide again.
+            # For a late throw, the contact reveals the position of the pack's front in time to decide again.
             over = printed.touch + CONTACT * self.single.flight_time + _PATIENCE
             unsure = learned.front_error > KNOWN and loop.pulses[-1].fired > over
             loop.printed = printed if unsure else None

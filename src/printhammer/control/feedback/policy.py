@@ -129,7 +129,7 @@ _SPEED_DOUBT: Final = 0.04  # Standard deviation of the estimated speed of a tou
 # Derivative of the next touch time with respect to speed, s / (m/s), where no finite difference is available;
 # arbitrary
 _STEEPEST: Final = 2e-3
-_NEAR: Final = 2  # Number of speed nodes to either side among which the steepest slope is searched; arbitrary
+_NEAR: Final = 2  # Number of speed nodes on either side that are searched for the steepest slope; arbitrary
 _FAST: Final = 0.3  # Residual speed after a landing that costs 1, m/s; arbitrary
 _STEEP: Final = 8.0  # Weight of the sixth power of a deviation relative to its square; arbitrary
 _EFFORT: Final = 0.1  # Cost of the largest return current over a whole period; arbitrary

@@ -32,7 +32,7 @@ from printhammer.support.arrays import FloatArray
 from printhammer.support.roots import bisect
 
 _POINTS: Final = 4001  # Quadrature points over the displacement; arbitrary
-_CURRENTS: Final = 17  # Currents among which the largest force is searched; arbitrary
+_CURRENTS: Final = 17  # Number of currents that are searched for the largest force; arbitrary
 _SPEEDS: Final = 32  # Impact speeds at the backstop; arbitrary
 _STROBES: Final = 4001  # Samples of each undriven rebound; arbitrary
 

@@ -369,7 +369,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return header_text(self._head, self.rates, rounded._times, rounded.multiplier, unit)
 
     def size(self, tick: float | str = NANOSECOND) -> int:
-        """Return the size of the C header's arrays, bytes, for a timer tick (s, or text with a unit)."""
+        """Return the size, in bytes, of the C header's arrays for a timer tick (s, or text with a unit)."""
         bits = bits_of(self._times, checked_tick(tick))
         return size_of(self.rates.size, entries_of(self.gaps, self.reach), bits)
 

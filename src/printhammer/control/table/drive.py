@@ -111,9 +111,10 @@ def history_text(history: Sequence[int]) -> str:
 
 
 def growing_text(multipliers: FloatArray, rates: FloatArray, gaps: int, reach: int) -> str:
-    """Name the histories whose repetition amplifies errors or has no periodic orbit; may be empty.
+    """Describe the histories whose repetition amplifies errors or has no periodic orbit, in one sentence.
 
-    `multipliers` has the shape (rates, entries). All NaN is a table without multipliers.
+    The text is empty if there are no such histories. `multipliers` has the shape (rates, entries); if all are
+    NaN, the table has no multipliers.
     """
     if np.isnan(multipliers).all():
         return ""

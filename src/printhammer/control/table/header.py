@@ -34,7 +34,7 @@ _PLACE_BYTES: Final = 4
 
 _ROUNDING: Final = 1e-9  # Rounding tolerance of a whole number; arbitrary
 _MULTIPLIER_BYTES: Final = 2
-"""Size of a multiplier in a C header, bytes, by definition: thousandths as integers of 16 bits."""
+"""Size of a multiplier in a C header, in bytes, by definition: thousandths as integers of 16 bits."""
 
 _ADVANCE, _, _DELAY, _BRAKE = range(len(COLUMNS))
 
@@ -46,7 +46,10 @@ def bits_of(times: Mapping[str, FloatArray], tick: float) -> int:
 
 
 def size_of(rates: int, entries: int, bits: int, values: int = 0) -> int:
-    """Return the size of a C header's arrays, bytes, for numbers of rates, entries and axis values."""
+    """Return the size, in bytes, of the arrays in a C header with given numbers of rates and entries.
+
+    `values` is the number of values of the second axis; 0 without a second axis.
+    """
     each = len(COLUMNS) * bits // 8 + 1 + _MULTIPLIER_BYTES
     return max(values, 1) * rates * entries * each + _PLACE_BYTES * (rates + values)
 

@@ -131,9 +131,9 @@ class Sampled(Waveform):
     """Measured record: interpolated samples, zero before the first sample and after the last.
 
     The file is a CSV with units in its heading, ``time [us],current [A]`` or ``time [us],force [N]``; times
-    count from the firing, are not negative and increase. Between samples the curve is a straight line
-    or a shape-preserving cubic (PCHIP: Fritsch and Carlson, SIAM J. Numer. Anal. 17 (1980) 238, with the
-    slopes of Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300), which is once continuously
+    are measured from the firing, are not negative, and increase. Between samples the curve is a straight
+    line or a shape-preserving cubic (PCHIP: Fritsch and Carlson, SIAM J. Numer. Anal. 17 (1980) 238, with
+    the slopes of Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300), which is once continuously
     differentiable and does not overshoot.
     """
 

@@ -62,7 +62,7 @@ def maker() -> dict[str, str]:
 
 
 def read(folder: Path) -> list[dict[str, Any]]:
-    """Return the record of a folder: compile times in s, by kind of code, for each `maker()`."""
+    """Read the compile times [s] recorded in a folder, by kind of code, for each result of `maker`."""
     with suppress(OSError, ValueError, TypeError, KeyError):
         entries = json.loads((folder / FILE).read_bytes())["makers"]
         return [

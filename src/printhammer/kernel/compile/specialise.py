@@ -53,7 +53,10 @@ class Kernel:
             code.with_it = tuple(other for other in codes.values() if other is not code)
 
     def __getattr__(self, name: str) -> Any:
-        """Return an entry point, compiled if necessary; `begin_ahead` may compile more of them."""
+        """Return an entry point, compiled if necessary.
+
+        Meanwhile, a second process started by `begin_ahead` may compile other functions.
+        """
         try:
             entry = self.__dict__["_entries"][name]
         except KeyError:

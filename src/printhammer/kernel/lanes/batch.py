@@ -61,7 +61,7 @@ class Kept(NamedTuple):
     strobe_starts, strobe_times
         Start index of each member, and the concatenated, ascending strobe times [s] of all members.
     grid : float64 array, shape (T,)
-        Ascending output times of the displacement [s]; may be empty.
+        Ascending output times of the displacement [s]; empty if no displacements are requested.
     want_dots : bool
         Whether to fill `dots`.
     status, reached, steps : array, shape (M,)

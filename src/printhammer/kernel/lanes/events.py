@@ -217,7 +217,7 @@ def note_strobes(
 
 @compiled
 def enter_contact(pool: Any, i: int, v: float, slot: Any, control: Any) -> int:
-    """Start a backstop contact at zero compression with velocity `v` [m/s]; return the contact pool."""
+    """Start a backstop contact at zero compression with velocity `v` [m/s]; return the pool of contacts."""
     unit = contact_unit(v, control)
     slot[R.UNIT] = unit
     pool[R.X * R.BLOCK + i] = 0.0
@@ -301,7 +301,7 @@ def after_switch(
     hammer: Hammer,
     control: Any,
 ) -> int:
-    """Update a member after a switching event; return its new pool, or LEAVES if it leaves the lanes."""
+    """Update a member after a switching event; return the index of its new pool of lanes, or LEAVES."""
     remember_step(pool, i, which, slot)
     pool[R.T * R.BLOCK + i] = t
     if switch == M.REVERSAL:

@@ -102,7 +102,7 @@ def begin_member(
     control: Any,
     slot: Any,
 ) -> int:
-    """Write the initial state of a member into a lane; return its pool, or LEAVES for the scalar kernel."""
+    """Write the initial state of a member into a lane; return the index of its pool of lanes, or LEAVES."""
     t, x, v = state[0], state[1], state[2]
     scale = control[0] / control[1]
     slot[R.FREE_STEP] = 0.02 * scale
@@ -144,7 +144,7 @@ def begin_member(
 
 @inlined
 def step_block(which: int, pool: Any, begin: int) -> None:
-    """Advance every lane of a block by one step, idle lanes included, with the step function of its pool."""
+    """Advance all lanes of a block by one step, idle lanes included, with the step function of their pool."""
     if which == R.FREE_POOL:
         free_block(pool, begin)
     elif which == R.LOADING_POOL:
@@ -166,7 +166,11 @@ def look_after(
     under_way: Any,
     live: Any,
 ) -> int:
-    """Handle the event of a lane after a step; return the next pool of the member, or a code."""
+    """Handle the event at which a lane stopped after a step.
+
+    Return the index of the pool of lanes in which the member continues (one pool per mode of motion), or
+    STAYS (in its lane), LEAVES (the scalar kernel repeats the run) or DONE (the run is complete).
+    """
     m = int(slot[R.MEMBER])
     row = batch.hammer_of[m]
     hammer, control = batch.hammers[row], control_of(batch, row)

@@ -144,7 +144,10 @@ def along(y: Point, h: float, slope: Point) -> Point:
 
 @inlined
 def point(t: float, place: float, v: float, drive: Drive) -> Point:
-    """Return the state vector of time, displacement or w, velocity, and the electric state of the drive."""
+    """Return the state vector: time, place, velocity and, with a coil circuit, the electric state.
+
+    `place` is the displacement or, in the regularised equations of a backstop contact, w = sqrt(b - x).
+    """
     if HAS_CIRCUIT:
         electric = drive[1]
         return t, place, v, electric[0], electric[1], electric[2]

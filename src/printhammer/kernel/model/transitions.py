@@ -31,7 +31,7 @@ TRANSITIONS: Final = (
     (M.RELOADING, M.REACHED_PEAK, M.LOADING, AT_PEAK),
     (M.LOADING, M.REVERSAL, M.UNLOADING, TURN),
     (M.RELOADING, M.REVERSAL, M.UNLOADING, TURN),
-    # A reversal on the front itself ends the contact; elsewhere the forces decide.
+    # A reversal exactly at the front of the pack ends the contact; elsewhere the forces decide.
     (M.RELOADING, M.REVERSAL, M.FREE, AT_FRONT),
     (M.UNLOADING, M.REVERSAL, M.UNLOADING, TURN),
     (M.UNLOADING, M.REVERSAL, M.RELOADING, TURN),

@@ -42,7 +42,7 @@ def write_states(strobes: Any, front: float, states: Any, branches: Any) -> None
 
 
 def class_of(agreed: int, settled: int, value: float, error: float, smooth: bool, rests: int) -> int:
-    """Classify a motion by its strobe states and its Lyapunov exponent; return its period or a code.
+    """Classify a motion by its strobe states and its Lyapunov exponent; return its period or verdict code.
 
     Parameters
     ----------

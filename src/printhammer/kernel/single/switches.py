@@ -141,7 +141,11 @@ def rebound(
 
 @inlined
 def reach_front(state: State, setup: Setup, nodes: Any, contacts: Any) -> None:
-    """Update the run state when the armature reaches the front: rebound, or a contact on inward motion."""
+    """Update the run state when the armature reaches the front of the pack.
+
+    The armature rebounds from a rigid front. Otherwise a contact begins if the armature moves, or is pushed,
+    into the pack.
+    """
     v = max(state[C.VELOCITY], 0.0)
     state[C.VELOCITY] = v
     if RIGID_FRONT:

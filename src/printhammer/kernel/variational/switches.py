@@ -107,7 +107,7 @@ def add_energies(columns: Any, k: int, later: float, before: Any, behind: Any) -
 
 @inlined
 def rebound_at(front: bool, v_in: float, hammer: Hammer) -> float:
-    """Return the velocity after an impact on the rigid surface, the front or the backstop [m/s]."""
+    """Return the velocity [m/s] after an impact on a rigid surface: the pack's front or the backstop."""
     if RIGID_FRONT and front:
         return pack_rebound(hammer[PACK:BACKSTOP_PART], v_in)
     return backstop_rebound(hammer[BACKSTOP_PART:MAGNET], v_in)

@@ -44,7 +44,7 @@ Lowered templates hold the sizes and offsets of structures as numbers, computed 
 with this alignment the numbers stay correct.
 """
 _STACK: Final = 1 << 20
-"""Size of the stack, bytes; several times the stack use of an entry point."""
+"""Size of the stack, in bytes; several times the stack use of an entry point."""
 
 
 @cache
