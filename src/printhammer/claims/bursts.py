@@ -47,13 +47,13 @@ def independent_at_low_rate(context: Context, claim: Claim) -> Measured:
 
 
 def rates_of(settings: Mapping[str, Any]) -> list[float]:
-    """Return the ascending grid of firing rates, Hz, that a claim's settings define."""
+    """Return the ascending grid of firing rates [Hz] that a claim's settings define."""
     first, last, step = (settings[name] for name in ("first_rate_Hz", "last_rate_Hz", "rate_step_Hz"))
     return [float(first + step * k) for k in range(round((last - first) / step) + 1)]
 
 
 def onsets(context: Context) -> dict[str, float]:
-    """Find the lowest rate, Hz, of each of three events: flight times vary, forces vary, a dot is lost.
+    """Find the lowest rate [Hz] of each of three events: flight times vary, forces vary, a dot is lost.
 
     The keys are "flight_time", "force" and "lost"; the key of an event that does not occur up to the first
     lost dot is absent.
@@ -218,7 +218,7 @@ def weak_prints_when_hung_up(context: Context, _claim: Claim) -> Measured:
 
 
 def later_impacts(motion: Motion) -> list[tuple[float, bool]]:
-    """Return the peak force, N, of each pack contact after the first, and whether the contact is distinct.
+    """Return the peak force [N] of each pack contact after the first, and whether the contact is distinct.
 
     An impact is distinct if at most one pulse was fired since the preceding contact: several pulses that
     together lift the armature cause a single impact.

@@ -137,22 +137,22 @@ class Context:
         return result
 
     def dots(self, drives: Sequence[Drive], tail: float = TAIL) -> DotTable:
-        """Simulate many drives, each until `tail`, s, after its last firing; return the table of dots."""
+        """Simulate many drives, each until `tail` [s] after its last firing; return the table of dots."""
         result = self.ensemble(drives, [float(drive.times[-1]) + tail for drive in drives], dots=True)
         assert result.dots is not None
         return result.dots
 
     def pulses(self, times: Iterable[float], duration: float) -> Motion:
-        """Simulate single pulses fired at given times, s, from rest."""
+        """Simulate single pulses fired at given times [s], from rest."""
         return self.run(PulseTrain(self.waveform, at=list(times)), duration)
 
     def train(self, rate: float, pulses: int, tail: float = TAIL) -> Motion:
-        """Simulate a pulse train at a rate, Hz, from rest, until `tail`, s, after its last firing."""
+        """Simulate a pulse train at a rate [Hz] from rest, until `tail` [s] after its last firing."""
         drive = PulseTrain(self.waveform, rate=rate, pulses=pulses)
         return self.run(drive, float(drive.times[-1]) + tail)
 
     def strobe_train(self, period: float, points: int) -> Motion:
-        """Simulate a pulse train of a given period, s, from rest to the firing of the last strobe point."""
+        """Simulate a pulse train of a given period [s], from rest to the firing of the last strobe point."""
         drive = PulseTrain(self.waveform, period=period, pulses=points)
         return self.run(drive, float(drive.times[-1]))
 

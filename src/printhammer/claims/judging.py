@@ -234,7 +234,7 @@ _ZOOMS: Final = 6  # Refinements of the grid; arbitrary
 
 
 def largest(function: Callable[[FloatArray], FloatArray], start: float, end: float) -> float:
-    """Estimate the maximum of a function of time, s, over an interval by repeated grid refinement."""
+    """Estimate the maximum of a function of time [s] over an interval by repeated grid refinement."""
     best = -np.inf
     for _ in range(_ZOOMS if end > start else 1):
         grid = np.linspace(start, end, _POINTS)

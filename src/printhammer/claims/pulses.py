@@ -240,7 +240,7 @@ def two_pulses_700us(context: Context, claim: Claim) -> Measured:
 
 
 def second_coil_work(context: Context, interval: float) -> float:
-    """Compute the coil work on the armature, J, due to the second of two firings `interval`, s, apart."""
+    """Compute the coil work [J] on the armature due to the second of two firings `interval` [s] apart."""
     both, first = context.pulses([0.0, interval], interval + TAIL), context.pulses([0.0], interval)
     return both.energy.coil_work - first.energy.coil_work
 

@@ -168,7 +168,7 @@ def elastomer_backstop(context: Context, claim: Claim) -> Measured:
 
 
 def _impact(context: Context, hammer: Hammer, speed: float) -> Motion:
-    """Simulate the impact of the armature on the backstop at a given speed, m/s, without current."""
+    """Simulate the impact of the armature on the backstop at a given speed [m/s], without current."""
     drive = PulseTrain(context.waveform, at=[_NEVER])
     return context.attempt(drive, CYCLE, hammer=hammer, state=(context.position, speed))
 

@@ -62,7 +62,7 @@ def panel_strobes(context: Context) -> list[Strobe]:
 
 
 def variants(context: Context, periods: list[float]) -> dict[str, list[Verdict]]:
-    """Classify trains of given periods, s, for each variant of constants and tolerance."""
+    """Classify trains of given periods [s] for each variant of constants and tolerance."""
     hammers = [context.hammer, *(changed(context.hammer, sign) for sign in _CHANGED.values())]
     every = strobes(
         [hammer for hammer in hammers for _ in periods],
@@ -129,7 +129,7 @@ def poincare(context: Context, claim: Claim) -> Measured:
 
 @dataclass(frozen=True)
 class Stretch:
-    """Interval of successive strobe times, s, in descending order, with one classification."""
+    """Interval of successive strobe times [s], in descending order, with one classification."""
 
     name: str
     longest: float
@@ -138,7 +138,7 @@ class Stretch:
 
 
 def stretches(periods: Sequence[float], names: Sequence[str]) -> list[Stretch]:
-    """Group a scan of strobe times, s, in descending order, into intervals with one classification."""
+    """Group a scan of strobe times [s], in descending order, into intervals with one classification."""
     every = []
     for name, group in itertools.groupby(zip(periods, names, strict=True), key=lambda item: item[1]):
         times = [period for period, _ in group]

@@ -127,7 +127,7 @@ def groups_of(names: Iterable[str]) -> dict[str, tuple[str, str | None]]:
 
 
 def program_of(names: Iterable[str] = MODULES) -> typer.Typer:
-    """Build the program with the named verbs, by default with all of them."""
+    """Build the program with the named verbs, by default with all verbs."""
     names = list(names)
     return build_program("printhammer", HELP, EXAMPLE, map(verb_of, names), groups_of(names))
 

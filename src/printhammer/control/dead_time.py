@@ -217,7 +217,7 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
 
     @property
     def reached(self) -> float:
-        """Largest impact speed, m/s, attainable at all grid points; 0 if a grid point has no impact."""
+        """Largest impact speed [m/s] attainable at all grid points; 0 if a grid point has no impact."""
         return 0.0 if np.isnan(self.strongest).any() else float(self.strongest.min())
 
     def to_header(self) -> str:
@@ -363,7 +363,7 @@ def _fire(hammer: Hammer, pulse: Waveform, span: float, tolerance: float) -> _Fi
 def _same_blow(
     hammer: Hammer, pulse: Waveform, wanted: float, longest: _Fired, tolerance: float
 ) -> float | None:
-    """Solve for the pulse width, s, that gives an impact speed, m/s; None without a solution.
+    """Solve for the pulse width [s] that gives an impact speed [m/s]; None without a solution.
 
     The search ends at the flight time of the longest pulse, since current after the impact has no effect.
     """
@@ -387,7 +387,7 @@ def _same_blow(
 
 
 def _shortest(pulse: Waveform, width: float) -> float:
-    """Return the smallest valid pulse width, s, in the sequence `width`, 2 `width`, 4 `width`, ..."""
+    """Return the smallest valid pulse width [s] in the sequence `width`, 2 `width`, 4 `width`, ..."""
     for doubling in range(2 * _DOUBLINGS):
         with suppress(InputError):
             of_width(pulse, width * 2.0**doubling)

@@ -80,7 +80,7 @@ class DotHeat:
         return 1.0 / self.on_time if self.on_time > 0.0 else math.inf
 
     def at(self, temperature: float) -> float:
-        """Return the coil heat per dot, J, at a winding temperature, degC."""
+        """Return the coil heat [J] per dot at a winding temperature [degC]."""
         shares = [
             heat / _share(self.feed, place) for heat, place in zip(self.heat, self.temperature, strict=True)
         ]
@@ -302,7 +302,7 @@ def thermal_duty(
 
 
 def steady(coil: ThermalCoil, heat: DotHeat, ambient: float, rate: float) -> float:
-    """Solve for the steady winding temperature, degC, at a dot rate, Hz; inf above `HOTTEST`."""
+    """Solve for the steady winding temperature [degC] at a dot rate [Hz]; inf above `HOTTEST`."""
 
     def excess(temperature: float) -> float:
         return rate * heat.at(temperature) * coil.whole - (temperature - ambient)

@@ -247,7 +247,7 @@ class ImpactEstimator:
 
     @cached_property
     def _filters(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Trial shifts of the touch within a window, s, with filter weights and the norms of the weights."""
+        """Trial shifts of the touch within a window [s], with filter weights and the norms of the weights."""
         offsets = self.step * (np.arange(self._size) - self._before)
         grid = max(self.step / PHASES, self.contact / _FINEST)
         count = math.ceil(_AROUND * self.contact / grid)
@@ -387,7 +387,7 @@ class Sampling(Declared):
         return math.hypot(self.noise, self.step / math.sqrt(12.0))
 
     def of(self, motion: Motion) -> FloatArray:
-        """Return the exact coil current, A, or coil voltage, V, at the output times of a motion."""
+        """Return the exact coil current [A] or coil voltage [V] at the output times of a motion."""
         values = motion.current if self.signal == "current" else motion.voltage
         return np.asarray(values, np.float64)
 

@@ -56,7 +56,7 @@ def peak_current(hammer: Hammer, pulse: Waveform) -> float:
 
 
 def fading_current(hammer: Hammer, pulse: Waveform, share: float) -> float:
-    """Return the decay time, s, from the end of a driver's pulse to `share` times the peak current."""
+    """Return the decay time [s] from the end of a driver's pulse to `share` times the peak current."""
     own: Any = pulse
     for doubling in range(_DOUBLINGS):
         times, current = _course(hammer, pulse, _SPAN * 2.0**doubling)
@@ -72,7 +72,7 @@ def fading_current(hammer: Hammer, pulse: Waveform, share: float) -> float:
 
 
 def _course(hammer: Hammer, pulse: Waveform, span: float) -> tuple[FloatArray, FloatArray]:
-    """Simulate a pulse from rest; return times, s, and absolute currents, A, for `span` pulse widths."""
+    """Simulate a pulse from rest; return times [s] and absolute currents [A], for `span` pulse widths."""
     own: Any = pulse
     end = span * own.width
     times = np.linspace(0.0, end, _SAMPLES)
@@ -94,7 +94,7 @@ def widest(
     halvings: int,
     peak: Callable[[Waveform], float] = lambda pulse: pulse.peak,
 ) -> float:
-    """Bisect for the largest pulse width, s, at which the peak current stays within a bound, A.
+    """Bisect for the largest pulse width [s] at which the peak current stays within a bound [A].
 
     The search covers the widths from `low` to `high`. The bound is assumed to hold at `low`, which is
     returned if the bound holds at no larger width. `peak` maps a pulse to its largest current, A.

@@ -114,7 +114,7 @@ def _end(record: Record, contact: Contact) -> float:
 
 
 def _peak_time(problem: Problem, record: Record, contact: Contact) -> float:
-    """Refine the time of largest indentation, s, by Newton's method on the velocity."""
+    """Refine the time [s] of largest indentation by Newton's method on the velocity."""
     t = contact.t_peak
     for _ in range(3):
         row = problem.resample(record, np.array([t]))[0]
@@ -156,7 +156,7 @@ def _force_time(problem: Problem, record: Record, contact: Contact, t_peak: floa
 
 
 def _stationary_time(problem: Problem, record: Record, t: float, step: float) -> float:
-    """Find the time near `t`, s, at which the pack force is stationary, by the secant method.
+    """Find the time near `t` [s] at which the pack force is stationary, by the secant method.
 
     A comparison of forces would locate the time to only half of the digits.
     """
@@ -238,7 +238,7 @@ class _Look:
         return self.flow.states[row], self.flow.changes[row]
 
     def later(self, columns: FloatArray, surface: str, v: float) -> FloatArray:
-        """Differentiate the time, s, at which the armature passes a surface at the speed `v`, m/s."""
+        """Differentiate the time [s] at which the armature passes a surface at the speed `v` [m/s]."""
         return np.asarray(-(columns[0] - surface_moves(self.wanted)[surface]) / v)
 
     def dot(self, dot: Struck, contacts: Sequence[Contact]) -> dict[str, FloatArray]:

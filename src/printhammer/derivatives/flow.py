@@ -222,7 +222,7 @@ def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
 
 
 def _released(hammer: Hammer, push: float, before: float) -> float:
-    """Return the net force, N, after a jump `push` of the force on a resting armature; 0 if still at rest.
+    """Return the net force [N] after a jump `push` of the force on a resting armature; 0 if still at rest.
 
     `before` is the sum of the forces, N, that a stop or friction balances until the jump.
     """
@@ -281,7 +281,7 @@ def surface_moves(wanted: Sequence[Parameter]) -> dict[str, FloatArray]:
 def pack_push_changes(
     problem: Problem, wanted: Sequence[Parameter], state: FloatArray, changes: FloatArray
 ) -> FloatArray:
-    """Return the derivatives of the pack force, N, with respect to n constants, shape (n,).
+    """Return the derivatives of the pack force [N] with respect to n constants, shape (n,).
 
     `state` is a row of `Flow.states` inside the pack; `changes`, shape (3 or more, n), are the derivatives of
     displacement, velocity and latest local maximum in this state.
@@ -307,7 +307,7 @@ def pack_push_rate(problem: Problem, record: Record, t: float) -> float:
 
 
 def _push_change(problem: Problem, moves: FloatArray, state: FloatArray, change: FloatArray) -> float:
-    """Return the derivative of the pack force, N, in the direction of a change of constants and state."""
+    """Return the derivative of the pack force [N] in the direction of a change of constants and state."""
     x, v, mode, peak = (float(number) for number in state[:4])
     dx, dv, dp = (float(number) for number in change)
     # A step must neither leave the pack nor change the indentation by much.

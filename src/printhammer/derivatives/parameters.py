@@ -95,7 +95,7 @@ def parameters(hammer: Hammer, drive: Drive, names: Sequence[str]) -> list[Param
 
 
 def rest_changes(hammer: Hammer, wanted: Sequence[Parameter]) -> FloatArray:
-    """Compute the gradient of the rest displacement, m, with respect to the scaled constants, shape (n,)."""
+    """Compute the gradient of the rest displacement [m] with respect to the scaled constants, shape (n,)."""
     changes = np.zeros(len(wanted))
     for k, parameter in enumerate(wanted):
         # The supply does not affect the state of rest.

@@ -226,7 +226,7 @@ def state_rows(problem: Problem, mode: float, electric: int = 3) -> list[int]:
 
 
 def state_of(row: FloatArray) -> tuple[float, float, float]:
-    """Return displacement, m, velocity, m/s, and latest local maximum, m, from a row of `Flow.states`."""
+    """Return displacement [m], velocity [m/s] and latest local maximum [m] from a row of `Flow.states`."""
     return float(row[0]), float(row[1]), float(row[3])
 
 

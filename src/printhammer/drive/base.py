@@ -112,7 +112,7 @@ class Drive:
         return int((np.arange(len(self._times)) - ended).max()) + 1
 
     def value(self, t: npt.ArrayLike) -> FloatArray:
-        """Return the total current, A, or force, N, at times t, s; right-continuous, 0 before any firing."""
+        """Return the total current [A] or force [N] at times t [s]; right-continuous, 0 before any firing."""
         time = np.asarray(t, dtype=np.float64)
         latest = np.searchsorted(self._times, time, side="right") - 1
         total = np.where(np.isnan(time), np.nan, 0.0)

@@ -149,7 +149,7 @@ class PulseTrains(Sequence[PulseTrain]):
         overlap: Overlap = "add",
         start: float | str = 0.0,
     ) -> Self:
-        """Create pulse trains of equal length at constant rates, Hz, with the first firing at `start`, s."""
+        """Create pulse trains of equal length at constant rates [Hz]; the first firing is at `start` [s]."""
         grid = read_array(rates, "rates", "numbers, Hz", "Hz").reshape(-1)
         steps = np.arange(read_count(pulses, "pulses"), dtype=np.float64)
         with np.errstate(all="ignore"):

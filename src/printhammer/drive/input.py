@@ -58,7 +58,7 @@ def period_of_rate(rate: float | str) -> float:
 
 
 def read_start(value: float | str) -> float:
-    """Parse the time of the first firing, s, not negative; errors as for `read_number`."""
+    """Parse the time of the first firing [s], not negative; errors as for `read_number`."""
     number = read_number(value, "s", "start")
     if number < 0.0:
         raise InputError.of("start", value, "0 s or later")

@@ -60,7 +60,7 @@ class Sheet:
         return self.bottom - self.top
 
     def pixels(self, finest: float) -> tuple[float, int, int]:
-        """Return the pixel size, m, at least `finest`, and the numbers of rows and columns of pixels."""
+        """Return the pixel size [m], at least `finest`, and the numbers of rows and columns of pixels."""
         size = max(finest, (self.width * self.height / MOST_PIXELS) ** 0.5)
         return size, max(1, round(self.height / size)), max(1, round(self.width / size))
 
@@ -272,7 +272,7 @@ def _discs(
 
 
 def _in_points(ax: Axes, length: float) -> float:
-    """Convert a length on the paper, m, to points in the figure."""
+    """Convert a length [m] on the paper to points in the figure."""
     figure = ax.get_figure(root=True)
     assert figure is not None
     width, _height = figure.get_size_inches()

@@ -185,7 +185,7 @@ def release_current(hammer: HammerLike) -> float:
 
 
 def holding_margin(hammer: HammerLike, x: npt.ArrayLike) -> FloatArray:
-    """Return the force that holds the armature back at zero current, N, at displacements x, m.
+    """Return the force [N] that holds the armature back at zero current, at displacements x [m].
 
     The margin is minus the net force of magnet and spring, without contacts: positive where the net force
     drives the armature to the backstop. At rest it equals the force on the backstop. NaN outside the range of
@@ -220,7 +220,7 @@ def positive_intervals(hammer: HammerLike) -> list[tuple[float, float]]:
 
 
 def pull_reversals(hammer: HammerLike) -> list[float]:
-    """Return the displacements, m, at which the pull of a measured magnet changes sign, ascending.
+    """Return the displacements [m] at which the pull of a measured magnet changes sign, ascending.
 
     The pull is the force at the largest current of the table minus the force at zero current; the search runs
     from the backstop to the end of the table. The list is empty for a law that is not a table.

@@ -71,7 +71,7 @@ class StaticForce:
             self.end = min(self.high, self.front + getattr(hammer.pack, "thickness", 0.0))
 
     def free(self, x: float, current: float = 0.0) -> float:
-        """Compute the net force of magnet and spring, N, without contacts; NaN outside the magnet's range."""
+        """Compute the net force [N] of magnet and spring without contacts; NaN outside the magnet's range."""
         return free_force(x, current, self.statics)
 
     def total(self, x: float, current: float = 0.0) -> float:
@@ -87,7 +87,7 @@ class StaticForce:
         return float(self.statics.spring_force(self.statics.spring, x))
 
     def elastic(self, depth: float) -> float:
-        """Compute the elastic force of the backstop, N, at a compression depth, m."""
+        """Compute the elastic force [N] of the backstop at a compression depth [m]."""
         if depth <= 0.0 or self.rigid:
             return 0.0
         return float(self.statics.backstop_elastic(self.statics.backstop, math.sqrt(depth)))
@@ -131,7 +131,7 @@ class StaticForce:
         return sorted({place for place in places if self.low <= place <= self.high})
 
     def reach(self, far: float = FARTHER[0]) -> tuple[float, float]:
-        """Return the search interval for equilibria, m, within `far` of the origin."""
+        """Return the search interval for equilibria [m] within `far` of the origin."""
         return reach_of(far, self.statics)
 
 

@@ -84,7 +84,7 @@ class Statics(NamedTuple):
 
 
 def free_force(x: float, current: float, s: Statics) -> float:
-    """Return the net force of magnet and spring, N, without contacts."""
+    """Return the net force [N] of magnet and spring, without contacts."""
     return float(s.magnet_force(s.magnet, x, current)) + float(s.spring_force(s.spring, x))
 
 
@@ -100,12 +100,12 @@ def total_force(x: float, current: float, s: Statics) -> float:
 
 
 def force_at(x: float, about: tuple[float, Statics]) -> float:
-    """Return the net force, N, at a displacement, m; `about` is the pair of current, A, and statics."""
+    """Return the net force [N] at a displacement [m]; `about` is the pair of current [A] and statics."""
     return total_force(x, about[0], about[1])
 
 
 def nearest_level(x: float, s: Statics) -> float:
-    """Return the distance, m, from `x` to the nearest kink of the spring law other than `x`; or infinity."""
+    """Return the distance [m] from `x` to the nearest kink of the spring law other than `x`; or infinity."""
     nearest = math.inf
     k = 0.0
     level = float(s.spring_level(s.spring, k))
@@ -123,12 +123,12 @@ def origin_of(s: Statics) -> float:
 
 
 def limits_of(s: Statics) -> tuple[float, float]:
-    """Return the range of displacements, m, that the magnet law and rigid stops permit."""
+    """Return the range of displacements [m] that the magnet law and rigid stops permit."""
     return max(s.low, s.position) if s.rigid else s.low, min(s.high, s.front) if s.rigid_front else s.high
 
 
 def reach_of(far: float, s: Statics) -> tuple[float, float]:
-    """Return the search interval for equilibria, m, within `far` of the origin."""
+    """Return the search interval for equilibria [m] within `far` of the origin."""
     low, high = limits_of(s)
     origin = origin_of(s)
     if not math.isnan(s.platen):

@@ -117,7 +117,7 @@ def matching(chart: xr.Dataset, other: xr.Dataset) -> tuple[IntArray, IntArray]:
 
 
 def on_times(chart: xr.Dataset, row: int, times: FloatArray) -> FloatArray:
-    """Interpolate the displacement at one rate, m, at given times, s; NaN in gaps and outside the record."""
+    """Interpolate the displacement [m] at one rate at given times [s]; NaN in gaps and outside the record."""
     return interpolated(chart["time"].values, chart["displacement"].values[row], times)
 
 

@@ -173,10 +173,11 @@ class PackPart(Part):
 
 
 class BackstopPart(Part):
-    """Base class of backstops: `RIGID` and `backstop_rebound`, or `backstop_elastic`, `_viscous`, `_energy`.
+    """Base class of backstops.
 
-    A subclass has the constant `position`, the displacement at which the armature first touches the backstop,
-    m.
+    A rigid backstop defines `RIGID` and `backstop_rebound`; any other backstop defines `backstop_elastic`,
+    `backstop_viscous` and `backstop_energy`. A subclass has the constant `position`, the displacement, m, at
+    which the armature first touches the backstop.
     """
 
     role: ClassVar[str] = "backstop"

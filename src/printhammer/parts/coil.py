@@ -34,7 +34,7 @@ REFERENCE: Final = 20.0
 
 
 def warm_resistance(resistance: float, temperature: float) -> float:
-    """Return the resistance of a copper winding, ohm, at a temperature, degC."""
+    """Return the resistance [ohm] of a copper winding at a temperature [degC]."""
     return resistance * (1.0 + COPPER * (temperature - REFERENCE))
 
 

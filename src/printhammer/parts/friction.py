@@ -32,7 +32,7 @@ def damping_force(c: Any, v: float) -> float:
 
 
 def friction_force(c: Any, k: float) -> float:
-    """Return the kinetic (`k` = 0) or static (`k` = 1) friction force, N, at least 0."""
+    """Return the kinetic (`k` = 0) or static (`k` = 1) friction force [N], at least 0."""
     return float(c[1] if k == 0.0 else c[2])
 
 

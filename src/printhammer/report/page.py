@@ -208,7 +208,7 @@ def _best_view(best: BestFor, claim: Claim, hammer: Hammer) -> dict[str, Any]:
 
 
 def timings_view(report: Report) -> dict[str, Any]:
-    """Return the computation times of figures and claims, s, the slowest first."""
+    """Return the computation times [s] of figures and claims, the slowest first."""
     entries: list[tuple[str, str, float]] = [
         (f"Figure {drawing.number}", f"figure-{drawing.number}", drawing.seconds)
         for drawing in report.drawings

@@ -80,7 +80,7 @@ class Dot(Declared):
 
 
 def touches_of(record: Record) -> list[tuple[Literal["pack", "backstop"], float]]:
-    """Return surface and time, s, of every touch in a run; contacts open at the start are excluded."""
+    """Return surface and time [s] of every touch in a run; contacts open at the start are excluded."""
     return [
         ("pack" if int(row[0]) == PACK_SURFACE else "backstop", float(row[1]))
         for row in record.contacts
@@ -353,7 +353,7 @@ def _closings(name: str, contact: LinearContact, problem: Problem, record: Recor
 def _force_and_loss(
     contact: LinearContact, problem: Problem, record: Record, times: FloatArray
 ) -> tuple[float, float]:
-    """Return the largest force, N, and the loss, J, of a closing; `times` are the times of its nodes, s."""
+    """Return the largest force [N] and the loss [J] of a closing; `times` are the times [s] of its nodes."""
     starts, lengths = times[:-1, np.newaxis], np.diff(times)[:, np.newaxis]
     points, weights = np.polynomial.legendre.leggauss(_POINTS)
     places, shares = np.tile(0.5 * (points + 1.0), (len(starts), 1)), np.tile(0.5 * weights, (len(starts), 1))
@@ -363,7 +363,7 @@ def _force_and_loss(
         shares[-1], places[-1] = 2.0 * places[-1] * shares[-1], 1.0 - places[-1] ** 2
 
     def motion(at: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Compute indentations, m, and their rates, m/s, at given times, s."""
+        """Compute indentations [m] and their rates [m/s] at given times [s]."""
         states = problem.resample(record, at)
         return np.maximum(contact.sign * (states[:, 0] - contact.position), 0.0), contact.sign * states[:, 1]
 

@@ -52,7 +52,7 @@ class CoilWork(Declared):
 
 
 def coil_power(hammer: Hammer, x: FloatArray, v: FloatArray, magnet: FloatArray) -> FloatArray:
-    """Return the power of the coil, W, from displacement, m, velocity, m/s, and magnet force, N."""
+    """Return the power [W] of the coil from displacement [m], velocity [m/s] and magnet force [N]."""
     static = StaticForce(hammer)
     unexcited = np.array([static.magnet(place) for place in x.ravel().tolist()]).reshape(x.shape)
     return np.asarray((magnet - unexcited) * v)
@@ -81,7 +81,7 @@ def coil_work_of(problem: Problem, record: Record) -> CoilWork:
 
 
 def squared_current(drive: Drive, start: float, end: float) -> float:
-    """Integrate the square of the current of a drive from one time, s, to another, A^2 s."""
+    """Integrate the square of the current of a drive, in A^2 s, from one time [s] to another."""
     edges = np.unique(np.add.outer(drive.times, drive.segments()[:, 0]))
     inside = edges[(edges > start) & (edges < end)]
     total = []
@@ -104,7 +104,7 @@ def _gauss(drive: Drive, ends: FloatArray) -> float:
 
 
 def _stretches(problem: Problem, record: Record) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Split steps where the coil power changes sign; return index, start and end, s, of the pieces."""
+    """Split steps where the coil power changes sign; return index, start and end [s] of the pieces."""
     begins, finishes = record.nodes[:-1, 0], record.nodes[1:, 0]
     rows = np.flatnonzero(finishes > begins)
     begins, finishes = begins[rows], finishes[rows]

@@ -183,16 +183,16 @@ class Motion(Result, fields=False):
         return "force" if self.drive.quantity == "force" else "current"
 
     def driven_at(self, t: npt.ArrayLike) -> FloatArray:
-        """Return the current in the coil, A, or the force of the drive, N, at any times of the run, s."""
+        """Return the current in the coil [A] or the force of the drive [N] at any times of the run [s]."""
         return self._resampled(t)[:, 10] if self._problem.laws.circuit else self.drive.value(t)
 
     def curves_at(
         self, t: npt.ArrayLike
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, Mapping[str, FloatArray]]:
-        """Return all curves of a plot at the given times of the run, s, in one pass.
+        """Return all curves of a plot at the given times of the run [s], in one pass.
 
-        Displacement, m, velocity, m/s, current in the coil, A, or force of the drive, N, voltage across the
-        coil, V (zero unless the drive is a voltage), and the forces by name, N.
+        The curves are displacement, m, velocity, m/s, current in the coil, A, or force of the drive, N,
+        voltage across the coil, V (zero unless the drive is a voltage), and the forces, N, by name.
         """
         table = self._resampled(t)
         if self._problem.laws.circuit:
@@ -250,7 +250,7 @@ class Motion(Result, fields=False):
         return table[:, 0], table[:, 1]
 
     def state_at(self, t: float) -> tuple[float, ...]:
-        """Return the state at a time of the run, s, from which another run can start: see `simulate`.
+        """Return the state at a time [s] of the run, from which another run can start: see `simulate`.
 
         Displacement, m, velocity, m/s, branch of the pack (-1 outside the pack) and memory, m; under a
         voltage also the currents in the coil and in its shorted turn, A, and the voltage of the supply's
@@ -274,7 +274,7 @@ class Motion(Result, fields=False):
         return (*begun, *(row[[10, 14, 13]].tolist() if self._problem.laws.circuit else ()))
 
     def forces_at(self, t: npt.ArrayLike) -> Mapping[str, FloatArray]:
-        """Return the forces by name, N, at any times of the run, s."""
+        """Return the forces [N], by name, at any times of the run [s]."""
         return self._forces(self._resampled(t))
 
     @cached_property
@@ -324,18 +324,18 @@ class Motion(Result, fields=False):
 
     @cached_property
     def strobe(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Firing times inside the run, s, with displacement, m, and velocity, m/s, at each firing."""
+        """Firing times inside the run [s], with displacement [m] and velocity [m/s] at each firing."""
         times = self.drive.times
         times = np.array(times[(times >= self.start) & (times <= self.end)])
         return times, *self.at(times)
 
     @cached_property
     def maxima(self) -> tuple[FloatArray, FloatArray]:
-        """Times, s, and displacements, m, of all local maxima of the displacement."""
+        """Times [s] and displacements [m] of all local maxima of the displacement."""
         return extrema(self._problem, self._record, 1.0)
 
     def peak_after(self, firing: int) -> tuple[float, float] | None:
-        """Return time, s, and displacement, m, of the largest local maximum from a firing to the next.
+        """Return time [s] and displacement [m] of the largest local maximum from a firing to the next.
 
         The result is None without such a maximum; the displacement at the firing itself does not count.
         """

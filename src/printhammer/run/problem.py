@@ -45,7 +45,7 @@ _MOST_FLIGHTS: Final = 1e6  # Largest number of flights of that guess; arbitrary
 
 
 def live_size(firings: int) -> int:
-    """Return the length of the kernel's working array of active pulses, for a number of firings."""
+    """Return the length of the kernel's working array of active pulses, from the number of firings."""
     return 3 + 7 * firings
 
 
@@ -336,7 +336,7 @@ class Problem:
         return out
 
     def peaks(self, record: Record) -> FloatArray:
-        """Return time, s, depth, m, and force, N, at the peak of each contact, shape (m, 3)."""
+        """Return time [s], depth [m] and force [N] at the peak of each contact, shape (m, 3)."""
         out = np.empty((len(record.contacts), 3))
         self.kernel.peaks(record.contacts, record.nodes, self.drive_arrays(), self.constants, out)
         return out

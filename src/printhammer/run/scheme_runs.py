@@ -187,7 +187,7 @@ class SchemeProblem(Problem):
         return magnet, self._law("spring_force")(packed["spring"], x), pack, elastic, viscous, 0.0
 
     def peaks(self, record: Record) -> FloatArray:
-        """Return time, s, depth, m, and force, N, at the deepest step end of each contact, shape (m, 3)."""
+        """Return time [s], depth [m] and force [N] at the deepest step end of each contact, shape (m, 3)."""
         nodes = record.nodes
         out = np.zeros((len(record.contacts), 3))
         table = self.resample(record, nodes[:, 0])

@@ -78,7 +78,7 @@ def read_state(state: Sequence[Any]) -> tuple[float, ...]:
 
 
 def initial_state(hammer: Hammer, state: Sequence[float] | None) -> tuple[float, float]:
-    """Return displacement, m, and velocity, m/s, at the start of a run; by default the rest state.
+    """Return displacement [m] and velocity [m/s] at the start of a run; by default the rest state.
 
     Raises
     ------

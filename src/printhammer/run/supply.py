@@ -83,7 +83,7 @@ def coil_of(hammer: Hammer) -> Coil:
 
 
 def linkage(hammer: Hammer, x: float, current: float) -> float:
-    """Return the flux linkage of the main path of a coil, Wb, at a displacement, m, and a current, A."""
+    """Return the flux linkage [Wb] of the main path of a coil at a displacement [m] and a current [A]."""
     return main_linkage(x, current, coil_of(hammer))
 
 
@@ -101,7 +101,7 @@ def emf(hammer: Hammer, x: float, current: float) -> float:
 
 
 def current_of(hammer: Hammer, x: float, linkage: float, main: float) -> float:
-    """Return the coil current, A, from the flux linkages of the coil and of its main path, Wb."""
+    """Return the coil current [A] from the flux linkages of the coil and of its main path [Wb]."""
     coil = winding_of(hammer)
     if coil.turn_resistance:
         return (linkage - main) / (coil.leakage or 0.0)

@@ -70,7 +70,7 @@ class Single(NamedTuple):
 
 
 def least_wait(waveform: Waveform) -> float:
-    """Compute the smallest time from the last firing to the end of a run, s, for any device.
+    """Compute the smallest time [s] from the last firing to the end of a run, for any device.
 
     With a driver, the run ends 4 ms after switch-off; with a current or a force, 4 ms after the firing or, if
     later, at the end of the pulse.
@@ -79,7 +79,7 @@ def least_wait(waveform: Waveform) -> float:
 
 
 def wait_of(hammer: Hammer, waveform: Waveform | None = None) -> float:
-    """Compute the time from the last firing to the end of a run, s, by default for the hammer's waveform."""
+    """Compute the time [s] from the last firing to the end of a run, by default for the hammer's waveform."""
     pulse = hammer.waveform if waveform is None else waveform
     return CYCLE if pulse is None else window_of(hammer, pulse).wait
 
@@ -181,7 +181,7 @@ def is_enough(hammer: Hammer, seen: Single, wait: float) -> bool:
 
 
 def last_wait(hammer: Hammer, waveform: Waveform) -> float:
-    """Return the upper bound on the window, s, at which the search by doubling stops."""
+    """Return the upper bound [s] on the window, at which the search by doubling stops."""
     way, speed = scales_of(hammer, PulseTrain(waveform), (hammer.rest, 0.0))
     return last_window(least_wait(waveform), way, speed)
 
@@ -242,7 +242,7 @@ def is_held(mode: float) -> bool:
 
 
 def is_settled(window: Window, x: float, v: float, rest: float, front: float) -> bool:
-    """Whether an armature at x, m, with the velocity v, m/s, is at rest, by the thresholds of `is_enough`.
+    """Whether an armature at x [m] with the velocity v [m/s] is at rest, by the thresholds of `is_enough`.
 
     `front` is the front of the pack, m, or the rest position plus the reach of the motion.
     """

@@ -95,7 +95,7 @@ def rail_of(hammer: Hammer) -> dict[str, Any] | None:
 
 
 def _inductance(hammer: Hammer) -> float:
-    """Return the inductance, H, with which coil and magnet at rest have the time constant `_LAST`."""
+    """Return the inductance [H] with which coil and magnet at rest have the time constant `_LAST`."""
     current, width = _pulse(hammer)
     whole = _LAST * width * _RESISTANCE
     wound = hammer.replace("coil", {"resistance": _RESISTANCE, "inductance": whole})
@@ -103,7 +103,7 @@ def _inductance(hammer: Hammer) -> float:
 
 
 def _pulse(hammer: Hammer) -> tuple[float, float]:
-    """Return peak, A, and width, s, of the current pulse of a hammer, or the default `_PULSE`."""
+    """Return peak [A] and width [s] of the current pulse of a hammer, or the default `_PULSE`."""
     waveform = hammer.waveform
     width = getattr(waveform, "width", None)
     if waveform is None or waveform.quantity != "current" or width is None:

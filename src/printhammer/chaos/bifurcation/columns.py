@@ -217,7 +217,7 @@ def run_in_stretches(
 
 
 def _train(regime: Regime, firings: int, rest: bool) -> tuple[Drive, FloatArray]:
-    """Build the drive of a train; return drive and firing times, s, with one time beyond the last firing."""
+    """Build the drive of a train; return drive and firing times [s], with one time beyond the last firing."""
     if rest and regime.drive is None:
         drive = regime.pulses(firings + 2)
         return drive, drive.times[: firings + 1]

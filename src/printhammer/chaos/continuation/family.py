@@ -79,7 +79,7 @@ class Passage(Declared):
 
     @property
     def dots(self) -> list[tuple[float, float] | None]:
-        """Flight time, s, and impact speed, m/s, of the dot of each firing; None for a lost dot."""
+        """Flight time [s] and impact speed [m/s] of the dot of each firing; None for a lost dot."""
         dots: list[tuple[float, float] | None] = [None] * self.firings
         for touch in self.of("pack"):
             fired = math.floor(touch.t_in / self.period)

@@ -60,7 +60,7 @@ class Flight(Declared):
 def fly(
     regime: Regime, surface: Surface, phase: float, speed: float, firings: int, tolerance: float
 ) -> Flight:
-    """Compute the flight from an impact at a given drive phase and speed, m/s, over `firings` periods."""
+    """Compute the flight from an impact at a given drive phase and speed [m/s], over `firings` periods."""
     hammer = regime.hammer
     place = hammer.front if surface == "pack" else hammer.position
     assert place is not None

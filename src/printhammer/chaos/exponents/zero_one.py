@@ -1,6 +1,6 @@
-"""The 0-1 test for chaos in a series of numbers, which needs no tangent flow.
+"""The 0-1 test for chaos in a series of values, which needs no tangent flow.
 
-The numbers phi(1), phi(2), ... drive a point in a plane, each in a direction that advances by an angle c,
+The values phi(1), phi(2), ... drive a point in a plane, each in a direction that advances by an angle c,
 
     p_c(n) = sum of phi(j) cos(j c),   q_c(n) = sum of phi(j) sin(j c),   j = 1 ... n.
 
@@ -147,7 +147,7 @@ def zero_one(
 
     Periodic components make M_c(n) oscillate, which hides slow growth. The test of 2009 subtracts the
     contribution of the mean, (mean)^2 (1 - cos n c)/(1 - cos c). Here the mean is subtracted from the series
-    itself, which is equivalent in the limit and loses no digits. If a series nearly repeats every q numbers,
+    itself, which is equivalent in the limit and loses no digits. If a series nearly repeats every q values,
     the mean of every q-th number is subtracted, so that chaos within narrow bands is detected in short
     series, too.
 
@@ -159,7 +159,7 @@ def zero_one(
     Parameters
     ----------
     series : array, Strobe, Regime or Hammer
-        At least 100 numbers; or strobe points, whose displacements are used; or a regime, or a hammer with
+        At least 100 values; or strobe points, whose displacements are used; or a regime, or a hammer with
         the keywords `firing`, of which a thousand strobe points are computed after a thousand firings.
     resolution : float, optional
         Amplitude below which changes are ignored, in the unit of the series. By default 1e-12 of the largest
@@ -180,7 +180,7 @@ def zero_one(
     Raises
     ------
     InputError
-        The series is too short, is not one-dimensional or contains numbers that are not finite, or the
+        The series is too short, is not one-dimensional or contains values that are not finite, or the
         resolution is negative.
     """
     many = read_count(angles, "angles")
@@ -291,9 +291,9 @@ def without_cycle(numbers: FloatArray, resolution: float) -> tuple[int, FloatArr
 
 
 def _is_deterministic(rest: FloatArray, q: int) -> bool:
-    """Whether neighbours at the same phase of a cycle of q numbers remain neighbours one step later.
+    """Whether neighbours at the same phase of a cycle of q values remain neighbours one step later.
 
-    Neighbours are determined in two ways: by the numbers alone, or together with the preceding numbers.
+    Neighbours are determined in two ways: by the values alone, or together with the preceding values.
     """
     shares = []
     for before in (0, 1):

@@ -361,7 +361,7 @@ class _Run:
         return Motion(self.problem, self.record, end, times, "default")
 
     def at_firings(self) -> FloatArray:
-        """Return displacement, m, velocity, m/s, mode and memory, m, at each firing, one row per period.
+        """Return displacement [m], velocity [m/s], mode and memory [m] at each firing, one row per period.
 
         The first row belongs to the last firing at or before the section.
         """

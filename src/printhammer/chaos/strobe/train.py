@@ -127,7 +127,7 @@ class Train(Declared):
 
     @property
     def hammer(self) -> Hammer:
-        """Hammer that is fired."""
+        """Hammer of the train."""
         return self.regime.hammer
 
     @property
@@ -136,7 +136,7 @@ class Train(Declared):
         return self.regime.period
 
     def times(self, firings: IntArray) -> FloatArray:
-        """Return the times, s, of the firings with given numbers; the first firing is number 1."""
+        """Return the times [s] of the firings with given numbers; the first firing is number 1."""
         if len(self.drive.times) > 1:
             return np.asarray(self.drive.times[firings - 1], dtype=np.float64)
         return np.asarray(self.drive.times[0] + self.period * (firings - 1.0), dtype=np.float64)

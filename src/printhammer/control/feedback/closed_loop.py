@@ -29,7 +29,7 @@ _BRANCHES: Final = tuple(MODE_NAMES.index(name) for name in ("loading", "unloadi
 
 
 class Leg(NamedTuple):
-    """Stage of a closed-loop simulation: the hammer and the end time, s, of each run."""
+    """Stage of a closed-loop simulation: the hammer and the end time [s] of each run."""
 
     hammers: list[Hammer]
     ends: FloatArray

@@ -3,8 +3,8 @@
 F. Hendriks, *Bounce and Chaotic Motion in Impact Print Hammers* (1983), ends with the wish that "driving
 current waveforms ought to respond to the phase of the hammer motion and the pattern to be printed". This
 module tests the idea: a controller that knows the nominal hammer, and observes the real one with delay and
-noise, prints all patterns of eight slots, as does the open loop; then the two fire pairs of pulses at a range
-of gaps.
+noise, prints all patterns of eight slots, as does the open loop. Then controller and open loop fire pairs of
+pulses at a range of gaps.
 """
 
 from __future__ import annotations

@@ -145,7 +145,7 @@ class Controller:
         loop.since = fired + _CLEAR * start.flight
 
     def _fire(self, loop: Loop, time: float, width: float) -> None:
-        """Add a firing of full current at `time`, s, for `width`, s."""
+        """Add a firing of full current at `time` [s] for `width` [s]."""
         pulse = Pulse(time)
         pulse.switch(time, self.driver.current)
         pulse.switch(time + width, 0.0)
@@ -322,7 +322,7 @@ class Controller:
             pulse.switch(loop.touch + end, 0.0)
 
     def _landings(self, kind: Any, speed: FloatArray, front: FloatArray) -> list[FloatArray]:
-        """Interpolate release time, brake start and brake width, s, of soft landings after pack contacts."""
+        """Interpolate release time, brake start and brake width [s] for soft landings after pack contacts."""
         below, share = between(self.fronts.table, kind, speed)
         nearer, farther = between_fronts(front)
         settings = []
@@ -347,7 +347,7 @@ class Controller:
 
 
 def _steps(loops: Sequence[Loop]) -> tuple[FloatArray, FloatArray]:
-    """Return times, s, and heights, A, of all steps of the current command, shape (M, S), zero-padded."""
+    """Return times [s] and heights [A] of all steps of the current command, shape (M, S), zero-padded."""
     rows = []
     for loop in loops:
         steps = [
@@ -364,7 +364,7 @@ def _steps(loops: Sequence[Loop]) -> tuple[FloatArray, FloatArray]:
 
 
 def _current(at: FloatArray, height: FloatArray, edge: float, t: FloatArray) -> FloatArray:
-    """Return the current, A, at times t, shape (M, K), with first-order lag behind the command."""
+    """Return the current [A] at times t, shape (M, K), with first-order lag behind the command."""
     total = np.zeros_like(t)
     for k in range(at.shape[1]):
         since = np.maximum(t - at[:, k, np.newaxis], 0.0)

@@ -68,7 +68,7 @@ class FreeForce:
         )
 
     def __call__(self, x: FloatArray, current: FloatArray) -> FloatArray:
-        """Interpolate the force, N, at displacements, m, and currents, A, clipped to the table's range."""
+        """Interpolate the force [N] at displacements [m] and currents [A], clipped to the table's range."""
         row = np.clip((x - self._low) / (self._high - self._low), 0.0, 1.0) * (_PLACES - 1)
         column = np.clip(0.5 + 0.5 * current / self._largest, 0.0, 1.0) * (_CURRENTS - 1)
         i = np.minimum(row.astype(np.int64), _PLACES - 2)

@@ -85,7 +85,7 @@ class ForceMap:
         return float(np.interp(release, self.release, self.force[row, number]))
 
     def state(self, row: int) -> tuple[float, float]:
-        """Return displacement, m, and speed, m/s, of touch `row` just before the pack contact."""
+        """Return displacement [m] and speed [m/s] of touch `row` just before the pack contact."""
         speed = float(self.speed[row])
         return self.front - AHEAD * speed, speed
 

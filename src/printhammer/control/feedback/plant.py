@@ -87,11 +87,11 @@ class Driver(Declared):
         read_positive(self.edge, "s", "edge of the driver")
 
     def switched(self, at: Sequence[float], levels: Sequence[float], initial: float = 0.0) -> Switched:
-        """Return the current waveform that changes to `levels`, A, at the times `at`, s."""
+        """Return the current waveform that changes to `levels` [A] at the times `at` [s]."""
         return Switched(at=tuple(at), levels=tuple(levels), edge=self.edge, initial=initial)
 
     def push(self, width: float) -> Switched:
-        """Return a rectangular current pulse of the given width, s, at the driver's current limit."""
+        """Return a rectangular current pulse of the given width [s] at the driver's current limit."""
         return self.switched((0.0, width), (self.current, 0.0))
 
     def drive(self, pulses: Sequence[Switched], at: Sequence[float] = (0.0,)) -> BoundedSequence:

@@ -88,7 +88,7 @@ class PositionSensor(Declared):
         return np.where(latest >= np.maximum(first, 0)[:, np.newaxis], latest, -1)
 
     def read(self, x: FloatArray, numbers: IntArray, runs: Words, stroke: float) -> FloatArray:
-        """Return the sensor readings, m, of true displacements `x`, m, at sample indices, shape (M, N).
+        """Return the sensor readings [m] of true displacements `x` [m] at sample indices, shape (M, N).
 
         `runs`, shape (M,), are the noise keys of the runs; `stroke` is the distance from backstop to pack, m.
         """

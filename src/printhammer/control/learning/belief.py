@@ -85,7 +85,7 @@ class Mode:
 
 @dataclass(frozen=True)
 class Belief:
-    """Posterior distribution of a unit's constants: modes, the most probable first, and probabilities."""
+    """Posterior distribution of a unit's constants: modes with probabilities, the most probable first."""
 
     modes: tuple[Mode, ...]
     weights: FloatArray  # Probabilities of the modes, (modes,)

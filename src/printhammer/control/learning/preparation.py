@@ -39,7 +39,7 @@ _ABOVE: Final = 1.25
 
 
 def default_rate(hammer: Hammer, driver: str, largest_current: float) -> float:
-    """Compute the default slot rate of learning, Hz, at which successive pulses of the device interact.
+    """Compute the default slot rate [Hz] of learning, at which successive pulses of the device interact.
 
     The rate is 1275 Hz divided by the time scale of the device, but at least 1.25 times the rate whose period
     is the settling time of a single pulse; rounded to four digits.

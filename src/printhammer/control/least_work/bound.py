@@ -79,7 +79,7 @@ def bound(hammer: Hammer, single: Nominal, force: float, largest: float) -> Boun
 
 
 def _strongest(static: StaticForce, x: FloatArray, largest: float) -> FloatArray:
-    """Return the largest force, N, of magnet and spring at displacements, over all allowed currents."""
+    """Return the largest force [N] of magnet and spring at displacements, over all allowed currents."""
     currents = np.linspace(-largest, largest, _CURRENTS).tolist()
     force = np.array([[static.free(place, current) for current in currents] for place in x.tolist()])
     rows, best = np.arange(x.size), np.clip(force.argmax(axis=1), 1, _CURRENTS - 2)
@@ -92,7 +92,7 @@ def _strongest(static: StaticForce, x: FloatArray, largest: float) -> FloatArray
 
 
 def _given_back(hammer: Hammer, most: float) -> float:
-    """Return the largest rebound energy, J, of an undriven armature at the backstop.
+    """Return the largest rebound energy [J] of an undriven armature at the backstop.
 
     The maximum is over incident energies up to `most`, J.
     """
@@ -115,7 +115,7 @@ def _given_back(hammer: Hammer, most: float) -> float:
 
 
 def _indentation(static: StaticForce, single: Nominal, force: float) -> tuple[float, float]:
-    """Return the indentation, m, and the loading work, J, at `force` times the single-pulse force."""
+    """Return the indentation [m] and the loading work [J] at `force` times the single-pulse force."""
     wanted, front = force * single.force, static.front
     deepest = single.indentation
     while -static.pack(front + deepest) < wanted:

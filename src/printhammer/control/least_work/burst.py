@@ -138,7 +138,7 @@ class LeastWork(Result, rows="node"):
 
     @property
     def nodes(self) -> tuple[list[float], list[float]]:
-        """Times, s, and currents, A, of the nodes of the piecewise linear current."""
+        """Times [s] and currents [A] of the nodes of the piecewise linear current."""
         if self.shape != "free":
             raise InputError(
                 f"shape = {self.shape!r}: the current has no nodes",

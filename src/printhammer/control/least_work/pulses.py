@@ -132,7 +132,7 @@ class PulsePlan:
         return PulseSequence(waveforms, [time for time, _width in fired])
 
     def _pulses(self, row: FloatArray, arrival: float) -> list[tuple[float, float]]:
-        """Decode variables in [0, 1] to pulse times, s, and widths, s, in the current slot."""
+        """Decode variables in [0, 1] to pulse times [s] and widths [s] in the current slot."""
         shortest = _SHORTEST * self._widest
         free = self._begin
         if self._fired:

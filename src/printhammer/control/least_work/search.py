@@ -191,7 +191,7 @@ def refined(
 
 
 def _in_steps(levels: FloatArray, edges: FloatArray, duration: float, nodes: int) -> FloatArray:
-    """Average piecewise constant currents, with switching times `edges`, s, over the steps between nodes."""
+    """Average piecewise constant currents, with switching times `edges` [s], over the steps between nodes."""
     ends = np.pad(edges, ((0, 0), (1, 1)), constant_values=((0.0, 0.0), (0.0, duration)))
     times = node_times(duration, nodes)
     past = np.clip(times, ends[:, :-1, np.newaxis], ends[:, 1:, np.newaxis]) - ends[:, :-1, np.newaxis]
@@ -327,7 +327,7 @@ def printing_current(
 
 
 def landing_current(task: Task, begin: SlotState, duration: float, nodes: int) -> FloatArray:
-    """Optimise the nodal currents, A, that land the armature softly after the last dot of a burst."""
+    """Optimise the nodal currents [A] that land the armature softly after the last dot of a burst."""
 
     def rated(currents: FloatArray, tolerance: float) -> FloatArray:
         outcomes = task.run(begin, np.pad(currents, ((0, 0), (0, 1))), duration, tolerance)
@@ -384,7 +384,7 @@ def _descend(
 
 
 def _within(task: Task, wanted: FloatArray, begin: float, reach: float, to_zero: bool) -> FloatArray:
-    """Clip nodal currents, A, to the limits on value and slope."""
+    """Clip nodal currents [A] to the limits on value and slope."""
     result = np.empty(wanted.size)
     current = begin
     for node, value in enumerate(wanted.tolist()):

@@ -187,7 +187,7 @@ class Task:
 
 
 def end_of(ensemble: Ensemble, end: float, current: float) -> SlotState:
-    """Return the final state of a simulation that ends at `end`, s, with a known final current, A."""
+    """Return the final state of a simulation that ends at `end` [s], with a known final current [A]."""
     strobes = ensemble.run(strobes=[[end]], threads=1, engine="plain").strobes
     assert strobes is not None
     x, v, memory = (float(column[0, 0]) for column in (strobes.x, strobes.v, strobes.memory))
@@ -222,7 +222,7 @@ class CoilForce:
         self._ends = float(places[0]), float(places[-1])
 
     def __call__(self, x: FloatArray, current: FloatArray) -> FloatArray:
-        """Evaluate the force, N, at displacements, m, and currents, A; NaN where x is NaN."""
+        """Evaluate the force [N] at displacements [m] and currents [A]; NaN where x is NaN."""
         inside = np.clip(np.nan_to_num(x, nan=self._ends[0]), *self._ends)
         force = self._spline.ev(inside, current)
         return np.where(np.isnan(x), np.nan, force)

@@ -171,7 +171,7 @@ COLUMNS: Final = Settings._fields  # Names of the times of an entry
 
 
 def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
-    """Return the pulse of a hammer, and its largest width, s, within a current limit, A.
+    """Return the pulse of a hammer, and its largest width [s] within a current limit [A].
 
     The width is at most `WIDEST` times the width of the hammer's pulse, or `_SATURATED` times if the current
     reaches the limit at the width of the hammer's pulse.
@@ -223,7 +223,7 @@ def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
 
 
 def fading(hammer: Hammer, pulse: Waveform, share: float) -> float:
-    """Return the time, s, from the end of a pulse until the current stays below `share` times its peak.
+    """Return the time [s] from the end of a pulse until the current stays below `share` times its peak.
 
     For a driver this is the first time at which the current has decayed; later induced currents are ignored.
     """
@@ -236,7 +236,7 @@ def fading(hammer: Hammer, pulse: Waveform, share: float) -> float:
 
 
 def clearance(hammer: Hammer, pulse: Waveform, width: float, largest: float) -> float:
-    """Return the time, s, from the end of a brake pulse to the earliest start of the next pulse.
+    """Return the time [s] from the end of a brake pulse to the earliest start of the next pulse.
 
     By then the brake pulse has decayed so far that two consecutive pulses of the largest width stay within
     the current limit, A.
@@ -354,7 +354,7 @@ def driven_by(hammer: Hammer, driver: str, largest: float) -> Hammer:
 
 
 def of_force(hammer: Hammer, pulse: Waveform, force: float, low: float, high: float) -> Hammer:
-    """Return the hammer with the pulse width, from `low` to `high`, s, that prints with `force`, N."""
+    """Return the hammer with the pulse width, from `low` to `high` [s], that prints with `force` [N]."""
     for _ in range(_ROUNDS):
         widths = np.linspace(low, high, _GRID).tolist()
         pulses = [of_width(pulse, width) for width in widths]

@@ -57,7 +57,7 @@ def size_of(rates: int, entries: int, bits: int, values: int = 0) -> int:
 def whole_ticks(
     times: Mapping[str, FloatArray], rates: FloatArray, gaps: int, reach: int, tick: float
 ) -> dict[str, FloatArray]:
-    """Round the times of a table to whole ticks, s, without overlap of pulses.
+    """Round the times of a table to whole ticks [s], without overlap of pulses.
 
     Where rounding to the nearest tick makes two pulses overlap, the brake pulse begins later or is shorter,
     or the dot is fired later, by a tick or two. The arguments are those of `look_ahead`, with arrays of shape

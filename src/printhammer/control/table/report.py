@@ -286,7 +286,7 @@ def _largest(values: FloatArray) -> float:
 
 
 def between(table: CompensationTable) -> list[float]:
-    """Return the rates, Hz, at which to validate a table: its own or, for a long table, five midpoints."""
+    """Return the rates [Hz] at which to validate a table: its own or, for a long table, five midpoints."""
     rates = table.rates
     if rates.size < _LONG:
         return [float(rate) for rate in rates]

@@ -75,7 +75,7 @@ _ROUNDING: Final = 1e-12
 
 
 def chosen(task: Task, periods: FloatArray) -> tuple[FloatArray, Ways]:
-    """Choose a pulse candidate for each of the ascending periods, s, from a dot to the next dot.
+    """Choose a pulse candidate for each of the ascending periods [s] from a dot to the next dot.
 
     Returns the periods at which a candidate exists, and the chosen candidate of each.
     """

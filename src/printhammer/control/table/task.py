@@ -152,7 +152,7 @@ class Task:
         return np.asarray(np.where(brake > 0.0, delay + brake + self.wait, self.single.left))
 
     def latest(self, width: FloatArray) -> FloatArray:
-        """Return the latest firing time after the slot, s, that leaves time for the next brake pulse."""
+        """Return the latest firing time [s] after the slot that leaves time for the next brake pulse."""
         return np.asarray(self.brake_from - self.faded - width)
 
     def deviations(

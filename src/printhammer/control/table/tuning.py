@@ -329,7 +329,7 @@ def _tune_again(draft: Draft, poor: IntArray) -> None:
 
 
 def _failed_brakes(draft: Draft) -> tuple[tuple[float, float, float], ...]:
-    """Return period, delay and width, s, of the brake pulses of candidates whose rows of dots failed."""
+    """Return period, delay and width [s] of the brake pulses of candidates whose rows of dots failed."""
     task, barred = draft.task, []
     for gap in range(1, task.reach + 1):
         columns = [number_of(each, task.reach) for each in histories(task.gaps, task.reach) if each[0] == gap]

@@ -100,7 +100,7 @@ class Rail(_Driver):
 
 
 class Chopper(_Driver):
-    """Chopper: supply on for the width, chopped between two currents or by a fixed off-time.
+    """Chopper: the supply is on for the width, chopped between two currents or with a fixed off-time.
 
     While the chopper keeps the supply off, the current circulates through a diode.
     """

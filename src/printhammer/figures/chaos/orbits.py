@@ -196,7 +196,7 @@ def _traces(ax: Axes, orbits: list[Orbit]) -> None:
 
 
 def _from_firing(orbit: Orbit, motion: Motion) -> tuple[FloatArray, FloatArray]:
-    """Return times since the first firing, s, and displacements, m, over one period of an orbit."""
+    """Return times since the first firing [s] and displacements [m] over one period of an orbit."""
     since = motion.t - motion.start + orbit.phase * orbit.regime.period
     if orbit.phase == 0.0:
         return since, motion.x

@@ -168,7 +168,7 @@ def _draw_inset(ax: Axes, strobe: Strobe, window: Window, way: Scale, speed: Sca
 
 
 def shown_period(period: float) -> str:
-    """Format a strobe time, s, in ms with two decimals if that is exact, else with more digits."""
+    """Format a strobe time [s] in ms with two decimals if that is exact, else with more digits."""
     number = from_si(period, "s", "ms")
     short = f"{number:.2f}"
     return f"{short if math.isclose(float(short), number, rel_tol=1e-9) else f'{number:.6g}'} ms"

@@ -44,7 +44,7 @@ def fired(hammer: Hammer, times: Iterable[float] = (0.0,), duration: float | str
 
 
 def places(hammer: Hammer) -> dict[str, float]:
-    """Return the positions, m, of the backstop, pack, platen and additional contacts of a hammer, by name."""
+    """Return the positions [m] of the backstop, pack, platen and additional contacts of a hammer, by name."""
     own = {"backstop": hammer.position, "pack": hammer.front, "platen": hammer.platen}
     contacts = {
         key.partition(".")[2]: term.position
@@ -70,7 +70,7 @@ def times_of(motion: Motion, start: float | None = None, end: float | None = Non
 
 
 def orbit(motion: Motion, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Sample displacement, m, and velocity, m/s, of a motion at `times`.
+    """Sample displacement [m] and velocity [m/s] of a motion at `times`.
 
     At each rigid impact, the state before the impact is inserted, so that the jump is drawn.
     """
@@ -89,7 +89,7 @@ def orbit(motion: Motion, times: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def settled_at(motion: Motion) -> float:
-    """Return the time, s, after which the armature stays within `SETTLED` of its final position."""
+    """Return the time [s] after which the armature stays within `SETTLED` of its final position."""
     times = times_of(motion)
     x, _v = motion.at(times)
     room = SETTLED * float(np.ptp(x))
@@ -135,7 +135,7 @@ def reach(hammer: Hammer) -> tuple[float, float]:
 
 
 def total_force(motion: Motion, times: FloatArray) -> FloatArray:
-    """Return the sum of all forces on the armature, N, at given times, s.
+    """Return the sum [N] of all forces on the armature at given times [s].
 
     While a rigid backstop holds the armature, its reaction balances all other forces, and the sum is 0.
     """

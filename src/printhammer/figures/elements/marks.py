@@ -288,7 +288,7 @@ def arrows(
 
 
 def firings(ax: Axes, times: Iterable[float], shown: Scale, color: str = BLUE, foot: float = 0.022) -> None:
-    """Mark firing times, s, by small triangles at the lower edge of the axes."""
+    """Mark firing times [s] by small triangles at the lower edge of the axes."""
     at = [float(shown.shown(t)) for t in times]
     how = {"transform": ax.get_xaxis_transform(), "clip_on": False, "zorder": 5.0, "gid": "firings"}
     dots(ax, at, [foot] * len(at), 4.5, color, marker="^", **how)

@@ -124,7 +124,7 @@ def _name_strikes(figure: Figure, strike: str) -> None:
 
 
 def new_figure(height: float, width: float = WIDTH, layout: _Layout = "constrained") -> Figure:
-    """Create an empty figure, sizes in inches; by default its layout avoids overlaps."""
+    """Create an empty figure, with sizes in inches; by default, the layout avoids overlaps."""
     from printhammer.figures.elements.picture import Picture
 
     figure = Picture(figsize=(width, height), layout=layout)  # type: ignore[arg-type]

@@ -131,7 +131,7 @@ def spring(
     *,
     displacements: npt.ArrayLike | None = None,
 ) -> Bench:
-    """Compute the static spring force at given displacements, m, with the magnet removed."""
+    """Compute the static spring force at given displacements [m], with the magnet removed."""
     if hammer.spring is None:
         raise InputError(
             f"{hammer.path}: the hammer has no [spring]",
@@ -221,7 +221,7 @@ def backstop(hammer: Hammer, sensor: Sensor, *, speeds: npt.ArrayLike | None = N
 def motion(
     hammer: Hammer, sensor: Sensor, *, duration: float | str | None = None, before: float | str = BEFORE
 ) -> Bench:
-    """Simulate one shot from rest, from `before`, s, before the firing to `duration`, s, after the firing."""
+    """Simulate one shot from rest, from `before` [s] before the firing to `duration` [s] after the firing."""
     from printhammer.drive.trains import PulseTrain
 
     if hammer.waveform is None:
@@ -379,7 +379,7 @@ def _peaks(hammer: Hammer) -> FloatArray:
 
 
 def _rebound(bare: Hammer, speed: float) -> float:
-    """Compute the rebound speed, m/s, of an armature thrown at the backstop, without any other force."""
+    """Compute the rebound speed [m/s] of an armature thrown at the backstop, without any other force."""
     part = bare.backstop
     if isinstance(part, HertzBackstop):
         from scipy.optimize import brentq

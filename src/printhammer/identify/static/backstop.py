@@ -68,7 +68,7 @@ class RestitutionLaw:
         self.speed = speed
 
     def value(self, p: FloatArray) -> FloatArray:
-        """Compute the rebound speeds, m/s, at the measured impact speeds."""
+        """Compute the rebound speeds [m/s] at the measured impact speeds."""
         return self.speed * rebound(self._z(p))[0]
 
     def jacobian(self, p: FloatArray) -> FloatArray:

@@ -155,7 +155,7 @@ class PackLaw:
         self.parameters = 1 + len(self.turns) + 2 * exponents
 
     def value(self, p: FloatArray) -> FloatArray:
-        """Compute the pack force of equation (5), N, at the measured indentations."""
+        """Compute the pack force [N] of equation (5) at the measured indentations."""
         low, high = self.exponents(p)
         power = low * self.log_r
         if len(self.turns):

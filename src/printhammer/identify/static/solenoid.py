@@ -177,7 +177,7 @@ class CircuitLaw:
         self.rows = list(zip(gap.tolist(), current.tolist(), strict=True))
 
     def value(self, p: FloatArray) -> FloatArray:
-        """Compute the logarithms of the forces, N, and flux linkages, Wb, at the measured points."""
+        """Compute the logarithms of the forces [N] and flux linkages [Wb] at the measured points."""
         constants = dict(zip(CONSTANTS, p.tolist(), strict=True))
         constants["leakage_reach"] = max(constants["leakage_reach"], (1.0 + 1e-9) * self.widest)
         c = ReluctanceMagnet(turns=self.turns, closed_at=0.0, **constants).packed(0.0)

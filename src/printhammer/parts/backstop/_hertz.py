@@ -11,7 +11,7 @@ def stiffness_from_bodies(
     youngs_moduli: tuple[float, float],
     poisson_ratios: tuple[float, float],
 ) -> float:
-    """Return the stiffness k, N/m^1.5, of a Hertz contact of two spheres, or of a sphere on a flat.
+    """Return the stiffness k [N/m^1.5] of a Hertz contact of two spheres, or of a sphere on a flat.
 
     Equation: k = (4/3) E* sqrt(R), 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2, 1/R = 1/R1 + 1/R2; K. L. Johnson,
     Contact Mechanics (1985), section 4.2. Radii are in m, the second None for a flat, Young's moduli in Pa.
@@ -23,14 +23,14 @@ def stiffness_from_bodies(
 def hertz_stiffness(
     radius1: float, radius2: float, modulus1: float, modulus2: float, ratio1: float, ratio2: float
 ) -> float:
-    """Return the Hertz stiffness of two bodies, N/m^1.5; the second radius is NaN for a flat."""
+    """Return the Hertz stiffness of two bodies, N/m^1.5; the second radius is NaN for a flat body."""
     compliance = (1.0 - ratio1 * ratio1) / modulus1 + (1.0 - ratio2 * ratio2) / modulus2
     curvature = 1.0 / radius1 + (0.0 if math.isnan(radius2) else 1.0 / radius2)
     return 4.0 / (3.0 * compliance * math.sqrt(curvature))
 
 
 def damping_from_restitution(k: float, restitution: float, speed: float) -> float:
-    """Return the damping l of equation (7), N s/m^2.5, for the restitution coefficient of a free rebound.
+    """Return the damping l [N s/m^2.5] of equation (7), for the restitution coefficient of a free rebound.
 
     With z = (l/k) v_in and y = (l/k) v_out a free contact obeys z - ln(1 + z) = -(y + ln(1 - y)), at any mass
     and stiffness: divide m v dv = -(k - l v) delta^1.5 d(x) by (k - l v) and integrate both ways. Solved for

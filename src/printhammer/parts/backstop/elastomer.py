@@ -22,7 +22,7 @@ from printhammer.support.constants import quantity
 
 
 def backstop_elastic(c: Any, w: float) -> float:
-    """Return the elastic force k w^3, N, not negative."""
+    """Return the elastic force k w^3 [N], not negative."""
     return float(c[0] * w * w * w)
 
 

@@ -24,7 +24,7 @@ from printhammer.support.constants import quantity
 
 
 def backstop_elastic(c: Any, w: float) -> float:
-    """Return the Hertz force of equation (6), k w^3, N, not negative."""
+    """Return the Hertz force of equation (6), k w^3 [N], not negative."""
     return float(c[0] * (w * w * w))
 
 

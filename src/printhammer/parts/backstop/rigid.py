@@ -20,7 +20,7 @@ RIGID = True
 
 
 def backstop_rebound(c: Any, v_in: float) -> float:
-    """Return the velocity after a bounce, m/s, not negative."""
+    """Return the velocity [m/s] after a bounce, not negative."""
     return float(-c[0] * v_in)
 
 

@@ -118,7 +118,7 @@ def magnet_inductance(c: Any, x: float, current: float) -> float:
 
 
 def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float:
-    """Return the current, A, for the flux linkage of magnet and series inductance.
+    """Return the current [A] for the flux linkage of magnet and series inductance.
 
     NaN outside the range of the law, and, if there is no leakage, at or above the saturation flux.
     """

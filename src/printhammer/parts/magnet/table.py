@@ -128,7 +128,7 @@ def magnet_inductance(c: Any, x: float, current: float) -> float:
 
 
 def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float:
-    """Return the current, A, for the flux linkage of magnet and series inductance; NaN outside the table.
+    """Return the current [A] for the flux linkage of magnet and series inductance; NaN outside the table.
 
     A current beyond the table by a rounding error is clipped to the end of the table.
     """

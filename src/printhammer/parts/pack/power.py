@@ -26,7 +26,7 @@ MEMORY = True
 
 
 def pack_loading(c: Any, x: float, v: float) -> float:
-    """Return the force of the loading branch of equation (5), N, not positive; 0 for x <= xp."""
+    """Return the force [N] of the loading branch of equation (5), not positive; 0 for x <= xp."""
     r = (x - c[1]) * c[2]
     if r <= 0.0:
         return 0.0
@@ -34,7 +34,7 @@ def pack_loading(c: Any, x: float, v: float) -> float:
 
 
 def pack_memory(c: Any, peak: float) -> float:
-    """Return q = S rmax^-8.3 of a local maximum, N, which the unloading branch needs.
+    """Return q = S rmax^-8.3 of a local maximum [N], which the unloading branch needs.
 
     The result is 0 for an indentation below 1e-30 d, whose force would be below 1e-81 S.
     """

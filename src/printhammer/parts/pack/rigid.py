@@ -22,7 +22,7 @@ RIGID_FRONT = True
 
 
 def pack_rebound(c: Any, v_in: float) -> float:
-    """Return the velocity after an impact, m/s, not positive."""
+    """Return the velocity [m/s] after an impact, not positive."""
     return float(-c[0] * v_in)
 
 

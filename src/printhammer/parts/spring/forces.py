@@ -46,7 +46,7 @@ FRONT, BACK = 1.0, -1.0
 
 
 def spring_force(c: Any, x: float) -> float:
-    """Return the sum of all forces and contact forces, N, at the displacement `x`, m."""
+    """Return the sum [N] of all forces and contact forces at the displacement `x` [m]."""
     total = 0.0
     for k in range(int(c[0])):
         row = 1 + WIDTH * k

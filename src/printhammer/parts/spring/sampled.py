@@ -27,7 +27,7 @@ __all__ = ["LEVELS", "spring_domain", "spring_energy", "spring_force", "spring_l
 
 
 def sum_of_curves(c: Any, x: float, integrated: bool) -> float:
-    """Return the sum of the sampled forces, N, or of the integrals, J, at `x`, m; NaN beyond the samples."""
+    """Return the sum of the sampled forces [N] or of the integrals [J] at `x` [m]; NaN beyond the samples."""
     total = 0.0
     at = 1 + WIDTH * int(c[0])
     first = at + 3
@@ -45,7 +45,7 @@ def sum_of_curves(c: Any, x: float, integrated: bool) -> float:
 
 
 def spring_force(c: Any, x: float) -> float:
-    """Return the sum of all forces and contact forces, N, at `x`, m; NaN beyond the samples of a force."""
+    """Return the sum [N] of all forces and contact forces at `x` [m]; NaN beyond the samples of a force."""
     return force_of_rows(c, x) + sum_of_curves(c, x, False)
 
 
@@ -69,7 +69,7 @@ def spring_level(c: Any, k: float) -> float:
 
 
 def spring_domain(q: Any, ends: Any) -> None:
-    """Narrow a displacement range, m, to the samples of all forces; `q` holds the values of the part."""
+    """Narrow a displacement range [m] to the samples of all forces; `q` holds the values of the part."""
     at = 1 + WIDTH * int(q[0])
     first = at + 3
     for _ in range(int(q[at])):

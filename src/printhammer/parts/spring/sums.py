@@ -43,7 +43,7 @@ VISCOUS = True
 
 
 def spring_viscous(c: Any, x: float, v: float) -> float:
-    """Return the dissipative part of the sum of the contact forces, N, at `x`, m, and `v`, m/s."""
+    """Return the dissipative part [N] of the sum of the contact forces at `x` [m] and `v` [m/s]."""
     total = 0.0
     for k in range(int(c[0])):
         row = 1 + WIDTH * k
@@ -57,7 +57,7 @@ def spring_viscous(c: Any, x: float, v: float) -> float:
 
 
 def spring_switch(c: Any, v: float) -> float:
-    """Return a number that changes sign where, at a velocity `v`, m/s, the force of a contact becomes 0."""
+    """Return a number that changes sign where, at a velocity `v` [m/s], the force of a contact becomes 0."""
     product = 1.0
     for k in range(int(c[0])):
         row = 1 + WIDTH * k

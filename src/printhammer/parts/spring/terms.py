@@ -137,7 +137,7 @@ class SampledForce(Term):
 
     @property
     def samples(self) -> tuple[tuple[float, float], ...]:
-        """Displacements, m, ascending, and forces, N, of the samples."""
+        """Displacements [m], ascending, and forces [N] of the samples."""
         return self._samples
 
 
@@ -196,7 +196,7 @@ class LinearContact(Term):
         return (self.sign, self.position, self.stiffness, self.power, self.damping or 0.0)
 
     def force(self, depth: Any, rate: Any = 0.0) -> Any:
-        """Return the contact force, N, at indentations, m, and their rates, m/s, numbers or arrays."""
+        """Return the contact force [N] at indentations [m] and their rates [m/s], numbers or arrays."""
         return self.stiffness * depth**self.power * np.maximum(1.0 + (self.damping or 0.0) * rate, 0.0)
 
 

@@ -194,7 +194,7 @@ def longest_run(motion: Motion, reference_force: float, forces: tuple[float, flo
 
 
 def delayed_train(hammer: Hammer, delay: float, pulses: int = _PULSES) -> tuple[float, ...]:
-    """Compute the firing times, s, of a train that fires at a delay, s, after each pack contact ends.
+    """Compute the firing times [s] of a train that fires at a delay [s] after each pack contact ends.
 
     The train has fewer than `pulses` firings if a firing makes no dot, since no contact then ends.
     """
@@ -212,7 +212,7 @@ def delayed_trains(
     hopeless: Callable[[DotTable, list[int]], BoolArray] | None = None,
     **options: Any,
 ) -> list[tuple[float, ...]]:
-    """Compute firing times, s, of many trains whose firings follow the pack contacts after a delay.
+    """Compute firing times [s] of many trains whose firings follow the pack contacts after a delay.
 
     Each hammer has its own delay, s; see `delayed_train`. One ensemble per firing simulates all trains.
 
@@ -256,7 +256,7 @@ def _run(hammer: Hammer, times: Sequence[float], patience: float | None) -> Moti
 
 
 def _departure(motion: Motion) -> float | None:
-    """Return the time, s, at which the pack contact of the first firing ends; None without a contact."""
+    """Return the time [s] at which the pack contact of the first firing ends; None without a contact."""
     dot = motion.dots[0]
     if dot.flight_time is None or dot.contact_time is None or not dot.peak_force:
         return None

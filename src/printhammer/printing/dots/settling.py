@@ -111,7 +111,7 @@ def settle(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float
 
 
 def undisturbed_rate(hammer: Hammer) -> float:
-    """Return a rate, Hz, up to which the armature is exactly at rest at each pulse; 0 without such a rate.
+    """Return a rate [Hz] up to which the armature is exactly at rest at each pulse; 0 without such a rate.
 
     A device with a rigid backstop and a driver that ends its current is at rest to the last bit some time
     after a pulse. Pulses further apart than that time give equal dots.
@@ -163,7 +163,7 @@ def settled_from(away: BoolArray) -> int:
 
 
 def _settle_time(motion: Motion, rest: float, limit: float) -> float | None:
-    """Bisect for the time, s, after which the armature stays within `limit`, m, of its rest position.
+    """Bisect for the time [s] after which the armature stays within `limit` [m] of its rest position.
 
     The time is measured from the firing. The result is None if the armature never leaves the limit, or is
     outside the limit at the end of the motion.

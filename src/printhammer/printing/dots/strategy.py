@@ -91,7 +91,7 @@ def slots_of(pattern: npt.ArrayLike) -> tuple[int, ...]:
 
 
 def slot_times(slots: Sequence[int] | IntArray, rate: float, first: float = FIRST_SLOT) -> FloatArray:
-    """Compute the times of slots, s, from slot indices of any shape and a slot rate, Hz."""
+    """Compute the times of slots [s] from slot indices of any shape and a slot rate [Hz]."""
     return first + np.asarray(slots, dtype=np.float64) / rate
 
 

@@ -413,7 +413,7 @@ def spread_of(values: FloatArray) -> Spread:
 
 
 def dot_table(dots: Sequence[Dot], times: FloatArray) -> DotTable:
-    """Convert the dots of one motion, with firing times, s, to a dot table with one ensemble member."""
+    """Convert the dots of one motion, with firing times [s], to a dot table with one ensemble member."""
 
     def column(name: str) -> FloatArray:
         values = [getattr(dot, name) for dot in dots]

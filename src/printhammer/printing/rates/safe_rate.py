@@ -317,7 +317,7 @@ def grid_of(
     step: float | str | None,
     spacing: float = STEP,
 ) -> tuple[FloatArray, float]:
-    """Return a grid of rates and its step, Hz, with default values for arguments that are None.
+    """Return a grid of rates and its step [Hz], with default values for arguments that are None.
 
     `spacing` is the default step for the paper's hammer, Hz; defaults scale with the time scale of the
     hammer.
@@ -330,7 +330,7 @@ def grid_of(
 
 
 def rate_grid(first: float | str, last: float | str, step: float | str) -> FloatArray:
-    """Return a grid of rates, Hz, from `first` to at most `last`."""
+    """Return a grid of rates [Hz] from `first` to at most `last`."""
     low, high, apart = (
         read_positive(value, "Hz", name) for value, name in ((first, "first"), (last, "last"), (step, "step"))
     )
@@ -449,7 +449,7 @@ def safe_rates(
     limits: Limits,
     effort: Effort,
 ) -> FloatArray:
-    """Compute the safe rates, Hz, of many hammers on an ascending grid of rates, Hz.
+    """Compute the safe rates [Hz] of many hammers on an ascending grid of rates [Hz].
 
     Other arguments are those of `all_pass`. The dots of each hammer are compared with its own entry of
     `singles`; progress counts the hammers whose safe rate is known. The rate is NaN if not even the first

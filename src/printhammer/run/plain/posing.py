@@ -102,7 +102,7 @@ class Coil(NamedTuple):
 
 
 def main_linkage(x: float, current: float, coil: Coil) -> float:
-    """Return the flux linkage of the main path of a coil, Wb, at a displacement, m, and a current, A."""
+    """Return the flux linkage [Wb] of the main path of a coil at a displacement [m] and a current [A]."""
     own = coil.inductance * current
     if not coil.coupled:
         return own
@@ -119,7 +119,7 @@ def main_inductance(x: float, current: float, coil: Coil) -> float:
 def sustained_current(
     voltage: float, series: float, support: float, upper: float, origin: float, coil: Coil
 ) -> tuple[float, float]:
-    """Return the current that a voltage can sustain in a coil, A, with and without the limit of a chopper.
+    """Return the current [A] that a voltage can sustain in a coil, with and without the limit of a chopper.
 
     `upper` is the current at which the chopper switches off, A, NaN without a chopper.
     """
@@ -133,7 +133,7 @@ def sustained_current(
 
 
 def linkage_scale(origin: float, current: float, coil: Coil) -> float:
-    """Return a typical flux linkage of a coil, Wb, at its typical current, A."""
+    """Return a typical flux linkage [Wb] of a coil at its typical current [A]."""
     span = abs(main_linkage(origin, current, coil) - main_linkage(origin, 0.0, coil))
     if not (math.isfinite(span) and span > 0.0):
         span = coil.inductance * current
@@ -207,13 +207,13 @@ def allowances(tolerance: float) -> tuple[float, float]:
 
 
 def least_window(support: float, replaces: bool) -> float:
-    """Return the smallest time from the last firing to the end of a run, s, for any device."""
+    """Return the smallest time [s] from the last firing to the end of a run, for any device."""
     lasts = support if math.isfinite(support) else 0.0
     return CYCLE + lasts if replaces else max(CYCLE, lasts)
 
 
 def last_window(least: float, way: float, speed: float) -> float:
-    """Return the largest window, s, from the smallest window and typical displacement, m, and speed, m/s."""
+    """Return the largest window [s] from the smallest window and typical displacement [m] and speed [m/s]."""
     return least + min(LONGEST * way / speed, LAST)
 
 
