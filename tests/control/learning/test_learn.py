@@ -303,6 +303,9 @@ def test_the_table_is_for_its_unit_only(tmp_path: Path, monkeypatch: pytest.Monk
             assert drive.peak <= 2.0
     assert result.share[-1] >= result.share[0]
     result.plot()
+    for name, value, error in zip(result.constants, result.believed, result.uncertainty, strict=True):
+        assert result.believed_hammer.constants[name].si == pytest.approx(value, rel=1e-9)
+        assert abs(value - result.unit.constants[name].si) < 5.0 * error
 
 
 @pytest.mark.parametrize("driver", ["switch", "bridge"])
