@@ -1,6 +1,9 @@
 """How far a verb is: told where somebody looks, and nowhere else."""
 
 import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -52,6 +55,20 @@ def test_what_is_said_meanwhile_stands_above_the_bar(capsys: pytest.CaptureFixtu
     lines = re.sub(r"\x1b\[[\d;?]*[a-zA-Z]", "", capsys.readouterr().err).replace("\r", "\n").splitlines()
     assert "compiling runs" in [line.strip() for line in lines]
     assert lines[-1] == "done"
+
+
+def test_a_long_table_is_announced(
+    cli: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "spring.csv"
+    rows = "".join(f"{0.01 * k},{0.5 + 0.002 * k}\n" for k in range(50))
+    path.write_text(f"displacement [mm],force [N]\n{rows}")
+    words = ["fit", "spring", path, "--backstop", "0 mm"]
+    assert "reading" not in cli(*words).err
+    monkeypatch.setattr("printhammer.support.tables.text._LONG", 100)
+    done = cli(*words)
+    assert "reading spring.csv: 51 lines" in done.err
+    assert done.out == cli(*words).out
 
 
 def test_an_error_goes_through() -> None:

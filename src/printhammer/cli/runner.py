@@ -290,6 +290,8 @@ def _listed(paths: Path | list[Path] | None) -> list[Path]:
 
 def _values(job: Job, options: Mapping[str, Option], texts: dict[str, Any]) -> dict[str, Any]:
     """Check the files, parse the options and load the hammer; return the values by parameter name."""
+    from printhammer.support import files
+
     job.check(
         *(
             Path(path)
@@ -298,6 +300,7 @@ def _values(job: Job, options: Mapping[str, Option], texts: dict[str, Any]) -> d
             for path in (texts[name] if isinstance(texts[name], list) else [texts[name]])
         )
     )
+    files.listeners.add(say)
     values = dict(texts)
     for path in values.pop("part", None) or []:
         from printhammer.parts.outside import load_parts

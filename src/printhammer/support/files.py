@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 
 from printhammer.errors import InputError
+
+listeners: set[Callable[[str], None]] = set()
+"""Callbacks for a message before a long table, which takes seconds to parse, is read."""
 
 
 def write_file(path: str | Path, content: str | bytes) -> None:

@@ -21,7 +21,9 @@ from pathlib import Path
 from typing import Final
 
 from printhammer.errors import InputError
+from printhammer.support.files import listeners
 
+_LONG: Final = 4_000_000  # Characters of a table that takes a second or more to parse; arbitrary
 _FAULT: Final = r"#(?:#+|N/A|NUM!|VALUE!|DIV/0!|REF!|NAME\?|NULL!|WERT!|ZAHL!|NV)\s*[,;|\t]"
 _COMMENT: Final = re.compile(rf"\s*((?!{_FAULT})#|//|[%;]\s*[^\W\d_][^;]*$)")
 
@@ -74,7 +76,11 @@ def read_any(path: Path, what: str) -> str:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: {what} cannot be read ({reason})", file=path) from None
-    return decoded(content, str(path))
+    text = decoded(content, str(path))
+    if len(text) > _LONG:
+        for tell in listeners:
+            tell(f"reading {path.name}: {text.count(chr(10)):,} lines")
+    return text
 
 
 def decoded(content: bytes, where: str) -> str:
