@@ -297,7 +297,7 @@ def tolerance_curves(path: Path) -> None:
         for way, (colour, line, mark) in looks.items():
             points = [(row[0], row[2]) for row in table.rows if row[1] == way]
             ax.plot(
-                *zip(*((x, y) for x, name, y in points if name == way), strict=True),
+                *zip(*points, strict=True),
                 color=colour,
                 linestyle=line,
                 marker=mark,
