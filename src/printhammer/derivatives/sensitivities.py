@@ -289,7 +289,7 @@ def sensitivities(
         Names such as "pack.stiffness", "waveform.width", "period", "rate" or "firing.1" (the second firing,
         since firings are counted from 0); by default all constants of hammer, pulse and firing times.
     state : tuple of float, optional
-        Displacement, m, and velocity, m/s, at time 0, independent of the constants; by default the rest
+        Displacement [m] and velocity [m/s] at time 0, independent of the constants; by default the rest
         state, which depends on the constants.
     tolerance : float, optional
         Error allowed in one step of the run.

@@ -351,7 +351,7 @@ def _away_from_zero(first: float, limit: float) -> list[float]:
 
 
 def _currents(hammer: HammerLike) -> tuple[float, float]:
-    """Return the range of currents in which the magnet's law is valid, A."""
+    """Return the range of currents [A] in which the magnet's law is valid."""
     low, high = getattr(hammer.magnet, "current_range", (-_LARGEST_CURRENT, _LARGEST_CURRENT))
     return float(low), float(high)
 

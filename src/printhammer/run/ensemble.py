@@ -148,7 +148,7 @@ class Ensemble:
     ends : float or array
         End times of the runs, s: one time for all members, or one for each member.
     states : tuple or array, optional
-        Displacement, m, and velocity, m/s, at the start: one for all or one row for each member; by default
+        Displacement [m] and velocity [m/s] at the start: one for all or one row for each member; by default
         the rest state of the member's hammer. Rows of four also hold the mode and the memory, as in
         `Strobes`, for a start inside the pack. Under a voltage three more columns may follow: the currents in
         the coil and in its shorted turn, A, and the voltage of the supply's capacitor, V; by default there is

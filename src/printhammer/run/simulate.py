@@ -58,7 +58,7 @@ def simulate(
         End of the run, s, or text with a unit; by default the window of the device after the last firing
         (`printhammer.run.window`), and required for a drive that does not end.
     state : sequence of float or str, optional
-        Displacement, m, and velocity, m/s, at time 0, as numbers or text with units; by default the rest
+        Displacement [m] and velocity [m/s] at time 0, as numbers or text with units; by default the rest
         state. For a start inside the pack, mode and memory may be added, see
         `printhammer.run.ensemble.Strobes`. With a voltage drive, the coil current, A, may be added, or three
         values: the currents in the coil and in its shorted turn, A, and the voltage of the supply's

@@ -65,7 +65,7 @@ class Base(Declared):
     )
     folder: Path = part("folder of the files that the drive refers to")
     state: tuple[float | None, float | None] = part(
-        "displacement, m, and velocity, m/s, at the start; None for the value at rest"
+        "displacement [m] and velocity [m/s] at the start; None for the value at rest"
     )
     duration: float | None = scalar("s", "end of the runs")
     tolerance: float = part("error allowed in one step")

@@ -51,7 +51,7 @@ class Attractor(Declared):
     name: str = part('name of the attractor: "period-q" or "strange"')
     period: int | None = part("period q in firings; None for a strange attractor")
     states: FloatArray = part(
-        "displacement, m, and velocity, m/s, at successive firings: the orbit, starting at its smallest"
+        "displacement [m] and velocity [m/s] at successive firings: the orbit, starting at its smallest"
         " displacement, shape (q, 2), or points of a strange attractor, shape (n, 2)"
     )
     exponent: float = part(

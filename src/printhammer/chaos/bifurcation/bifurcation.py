@@ -94,7 +94,7 @@ def bifurcation(
         still active; the first train begins at rest. "both": up and down. See
         `printhammer.chaos.bifurcation.builder`.
     state : tuple of float, optional
-        Displacement, m, and velocity, m/s, that replace the rest state; pulses of earlier firings are still
+        Displacement [m] and velocity [m/s] that replace the rest state; pulses of earlier firings are still
         active.
     refine : int, optional
         Number of times to halve the step between neighbours with different periods or distant orbits.

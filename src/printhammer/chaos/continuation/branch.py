@@ -54,7 +54,7 @@ class BranchEvent(Declared, eq=False):
         " to another phase, since a contact nears it"
     )
     value: float = part("value of the parameter, SI")
-    state: FloatArray = part("displacement, m, and velocity, m/s, at the section, shape (2,)")
+    state: FloatArray = part("displacement [m] and velocity [m/s] at the section, shape (2,)")
     phase: float = part("phase of the section, as a fraction of the period")
     multipliers: npt.NDArray[np.complex128] = part("multipliers at the point, shape (2,)")
     surface: str = part('surface of a grazing: "pack", "backstop" or, if several contacts change, ""')

@@ -62,7 +62,7 @@ def continuation(
         For a hammer or regime: number of firings after which the orbit repeats; by default the period that
         the train from rest settles to, or 1 if it does not settle or a state is given.
     state : tuple of float, optional
-        For a hammer or regime: displacement, m, and velocity, m/s, at a section, near the orbit.
+        For a hammer or regime: displacement [m] and velocity [m/s] at a section, near the orbit.
     most : int, optional
         Maximum number of steps in each direction.
     steps : Steps, optional

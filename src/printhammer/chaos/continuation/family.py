@@ -93,7 +93,7 @@ class Passage(Declared):
 class Course(Declared):
     """Motion of a periodic orbit over one period: states, pack forces and energies, J."""
 
-    states: FloatArray = part("displacement, m, and velocity, m/s, at the sections, shape (firings, 2)")
+    states: FloatArray = part("displacement [m] and velocity [m/s] at the sections, shape (firings, 2)")
     peak_forces: FloatArray = column(
         "N", "largest pack force of the contacts of each firing", "firing", more="NaN without a contact"
     )

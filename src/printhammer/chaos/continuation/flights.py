@@ -48,7 +48,7 @@ _SLOWER: Final = (0.98, 0.9, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.02, 0.005)
 class Flight(Declared):
     """Flight between two impacts on a surface, without a force of this surface close to the two impacts."""
 
-    end: FloatArray = part("displacement, m, and velocity, m/s, at the end, shape (2,)")
+    end: FloatArray = part("displacement [m] and velocity [m/s] at the end, shape (2,)")
     jacobian: FloatArray = part("derivative with respect to the state at the start, shape (2, 2)")
     accelerations: tuple[float, float] = part("acceleration at the start and at the end, m/s^2")
     contacts: tuple[str, ...] = part("surfaces touched during the flight")

@@ -403,7 +403,7 @@ class Tracer:
         return "symmetric" if apart < _SHORTER else "asymmetric"
 
     def in_words(self, stop: Stop) -> Stop:
-        """Return a copy of a stop whose sentence states the parameter value with its unit."""
+        """Return a copy of a `Stop` whose sentence states the parameter value with its unit."""
         at = self.at_value(stop.parameter)
         why = stop.sentence.rpartition(": ")[2]
         sentences = {

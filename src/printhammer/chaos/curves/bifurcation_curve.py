@@ -57,7 +57,7 @@ class BifurcationCurve(Result, rows="point"):
     tolerance: float = part("tolerance of the integration")
     first: FloatArray = column("SI", "value of the first parameter", "point")
     second: FloatArray = column("SI", "value of the second parameter", "point")
-    state: FloatArray = part("displacement, m, and velocity, m/s, at the section, shape (N, 2)", repr=False)
+    state: FloatArray = part("displacement [m] and velocity [m/s] at the section, shape (N, 2)", repr=False)
     phase: FloatArray = column(
         "1",
         "phase of the section, as a fraction of the period, from a firing on",

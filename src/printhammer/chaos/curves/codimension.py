@@ -53,7 +53,7 @@ class CodimensionTwo(Declared):
     kind: str = part('kind of the point, such as "cusp", "fold-flip" or "resonant grazing"')
     first: float = part("value of the first parameter, SI")
     second: float = part("value of the second parameter, SI")
-    state: FloatArray = part("displacement, m, and velocity, m/s, at the section, shape (2,)")
+    state: FloatArray = part("displacement [m] and velocity [m/s] at the section, shape (2,)")
     phase: float = part("phase of the section, as a fraction of the period from the firing on")
     multipliers: npt.NDArray[np.complex128] = part("multipliers of the orbit, shape (2,)")
     after: int = part("index of the preceding point of the curve; -1 before the first point")

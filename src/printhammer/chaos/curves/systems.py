@@ -101,7 +101,7 @@ class CurvePoint(Declared):
 
     first: float = part("value of the first parameter, SI")
     second: float = part("value of the second parameter, SI")
-    state: FloatArray = part("displacement, m, and velocity, m/s, at the section, shape (2,)")
+    state: FloatArray = part("displacement [m] and velocity [m/s] at the section, shape (2,)")
     phase: float = part("phase of the section, as a fraction of the period from the firing on")
     jacobian: FloatArray = part("derivative of the strobe map, shape (2, 2)")
     contacts: str = part("sequence of the contacts, P and B")

@@ -1,4 +1,4 @@
-"""Tracing of bifurcation curves: start, choice of the extended map, section changes, and stops."""
+"""Tracing of bifurcation curves: start, choice of the extended map, section changes, and reasons for stopping."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ System = MultiplierSystem | ImpactSystem | GrazingSystem
 
 @dataclass
 class Traced:
-    """Traced bifurcation curve: nodes, stops, points of codimension two, and normal-form coefficients."""
+    """Traced bifurcation curve: nodes, ends, points of codimension two, and normal-form coefficients."""
 
     kind: str
     surface: str
@@ -345,7 +345,7 @@ class CurveTracer:
         return f"{name} = {value:.9g} {self.plane.regime.quantity(name).si}".removesuffix(" 1")
 
     def in_words(self, stop: Stop, points: list[CodimensionTwo], end: int) -> Stop:
-        """Return a stop whose sentence names the parameters and any codimension-two point at the end."""
+        """Return a `Stop` whose sentence names the parameters and any codimension-two point at the end."""
         at = self.at_value(1, stop.parameter)
         if stop.reason == "grazing" and points:
             point = points[-1 if end else 0]

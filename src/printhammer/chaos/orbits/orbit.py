@@ -90,7 +90,7 @@ class Orbit(Result):
         "m", "latest local maximum inside the pack", "firing", more="0 except on the unloading branch"
     )
     section: FloatArray = part(
-        "displacement, m, and velocity, m/s, at the section", more="shape (2,)", repr=False
+        "displacement [m] and velocity [m/s] at the section", more="shape (2,)", repr=False
     )
     multipliers: npt.NDArray[np.complex128] = part(
         "Floquet multipliers, the larger absolute value first",

@@ -98,7 +98,7 @@ def orbit(
     regime : Regime
         Hammer and periodic drive.
     state : array, shape (2,)
-        Displacement, m, and velocity, m/s, at a section.
+        Displacement [m] and velocity [m/s] at a section.
     firings : int, optional
         Period of the orbit, in firings.
     phase : float, optional

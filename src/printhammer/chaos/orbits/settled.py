@@ -57,7 +57,7 @@ class Settled(Declared):
 
     period: int | None = part("firings after which the orbit repeats; None if undecided")
     states: FloatArray = part(
-        "displacement, m, and velocity, m/s, at the firings of the orbit, shape (period, 2)"
+        "displacement [m] and velocity [m/s] at the firings of the orbit, shape (period, 2)"
     )
     multiplier: float = part(
         "largest absolute value of a Floquet multiplier; NaN if Newton's method was not used",

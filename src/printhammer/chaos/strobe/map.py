@@ -69,7 +69,7 @@ class Image(Declared):
     """Image of a state under the strobe map, with derivative, contacts and distance from a grazing."""
 
     state: FloatArray = part(
-        'displacement, m, and velocity, m/s, at the end, shape (2,); NaN unless the status is "ok"'
+        'displacement [m] and velocity [m/s] at the end, shape (2,); NaN unless the status is "ok"'
     )
     jacobian: FloatArray = part(
         "derivative of the state at the end with respect to the state at the start, from the tangent flow,"

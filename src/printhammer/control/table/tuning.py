@@ -281,7 +281,7 @@ def _counter(effort: Effort, total: int) -> Callable[[], None]:
 
 
 def _all_rates(single: Single, scale: float) -> FloatArray:
-    """Return the default rates of a table, Hz: from dots at rest to nearly overlapping pack contacts."""
+    """Return the default rates [Hz] of a table, up to the rate at which pack contacts nearly overlap."""
     first, step = FIRST / scale, STEP / scale
     lowest = step * np.floor(1.0 / (single.settled * step))
     rates = np.arange(lowest, 1.0 / single.left, step)

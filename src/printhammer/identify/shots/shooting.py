@@ -57,7 +57,7 @@ class Chain:
     """Simulated segments of one shot at given parameter values, with derivatives."""
 
     motion: FloatArray
-    """Displacement, m, and velocity, m/s, at the grid times; shape (g, 2)."""
+    """Displacement [m] and velocity [m/s] at the grid times; shape (g, 2)."""
     gaps: FloatArray
     """Gaps: final state of each segment minus the initial state of the next, shape (j, 2)."""
     by_parameter: FloatArray
@@ -154,7 +154,7 @@ class Shooting:
     ) -> list[Chain] | None:
         """Integrate all segments of all shots; return None for an invalid hammer or a failed simulation.
 
-        `values` are the parameters, SI; `states` the displacement, m, and velocity, m/s, at the joints of
+        `values` are the parameters, SI; `states` the displacement [m] and velocity [m/s] at the joints of
         each shot, shape (j, 2).
         """
         try:

@@ -62,7 +62,7 @@ class Shot(Declared, eq=False):
     touches: list[Touch] = part("contacts in order; the first is the rest at the backstop, if recorded")
     joints: IntArray = part("sample indices at which the record is divided into segments, shape (j,)")
     states: FloatArray = part(
-        "displacement, m, and velocity, m/s, at the joints, estimated from the record. Shape (j, 2)"
+        "displacement [m] and velocity [m/s] at the joints, estimated from the record. Shape (j, 2)"
     )
 
     def touching(self, surface: Surface) -> list[Touch]:

@@ -85,7 +85,7 @@ def write_image(
     Parameters
     ----------
     start : float64 array, shape (2,)
-        Displacement, m, and velocity, m/s, at the start.
+        Displacement [m] and velocity [m/s] at the start.
     ends : float64 array, shape (2, any)
         States at both ends; see `printhammer.kernel.variational.layout.Carried`.
     current : float

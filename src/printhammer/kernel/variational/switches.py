@@ -340,7 +340,7 @@ def is_departure(before: Any, node: Any) -> bool:
 
 @compiled
 def leave_at_edge(node: Any, pulse: int, piece: int, columns: Any, setting: Setting) -> None:
-    """Propagate the columns through an edge of the drive, just passed, that ended a rest.
+    """Propagate the columns through the edge of the drive that has just ended a rest.
 
     Until the edge, stop or friction balance the other forces: a shift of the edge shifts the motion by the
     same time.

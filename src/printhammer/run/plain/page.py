@@ -275,7 +275,7 @@ def fill_scales(
         Code of the driven quantity (current 0, force 1, voltage 2), largest value of a pulse, and time
         between firings, s, NaN if the times between firings differ.
     start : float64 array, shape (2,)
-        Displacement, m, and velocity, m/s, at the start.
+        Displacement [m] and velocity [m/s] at the start.
     tolerance : float
         Tolerance of the run.
     out : float64 array, shape (8,)
