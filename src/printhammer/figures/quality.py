@@ -84,8 +84,8 @@ def plot(quality: Quality) -> Figure:
 def plot_safe_rate(*safe_rates: SafeRate) -> Figure:
     """Draw the deviations of force and arrival time against the rate, and the safe rate.
 
-    Bands extend from the smallest to the largest deviation of any dot of any pattern; the grey area is within the limits.
-    Several safe rates, e.g. of different strategies, are overlaid.
+    Bands extend from the smallest to the largest deviation of any dot of any pattern; the grey area is within
+    the limits. Several safe rates, e.g. of different strategies, are overlaid.
     """
     figure = new_figure(4.6)
     axes = figure.subplots(2, 1, sharex=True)

@@ -64,7 +64,7 @@ class FittedConstant(Declared):
     interval: tuple[float, float] = part("bounds of the 95 % interval, SI")
     unit: str = part("SI unit")
     in_file: bool = part(
-        "whether the constant has a key in a hammer file; combinations of constants and exponents have none",
+        "whether the constant has a key in a hammer file; combinations of constants and exponents have no key",
         default=True,
     )
     how: str = part(
@@ -138,7 +138,7 @@ class Fit(Result):
         "keys of the constants in the covariance",
         "key",
         name="key",
-        more="may lack a constant from which another constant was computed",
+        more="a constant from which another constant was computed may be missing",
     )
     covariance: FloatArray = column("SI", "covariance of two constants", "key other_key")
     abscissa: FloatArray = column("SI", "abscissa of the datum", "datum")
@@ -177,7 +177,7 @@ class Fit(Result):
         "", "combinations that the data do not determine, one sentence each", default=()
     )
     profiles: Mapping[str, Profile] = part("profiles of weakly determined constants", default_factory=dict)
-    rejected: str = scalar("", "reason to reject the law", more="empty if it is not rejected", default="")
+    rejected: str = scalar("", "reason to reject the law", more="empty if the law is not rejected", default="")
     p_value: float = scalar(
         "1",
         "probability of residuals at least as large if the law holds (p-value)",

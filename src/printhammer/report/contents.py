@@ -153,7 +153,7 @@ class Report(Declared):
     results: list[JudgedClaim] = part("the evaluated claims")
     drawings: list[Drawing] = part("the figures")
     provenance: Mapping[str, Any] = part("versions, fingerprint, tolerance")
-    reconstruction: Results = part("results of a reconstruction, of this hammer or of another")
+    reconstruction: Results = part("results of the reconstruction of this or another hammer")
     seconds: float = part("total computation time")
     files: list[Path] = part("paths of the written files", default_factory=list)
 

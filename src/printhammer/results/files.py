@@ -54,10 +54,10 @@ class Reopened(Declared):
 
     path: Path = part("path of the file")
     dataset: xr.Dataset = part(
-        "arrays as a Dataset; of a table (.csv, .parquet), the columns over the dimension `row`", repr=False
+        "arrays as a Dataset; for a table (.csv, .parquet), the columns over the dimension `row`", repr=False
     )
     dataframe: pd.DataFrame = part(
-        "columns as a table; of a Dataset, the arrays over the dimensions of the first array", repr=False
+        "columns as a table; for a Dataset, the arrays over the dimensions of the first array", repr=False
     )
 
     @property

@@ -54,7 +54,7 @@ class Columns(Declared):
         "m", "latest local maximum on the unloading branch inside the pack", "train point", more="else 0"
     )
     current: FloatArray = column(
-        "A", "current in the coil", "train point", more="0 unless a voltage drives it"
+        "A", "current in the coil", "train point", more="0 without a voltage drive"
     )
     status: TextArray = column("", "status of each run; `NOT_RUN` before the run", "train")
     last: FloatArray = part(

@@ -1,4 +1,4 @@
-"""Tracing of bifurcation curves: start, choice of the extended map, section changes, and reasons for stopping."""
+"""Tracing of bifurcation curves: start, choice of the extended map, section changes, end of the curve."""
 
 from __future__ import annotations
 

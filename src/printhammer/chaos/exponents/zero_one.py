@@ -85,7 +85,7 @@ class ZeroOne(Result):
     cycle: int = scalar(
         "1",
         "cycle length q after which the series most nearly repeats",
-        more="the mean of every q-th number was subtracted",
+        more="the mean of every q-th value was subtracted",
     )
     resolution: float = scalar(
         "1", "amplitude up to which changes of the series are ignored", more="in the unit of the series"

@@ -181,7 +181,7 @@ class Learned:
     scale_error: float = SCALE_ERROR
 
     def drift(self) -> None:
-        """Add process noise to the standard deviations of pack front and current scale, up to their prior values."""
+        """Add process noise to the errors of pack front and current scale, up to their prior values."""
         self.front_error = float(min(np.hypot(self.front_error, _FRONT_DRIFT), FRONT_ERROR))
         self.scale_error = float(min(np.hypot(self.scale_error, _SCALE_DRIFT), SCALE_ERROR))
 
