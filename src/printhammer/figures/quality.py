@@ -162,8 +162,8 @@ _BAR: Final = 0.66  # Height of a bar, as a fraction of the spacing; arbitrary
 def plot_damping(study: DampingStudy) -> Figure:
     """Draw a damping study: safe rate, settle-out time and impulse, one row per material.
 
-    All bars, including the impulse at the backstop, are for the same print force. Hollow bars: the current
-    exceeds the limit. Dashed lines: the unchanged hammer. A text replaces a missing bar.
+    All bars, including the impulse at the backstop, are for the same print force. A bar is hollow if the
+    current exceeds the limit. Dashed lines show the unchanged hammer. A text replaces a missing bar.
     """
     count = len(study.materials)
     figure = new_figure(1.3 + _ROW * count, 7.6)

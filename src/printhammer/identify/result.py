@@ -64,7 +64,7 @@ class FittedConstant(Declared):
     interval: tuple[float, float] = part("bounds of the 95 % interval, SI")
     unit: str = part("SI unit")
     in_file: bool = part(
-        "whether the constant has a key in a hammer file; combinations of constants and exponents have no key",
+        "whether the constant has a key in a hammer file; combinations of constants, and exponents, do not",
         default=True,
     )
     how: str = part(
@@ -72,8 +72,8 @@ class FittedConstant(Declared):
         default="",
     )
     held: bool = part(
-        "whether the constant was held since the data do not determine it; the interval is then its range,"
-        " the standard error infinite",
+        "whether the constant was held since the data do not determine it; in this case the interval is the"
+        " range of the constant, and the standard error is infinite",
         default=False,
     )
 
@@ -121,7 +121,7 @@ class Profile(Declared, eq=False):
     )
     interval: tuple[float, float] = part(
         "bounds of the 95 % interval, where the increase reaches the square of Student's t, SI; infinite"
-        " if it does not"
+        " if the increase stays below"
     )
 
 
@@ -177,7 +177,7 @@ class Fit(Result):
         "", "combinations that the data do not determine, one sentence each", default=()
     )
     profiles: Mapping[str, Profile] = part("profiles of weakly determined constants", default_factory=dict)
-    rejected: str = scalar("", "reason to reject the law", more="empty if the law is not rejected", default="")
+    rejected: str = scalar("", "reason to reject the law", more="empty if the law holds", default="")
     p_value: float = scalar(
         "1",
         "probability of residuals at least as large if the law holds (p-value)",

@@ -63,7 +63,7 @@ def with_friction(damping: DampingPart | None, frictions: Iterable[Friction]) ->
     Raises
     ------
     InputError
-        The damping has another law than `viscous`.
+        The damping law is not `viscous`.
     """
     if damping is not None and not isinstance(damping, ViscousDamping):
         raise InputError.of("damping.law", damping.law, "viscous beside friction")

@@ -289,7 +289,7 @@ def _member(member: FamilyMember, names: list[str]) -> dict[str, Any]:
 
 
 def _spread(family: Family, hammer: Hammer) -> dict[str, Any]:
-    """Return the family's constants as ratios to the shipped hammer's, on a logarithmic axis."""
+    """Return the family's constants as ratios to those of the shipped hammer, on a logarithmic axis."""
     ratios: dict[str, list[float]] = {}
     for key, constant in hammer.constants.items():
         values = [member.constants[key] for member in family.hammers if key in member.constants]

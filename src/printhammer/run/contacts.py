@@ -173,7 +173,7 @@ _FIRINGS: Final = "member firing"
 
 
 class DotTable(Result):
-    """Dots of all ensemble members, one row per member, NaN-padded to equal length."""
+    """Dots of all ensemble members, one row per member, padded with NaN to equal length."""
 
     fired: BoolArray = column(
         "1", "whether the member has this firing, and the run reached its time", _FIRINGS

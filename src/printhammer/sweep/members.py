@@ -61,7 +61,7 @@ class Base(Declared):
     hammer: Hammer = part("the hammer, before the axes change it")
     drive: Mapping[str, Any] = part("tables of the drive file; its waveform only where an axis changes it")
     waveform: Waveform | None = part(
-        "waveform of the drive; None if the hammer's is fired, or an axis changes it"
+        "waveform of the drive; None if the hammer's waveform is fired, or if an axis changes the waveform"
     )
     folder: Path = part("folder of the files that the drive refers to")
     state: tuple[float | None, float | None] = part(

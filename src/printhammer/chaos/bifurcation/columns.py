@@ -53,9 +53,7 @@ class Columns(Declared):
     memory: FloatArray = column(
         "m", "latest local maximum on the unloading branch inside the pack", "train point", more="else 0"
     )
-    current: FloatArray = column(
-        "A", "current in the coil", "train point", more="0 without a voltage drive"
-    )
+    current: FloatArray = column("A", "current in the coil", "train point", more="0 without a voltage drive")
     status: TextArray = column("", "status of each run; `NOT_RUN` before the run", "train")
     last: FloatArray = part(
         "state from which the next train can continue, one firing after the last requested firing, shape (M,"

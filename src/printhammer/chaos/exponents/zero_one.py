@@ -148,7 +148,7 @@ def zero_one(
     Periodic components make M_c(n) oscillate, which hides slow growth. The test of 2009 subtracts the
     contribution of the mean, (mean)^2 (1 - cos n c)/(1 - cos c). Here the mean is subtracted from the series
     itself, which is equivalent in the limit and loses no digits. If a series nearly repeats every q values,
-    the mean of every q-th number is subtracted, so that chaos within narrow bands is detected in short
+    the mean of every q-th value is subtracted, so that chaos within narrow bands is detected in short
     series, too.
 
     The remainder of a settled series is rounding noise, which performs a random walk as chaos does. Therefore
@@ -274,7 +274,7 @@ def without_cycle(numbers: FloatArray, resolution: float) -> tuple[int, FloatArr
     """Estimate the cycle length of a series; return the length, and the series minus its cycle means.
 
     The cycle length q, 1 for the mean alone, minimises the criterion of G. Schwarz (Ann. Statist. 6 (1978)
-    461), n ln(residual variance) + q ln(n), and the means of every q-th number are subtracted. Changes up to
+    461), n ln(residual variance) + q ln(n), and the means of every q-th value are subtracted. Changes up to
     the resolution are ignored. If the residual is not deterministic, it is noise on a cycle, which alone
     would look like chaos; the cycle is then not subtracted.
     """

@@ -1,13 +1,14 @@
 """Stable and unstable manifolds of saddles of the strobe map, as curves in the plane of states.
 
-The unstable manifold of a saddle is the set of states whose backward orbits converge to it, the stable
-manifold the set of states whose forward orbits do, which bounds basins. Both are tangent at the saddle
-to an eigenvector of the monodromy matrix. The unstable manifold is grown from a fundamental segment on that
-eigenvector, whose images under the map are the whole curve; where two images lie too far apart or the curve
-bends too much, a point of the segment between them is added (D. Hobson, J. Comput. Phys. 104 (1993) 14). The
-map has no inverse through the paper's pack or a contact at rest, so the stable manifold is continued instead:
-each further point is the state whose image is a point of the known curve, found by Newton's method with the
-tangent flow (J. P. England, B. Krauskopf and H. M. Osinga, SIAM J. Appl. Dyn. Syst. 3 (2004) 161).
+The unstable manifold of a saddle is the set of states whose backward orbits converge to the saddle. The
+stable manifold is the set of states whose forward orbits converge to the saddle; it bounds basins. At the
+saddle, each manifold is tangent to an eigenvector of the monodromy matrix. The unstable manifold is grown
+from a fundamental segment on that eigenvector, whose images under the map are the whole curve; where two
+images lie too far apart or the curve bends too much, a point of the segment between them is added (D. Hobson,
+J. Comput. Phys. 104 (1993) 14). The map has no inverse through the paper's pack or a contact at rest, so the
+stable manifold is continued instead: each further point is the state whose image is a point of the known
+curve, found by Newton's method with the tangent flow (J. P. England, B. Krauskopf and H. M. Osinga, SIAM J.
+Appl. Dyn. Syst. 3 (2004) 161).
 
 Lengths are in half-widths of the strobe window. Limitation: a curve ends where the map is not differentiable
 or the state is invalid, as behind a rigid backstop; its continuation beyond is not computed.

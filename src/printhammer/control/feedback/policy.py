@@ -1,9 +1,9 @@
 """The control policy: the action of least present and future cost, by dynamic programming.
 
 The cost of a dot is a² (1 + k a⁴) + b² (1 + k b⁴), with a and b its deviations of force and arrival as
-fractions of the limits, so that a deviation near a limit costs far more than others. The return current
-has a small cost, as has an action whose next touch depends strongly on the uncertain speed of the present
-touch. The discounted cost-to-go is a function of the touch (kind, lateness, speed) and of the number
+fractions of the limits, so that a deviation near its limit costs far more than a small one. The return
+current has a small cost, as has an action whose next touch depends strongly on the uncertain speed of the
+present touch. The discounted cost-to-go is a function of the touch (kind, lateness, speed) and of the number
 of dots before the next rest, and satisfies Bellman's equation (R. Bellman, *Dynamic Programming*, 1957). The
 cost-to-go is computed by backward induction from the last dot before a rest.
 

@@ -40,7 +40,7 @@ _ADVANCE, _, _DELAY, _BRAKE = range(len(COLUMNS))
 
 
 def bits_of(times: Mapping[str, FloatArray], tick: float) -> int:
-    """Return the width of a C header's times, bits: 32 for nanoseconds, else 16 if all times fit."""
+    """Return the width, in bits, of the times in a C header: 32 for nanoseconds, else 16 if all times fit."""
     largest = max(float(np.abs(np.rint(values / tick)).max()) for values in times.values())
     return 32 if tick == NANOSECOND or largest > np.iinfo(np.int16).max else 16
 

@@ -1,9 +1,9 @@
 """Multiplier of each history of a compensation table: error growth per dot if the history repeats.
 
-The history of a dot lists the last gaps between dots. Printed again and again, these gaps are a periodic
-pattern, in which this history occurs. The strobe map of the pattern leads from a firing to the firing after
-one repetition. A repetition of n dots with the Floquet multiplier M has the dot-to-dot multiplier
-sign(M) |M|^(1/n), the geometric mean over its dots. Rotations of the gaps are the same pattern.
+The history of a dot lists the last gaps between dots. If these gaps are repeated endlessly, they form a
+periodic pattern, in which this history occurs. The strobe map of the pattern leads from a firing to the
+firing after one repetition. A repetition of n dots with the Floquet multiplier M has the dot-to-dot
+multiplier sign(M) |M|^(1/n), the geometric mean over its dots. Rotations of the gaps are the same pattern.
 
 A rest is represented by the shortest gap that counts as rest, one slot more than the reach, after which the
 residual motion is largest. For equal gaps, the multiplier is the multiplier of a row; see
@@ -41,7 +41,7 @@ def with_multipliers(
 ) -> CompensationTable:
     """Return a copy of a table with the dot-to-dot multiplier of each history, computed for its hammer.
 
-    A table that was rounded to ticks, edited, or read from a file without multipliers has none.
+    A table that was rounded to ticks, edited, or read from a file without multipliers has no multipliers.
 
     Parameters
     ----------

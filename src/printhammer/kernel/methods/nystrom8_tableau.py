@@ -1,6 +1,6 @@
 """Coefficients of the Runge-Kutta-Nystrom pair 8(6) in nine stages, first same as last.
 
-For x'' = f(t, x), where the acceleration does not depend on the velocity. Source: J. R. Dormand, M. E. A.
+The pair integrates x'' = f(t, x), where f does not depend on the velocity. Source: J. R. Dormand, M. E. A.
 El-Mikkawy, P. J. Prince, "High-order embedded Runge-Kutta-Nystrom formulae", IMA J. Numer. Anal. 7 (1987)
 423-430, pair RKN8(6)9FM. Stages are numbered from 1. ``A`` holds the stage weights, ``BX`` and ``BV`` the
 weights of position and velocity at the end, ``EX`` and ``EV`` the differences from the embedded method of
