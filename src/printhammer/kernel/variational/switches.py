@@ -163,7 +163,8 @@ def pass_rebound(node: Any, after: Any, columns: Any, setting: Setting) -> None:
 def pass_reversal(node: Any, after: Any, mode: int, following: int, columns: Any, setting: Setting) -> bool:
     """Propagate the tangent columns through a reversal in the pack.
 
-    Return whether the motion is differentiable there. The energy rows do not jump, since all powers are zero at zero velocity.
+    Return whether the motion is differentiable there. The energy rows do not jump, since all powers are zero
+    at zero velocity.
     """
     hammer, drive = setting.hammer, driven(setting.drive, electric_at_node(after))
     before = acceleration_at(after, mode, node[4], 0.0, hammer, drive)
