@@ -1,7 +1,7 @@
 """The control policy: the action of least present and future cost, by dynamic programming.
 
 The cost of a dot is a² (1 + k a⁴) + b² (1 + k b⁴), with a and b its deviations of force and arrival as
-fractions of the limits, so that a deviation near its limit costs far more than a small one. The return
+fractions of the limits, so that a deviation near its limit costs far more than a small deviation. The return
 current has a small cost, as has an action whose next touch depends strongly on the uncertain speed of the
 present touch. The discounted cost-to-go is a function of the touch (kind, lateness, speed) and of the number
 of dots before the next rest, and satisfies Bellman's equation (R. Bellman, *Dynamic Programming*, 1957). The
