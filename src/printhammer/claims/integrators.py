@@ -1,4 +1,4 @@
-"""Claim about the accuracy and stability of the two integrators of 1983."""
+"""Claim about the accuracy and stability of the two integrators of the 1983 paper."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _RUNGE_KUTTA_LIMIT: Final = math.sqrt(8.0)
 
 @measures("integrator_comparison", *WHOLE)
 def integrator_comparison(context: Context, claim: Claim) -> Measured:
-    """Measure errors of the integrators of 1983 at the paper's steps, and step sizes at which a run fails."""
+    """Measure the errors of both integrators at the paper's step sizes, and the step sizes that fail."""
     reference = context.run(PulseTrain(context.waveform), _CYCLE, tolerance=REFERENCE_TOLERANCE)
     trapezoid, runge_kutta = (_scheme(context, name, 1.0) for name in ("trapezoid", "runge-kutta-4"))
     errors = {motion: _error(motion, reference) for motion in (trapezoid, runge_kutta)}

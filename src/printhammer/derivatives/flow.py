@@ -273,7 +273,7 @@ def without_current(problem: Problem, wanted: Sequence[Parameter], columns: Floa
 
 
 def surface_moves(wanted: Sequence[Parameter]) -> dict[str, FloatArray]:
-    """Return the derivatives of the positions (m) of pack front and backstop with respect to n constants."""
+    """Return the derivatives of the positions [m] of pack front and backstop with respect to n constants."""
     moves = as_arrays(wanted)["hammer"]
     return {"pack": moves[:, FRONT], "backstop": moves[:, POSITION]}
 

@@ -120,7 +120,7 @@ class Sensitivities(Result):
     def logarithmic(self) -> FloatArray:
         """Relative change of a dot's quantity per relative change of a constant, shape (d, q, n).
 
-        NaN for a constant that is zero.
+        The result is NaN for a constant that is zero.
         """
         return _relative(self.derivatives, self.values, self.dots)
 

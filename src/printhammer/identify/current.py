@@ -68,7 +68,7 @@ def check_driver(hammer: Hammer) -> None:
 def probe_current(
     hammer: Hammer, waveform: Waveform, t: FloatArray, *, locked: float | None = None, tau: float = 0.0
 ) -> FloatArray:
-    """Simulate the probe current (A), at ascending times `t` (s), of a coil that is switched on at time 0.
+    """Simulate the probe current [A] at ascending times `t` [s] for a coil that is switched on at time 0.
 
     The armature starts at rest or is locked at a displacement, m; `tau` is the time constant of the probe, s.
     Before time 0 the current is zero.

@@ -72,7 +72,7 @@ _STATUS = ("ok", "newton failed", "diverged")
 
 @dataclass(frozen=True)
 class SchemeRun:
-    """Result of a run with a scheme of 1983: ``t``, s, ``x``, m, ``v``, m/s, ``memory``, m, and ``status``.
+    """Result of a run with a scheme of the 1983 paper: ``t``, ``x``, ``v``, ``memory``, SI, and ``status``.
 
     The arrays have one element per end of a step or per requested time. The memory is the latest local
     maximum while the armature moves out of the pack, and 0 elsewhere.

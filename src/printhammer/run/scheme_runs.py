@@ -23,7 +23,7 @@ from printhammer.run.problem import Problem, Record
 from printhammer.support.arrays import FloatArray, IntArray
 
 READINGS = schemes_1983.READINGS
-"""Rules that decide when the schemes of 1983 take a short step; see `printhammer.kernel.schemes_1983`."""
+"""Rules that decide when a 1983 scheme takes a short step; see `printhammer.kernel.schemes_1983`."""
 
 Reading = schemes_1983.Reading
 Scheme = schemes_1983.Scheme
@@ -32,11 +32,11 @@ _GAUSS = np.polynomial.legendre.leggauss(4)  # Nodes and weights of the quadratu
 
 
 class SchemeProblem(Problem):
-    """Hammer under a drive, integrated with a scheme of 1983.
+    """Hammer under a drive, integrated with a scheme of the 1983 paper.
 
-    Arguments as for `Problem`, with the tolerance ignored; `scale` multiplies all step sizes of the paper's
-    schedule, and `reading`, one of `READINGS`, decides when a short step is taken. Raises InputError if
-    `scale` is not positive, or the hammer has damping.
+    The arguments are those of `Problem`; the tolerance is ignored. `scale` multiplies all step sizes of the
+    paper's schedule, and `reading`, one of `READINGS`, decides when a short step is taken. Raises InputError
+    if `scale` is not positive, or the hammer has damping.
     """
 
     def __init__(

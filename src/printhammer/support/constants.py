@@ -114,7 +114,7 @@ def quantities(model: type[BaseModel]) -> Mapping[str, Quantity]:
 
 @cache
 def options(model: type[BaseModel]) -> Mapping[str, Any]:
-    """List the fields that are no physical constants (choices, flags, file names): annotation by name."""
+    """List the fields that are not physical constants (choices, flags, file names): annotation by name."""
     known = quantities(model)
     return {name: field.annotation for name, field in model.model_fields.items() if name not in known}
 

@@ -148,8 +148,8 @@ class Orbits(Result):
 
         The estimate is not a bound: orbits that no guess comes near are not counted.
 
-        Good-Turing estimate: 1 minus the fraction of guesses that converge to an orbit reached by no other
-        guess (I. J. Good, Biometrika 40 (1953) 237).
+        The Good-Turing estimate is 1 minus the fraction of guesses that converge to an orbit reached by no
+        other guess (I. J. Good, Biometrika 40 (1953) 237).
         """
         return 1.0 - self.hits.count(1) / sum(self.hits) if self.hits else math.nan
 
@@ -168,7 +168,7 @@ class Orbits(Result):
     def indices(self) -> dict[int, int]:
         """Sums of the indices of the fixed points of the strobe map, by number of firings, ascending from 1.
 
-        See `index_sums`. Empty if no theorem gives the sum.
+        See `index_sums`. The array is empty if no theorem gives the sum.
         """
         if not indices_add_up(self.regime) or any(orbit.kind == UNDECIDED for orbit in self.found):
             return {}

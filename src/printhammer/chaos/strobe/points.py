@@ -4,8 +4,8 @@ A pulse train defines an iterated map, the strobe map, in the plane of displacem
 state at one firing to the state at the next. If a firing falls inside a pack contact, the state also includes
 the branch of the pack's law and its memory, the latest local maximum.
 
-*The integrators of 1983.* Strobe points can also be computed by the two integrators of the paper, with the
-paper's step sizes.
+*The integrators of the 1983 paper.* Strobe points can also be computed by the two integrators of the paper,
+with the paper's step sizes.
 
 The panels of Fig. 11 were classified by eye from such points. Integrators with fixed steps that do not locate
 contacts do not compute the motion accurately: every touch adds an error, and the result is a different map,
@@ -295,7 +295,7 @@ def scheme_strobes(
     firings: tuple[int, int] = (FIRST, LAST),
     progress: Progress | None = None,
 ) -> list[Strobe]:
-    """Compute the strobe points of trains from rest with an integration scheme of 1983.
+    """Compute the strobe points of trains from rest with an integration scheme of the 1983 paper.
 
     Parameters
     ----------

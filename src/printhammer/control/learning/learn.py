@@ -128,7 +128,7 @@ def calibrate(
 
 
 def table_of(learner: Learner, base: CompensationTable, driver: str, hammer: Hammer) -> CompensationTable:
-    """Convert the drive selected by a learner, table or open loop, to a table for a hammer.
+    """Convert the drive selected by a learner (a table or an open loop) to a table for a hammer.
 
     `base` is the starting table, tuned for the hammer as switched by `driver`.
     """

@@ -98,7 +98,7 @@ def settled_at(motion: Motion) -> float:
 
 
 def shown_until(motion: Motion) -> float:
-    """Return the end of the time axis for a motion that settles, s: rounded up, with a margin."""
+    """Return the end [s] of the time axis for a motion that settles, rounded up, with a margin."""
     step = 10.0 ** math.floor(math.log10(motion.end)) / 4.0
     return float(min(motion.end, step * math.ceil(1.1 * settled_at(motion) / step)))
 

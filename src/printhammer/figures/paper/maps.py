@@ -179,7 +179,7 @@ def _sheet(ax: Axes, view: _View, time: FloatArray, x: FloatArray, rate: float, 
 def thinned(x: FloatArray, y: FloatArray, room: float) -> tuple[FloatArray, FloatArray]:
     """Thin a curve to fewer points whose polygon stays within `room` of the curve, measured along y.
 
-    Algorithm of D. Douglas and T. Peucker, Cartographica 10 (1973) 112.
+    The algorithm is that of D. Douglas and T. Peucker, Cartographica 10 (1973) 112.
     """
     keep = np.zeros(len(x), dtype=np.bool_)
     keep[[0, -1]] = True

@@ -57,10 +57,10 @@ def poincare(
         Classifications printed in the paper, such as "period-2", by strobe time, s; a panel shows its printed
         classification if the computed one differs.
     scheme : str, optional
-        Integration scheme of 1983, "runge-kutta-4" or "trapezoid", used with the step sizes of the paper, see
-        `printhammer.chaos.strobe.points`; by default the accurate integrator.
+        Integration scheme of the 1983 paper, "runge-kutta-4" or "trapezoid", used with the step sizes of the
+        paper, see `printhammer.chaos.strobe.points`; by default the accurate integrator.
     reading : str, optional
-        Rule that decides where the integrators of 1983 take short steps, one of
+        Rule that decides where the integrators of the 1983 paper take short steps, one of
         `printhammer.run.scheme_runs.READINGS`.
     """
     from matplotlib.lines import Line2D
@@ -111,7 +111,7 @@ def _strobe_points(
     scheme: Scheme | None,
     reading: Reading,
 ) -> list[Strobe]:
-    """Compute the strobe points of the panels, accurately or with a scheme of 1983."""
+    """Compute the strobe points of the panels, accurately or with a scheme of the 1983 paper."""
     if scheme is None:
         from printhammer.chaos import strobes
 

@@ -2,7 +2,7 @@
 
 Inverse mass [1/kg], backstop position [m] and pack front [m] come first. The packed constants of damping,
 spring, pack, backstop, coil with supply, and magnet follow, each part at a fixed index: thirteen elements
-are reserved for the damping, 272 for the spring, sixteen for each of the others, and any number for the
+are reserved for the damping, 272 for the spring, sixteen for each other part, and any number for the
 magnet, which is last.
 """
 

@@ -1,4 +1,4 @@
-"""Results of the reconstruction: base rates, predictions, search, family, schemes of 1983.
+"""Results of the reconstruction: base rates, predictions, search, family, schemes of the 1983 paper.
 
 Five JSON files in the folder `data` beside this module, each with ``"format": 1``; any of them may be absent.
 All values are SI.
@@ -241,7 +241,7 @@ class Change(_Table):
 
 
 class Schemes(_Table):
-    """Effect of the integrators of 1983 on the classification of panels and on the claims."""
+    """Effect of the integrators of the 1983 paper on the classification of panels and on the claims."""
 
     format: Literal[1] = Field(description="1, the version of the format")
     shipped: str = Field(description="the fingerprint of the hammer of panels and claims")

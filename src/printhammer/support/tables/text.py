@@ -2,7 +2,7 @@
 
 Blank lines are skipped. Lines that begin with #, or with ; (sigrok) or % (Matlab), are comments; a comment
 such as ``# sampling rate: 1 MHz`` is stored as key and text. A row whose first cell is an error value of a
-spreadsheet, such as #N/A, is no comment.
+spreadsheet, such as #N/A, is not a comment.
 
 Cells are classified as numbers, gaps or out-of-range readings; decimal marks and thousands separators are
 converted.
