@@ -135,7 +135,7 @@ def driver_of(hammer: Hammer, current: float = LARGEST_CURRENT, edge: float | No
 
 REMEMBERED: Final = 4  # Number of the latest pulses whose currents may not have decayed; arbitrary
 APART: Final = 1e-9  # Shortest time between two switchings, s; arbitrary
-# Prior standard deviation of the pack's front position, as a fraction of the stroke; arbitrary
+# Prior standard deviation of the position of the pack's front, as a fraction of the stroke; arbitrary
 FRONT_ERROR: Final = 0.04
 SCALE_ERROR: Final = 0.03  # Prior standard deviation of the current scale; arbitrary
 # Standard deviations of the random walk per decision (process noise); arbitrary

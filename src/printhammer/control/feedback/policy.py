@@ -58,7 +58,7 @@ class Fronts:
     # One impact map for each of `OFFSETS`, with the same touches and the same actions
     maps: tuple[ImpactMap, ...]
     landings: tuple[Landing, ...]  # One set of landings for each of `OFFSETS`
-    # Derivative of the force with respect to the distance of the front, with unchanged switching: in
+    # Derivative of the force with respect to the distance of the pack's front, with unchanged switching: in
     # single-pulse forces per stroke, (T, A)
     front_force: FloatArray
 

@@ -135,8 +135,8 @@ def _look_closely(task: Task, periods: FloatArray, groups: list[Ways]) -> None:
     New candidates are added to the groups of the periods.
     """
     least = [group.cost.min(initial=np.inf) for group in groups]
-    # Where even the re-solved neighbours cost more than `_FAR`, no candidate is expected; an unstable one may
-    # have a stable neighbour.
+    # Where even the re-solved neighbours cost more than `_FAR`, no candidate is expected. An unstable
+    # candidate may have a stable neighbour.
     hope = [row for row, cost in enumerate(least) if BAD < cost <= _FAR or UNSTABLE <= cost < np.inf]
     close, shifts = _CLOSE * task.scale, [later * task.scale for later in _LATER]
     nodes = spaced(periods[hope], close)
