@@ -58,7 +58,7 @@ class ToleranceYield(Result):
     spreads: Mapping[str, float] = part("relative spread of each varying constant, to either side")
     factors: FloatArray = column(
         "1",
-        "constant over that of the design; for the front of the pack, its distance from the backstop",
+        "constant over that of the design; for the front, its distance from the backstop",
         "member constant",
         more="in the order of `spreads`",
         name="factor",
