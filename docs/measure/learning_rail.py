@@ -1,14 +1,18 @@
 """Measure learning for hammers with a rail driver, from the coil current alone and from a microphone.
 
-Run ``.venv/bin/python docs/measure/learning_rail.py``. The script draws units of the paper's
-hammer with a 100 V rail, and counts the dots of the de Bruijn cycle of order 8 and of rows of 200 slots
-within limits, at multiples of the open-loop safe rate of the current-driven hammer; ``--wire`` uses the
-shipped wire of a dot-matrix head instead, at 1200 Hz. The microphone of each unit has an unknown offset, with
-a standard deviation of 25 us. It takes some minutes; ``--units N`` sets the number of units.
+Run ``.venv/bin/python docs/measure/learning_rail.py``. The script draws units of the paper's hammer with
+the 100 V rail of ``examples/behind_a_rail.py``, and counts the dots of the de Bruijn cycle of order 8 and of
+rows of 200 slots within limits, at multiples of the open-loop safe rate of the current-driven hammer;
+``--wire`` uses the shipped wire of a dot-matrix head instead, at 1200 Hz. The microphone of each unit has an
+unknown offset, with a standard deviation of 25 us. It takes some minutes; ``--units N`` sets the number of
+units.
 """
 
 import argparse
+import runpy
+from pathlib import Path
 
+import matplotlib
 import numpy as np
 from measured import MOTION, Cell, Column, open_loop_rate, write
 
@@ -33,8 +37,10 @@ BOUND = 5.0
 AFTER = (0, 50, 200, 1000)
 MEMBERS = 150
 NOISE = "50 mV"
-COIL = {"resistance": 28.6, "inductance": "6.547 mH"}
-RAIL = {"shape": "rail", "voltage": 100.0, "width": "177.24 us", "decay_resistance": "159.1 ohm"}
+VOLTAGE = 100.0
+"""Rail voltage, V, one of those of `EXAMPLE`; arbitrary."""
+EXAMPLE = Path(__file__).parents[2] / "examples" / "behind_a_rail.py"
+"""Example that fits coil and rail drivers to the current of the paper's hammer."""
 ROOMS = (
     *MOTION,
     "derivatives",
@@ -110,7 +116,9 @@ def main() -> None:
         write("learning-wire", columns, rows, {**settings, "rate": WIRE}, ROOMS, ("impact-wire",))
         return
     plain = ph.load("hendriks-1983")
-    hammer, safe = plain.replace({"coil": COIL, "waveform": RAIL}), open_loop_rate(plain)
+    matplotlib.use("Agg")
+    hammer, _error = runpy.run_path(str(EXAMPLE))["devices"][VOLTAGE]
+    safe = open_loop_rate(plain)
     units = Variability().draw(hammer, count, 7)
     coil = ph.impact_time(hammer, signal="voltage", noise=[NOISE], dots=200, units=50).sensor()
     print(coil, flush=True)
