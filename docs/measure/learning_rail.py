@@ -4,8 +4,8 @@ Run ``.venv/bin/python docs/measure/learning_rail.py``. The script draws units o
 the 100 V rail of ``examples/behind_a_rail.py``, and counts the dots of the de Bruijn cycle of order 8 and of
 rows of 200 slots within limits, at multiples of the open-loop safe rate of the current-driven hammer;
 ``--wire`` uses the shipped wire of a dot-matrix head instead, at 1200 Hz. The microphone of each unit has an
-unknown offset, with a standard deviation of 25 us. It takes some minutes; ``--units N`` sets the number of
-units.
+unknown offset, with a standard deviation of 25 us. Ten units take some 25 minutes
+of processor time; ``--units N`` sets the number of units.
 """
 
 import argparse

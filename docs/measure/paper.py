@@ -3,8 +3,8 @@
 Run ``.venv/bin/python docs/measure/paper.py``. The script draws hammers from the variability of a
 production. Each hammer prints the de Bruijn cycle of order 8 on uniform paper, on paper that varies, and
 on paper that varies twice as much; the script counts the dots within limits in open loop, with a table,
-with a table learned from impact times and forces by a sensor of unknown offset, and with feedback. It takes
-some twenty minutes on one core.
+with a table learned from impact times and forces by a sensor of unknown offset, and with feedback. Five
+units at one rate take some ten minutes of processor time.
 
 ``--units N`` sets the number of hammers, ``--share X`` the rate as a multiple of the open-loop safe rate.
 """

@@ -58,7 +58,9 @@ def energy(
     pulses: bool = opt.switch(
         "Use only pulses of the hammer's waveform, and optimise their firing times and widths."
     ),
-    supply: bool = opt.switch("Also report the dots of the burst with all currents scaled by 0.97 to 1.03."),
+    supply: bool = opt.switch(
+        "Report the dots of the burst for a supply error, with all currents scaled by 0.97 to 1.03."
+    ),
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:

@@ -97,7 +97,7 @@ def paper(
     out: Path = opt.folder(
         "Output folder for the report; an earlier report is replaced.", default=Path("build/paper")
     ),
-    pdf: bool = opt.switch("Also write the report as a PDF file, report.pdf."),
+    pdf: bool = opt.switch("Add a PDF version of the report, report.pdf."),
     strict: bool = opt.switch("Exit with status 1 if a claim fails."),
 ) -> Answer:
     """Reproduce all figures and claims of the paper: HTML report, figures and claims.json."""
