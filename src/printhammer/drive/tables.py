@@ -61,13 +61,13 @@ def close(table: Any, rows: int, end: float) -> int:
 
 
 def half_sine(fields: Any, table: Any) -> int:
-    """Write the table of a half sine: amplitude, width; return the number of rows."""
+    """Write the table of a half sine: fields amplitude, width; return the number of rows."""
     rows = put(table, 0, 0.0, SINE, 0.0, fields[0], math.pi / fields[1], 0.0)
     return close(table, rows, fields[1])
 
 
 def sine(fields: Any, table: Any) -> int:
-    """Write the table of an endless sine wave: amplitude, frequency, phase; return the number of rows."""
+    """Write the table of an endless sine: fields amplitude, frequency, phase; return the number of rows."""
     rows = put(table, 0, 0.0, SINE, 0.0, fields[0], 2.0 * math.pi * fields[1], fields[2])
     return close(table, rows, math.inf)
 
@@ -78,7 +78,7 @@ def rate_of(time_constant: float) -> float:
 
 
 def rectangle(fields: Any, table: Any) -> int:
-    """Write the table of a rectangle: amplitude, width, rise and decay times; return the number of rows."""
+    """Write the table of a rectangle: fields amplitude, width, rise, decay; return the number of rows."""
     amplitude, width = fields[0], fields[1]
     up, down = rate_of(fields[2]), rate_of(fields[3])
     if math.isinf(up):
@@ -94,7 +94,7 @@ def rectangle(fields: Any, table: Any) -> int:
 
 
 def trapezoid(fields: Any, table: Any) -> int:
-    """Write the table of a trapezoid: amplitude, rise, width of the top, fall; return the number of rows."""
+    """Write the table of a trapezoid: fields amplitude, rise, width, fall; return the number of rows."""
     amplitude, width = fields[0], fields[2]
     up, down = rate_of(fields[1]), rate_of(fields[3])
     rows = 0

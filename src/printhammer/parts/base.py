@@ -155,11 +155,11 @@ def domain_of(*parts: MagnetPart | SpringPart | None) -> tuple[float, float]:
 
 
 class PackPart(Part):
-    """Base class of ribbon and paper packs: `pack_loading`, `pack_memory`, `pack_unloading` and `MEMORY`.
+    """Base class of ribbon and paper packs.
 
-    A rigid stop has `RIGID_FRONT` and `pack_rebound` instead.
-
-    A subclass has the constant `front`, the displacement at which the armature first touches the pack, m.
+    A pack defines `pack_loading`, `pack_memory`, `pack_unloading` and `MEMORY`; a rigid stop defines
+    `RIGID_FRONT` and `pack_rebound` instead. A subclass has the constant `front`, the displacement, m, at
+    which the armature first touches the pack.
     """
 
     role: ClassVar[str] = "pack"
@@ -191,7 +191,10 @@ class BackstopPart(Part):
 
 
 class DampingPart(Part):
-    """Base class of the armature's damping at every displacement: `damping_force(c, v)`, smooth in v."""
+    """Base class of dampers of the armature at every displacement.
+
+    A subclass defines `damping_force(c, v)`, a smooth function of v.
+    """
 
     role: ClassVar[str] = "damping"
 

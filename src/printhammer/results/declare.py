@@ -258,9 +258,9 @@ def _type_text(annotation: str, dims: tuple[str, ...]) -> str:
 class Declared:
     """Base of classes with declared fields but without a Dataset; subclasses are frozen dataclasses.
 
-    The fields declare their meanings like the fields of a result; the Attributes section of the docstring
-    follows from the declarations. With `eq=False` instances are compared by identity, as required for fields
-    that are arrays.
+    The fields declare their meanings like the fields of a result; the Attributes section of the docstring is
+    generated from the declarations. With `eq=False` instances are compared by identity, as required for
+    fields that are arrays.
     """
 
     if TYPE_CHECKING:

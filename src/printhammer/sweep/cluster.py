@@ -193,7 +193,7 @@ class _Tasks:
 
 
 def _task(base: Base, outputs: Outputs, rows: FloatArray, wanted: dict[str, str]) -> Results | str:
-    """Compute a block on a worker with equal software versions; return the results or an error message."""
+    """Compute a block on a worker; return the results, or an error message if software versions differ."""
     for name, version in versions().items():
         if version != wanted[name]:
             return f"a worker of the cluster has {name} {version}: expected {wanted[name]}"

@@ -269,7 +269,7 @@ def points_of(series: Any, firing: Firing) -> Any:
 def strobe_of(
     train: Train, firing: IntArray, states: States, tolerance: float, judged: Verdict | None
 ) -> Strobe:
-    """Build a `Strobe` from the states of a train at selected firings and the classification."""
+    """Build a `Strobe` from the states of a train at selected firings and the train's classification."""
     return Strobe(
         hammer=train.hammer,
         drive=train.drive,

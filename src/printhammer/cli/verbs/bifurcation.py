@@ -60,7 +60,7 @@ def bifurcation(
         " (down) order.",
         default="from-rest",
     ),
-    firings: int = opt.whole("Number of firings at each value.", default=1000),
+    firings: int = opt.whole("Number of firings at each parameter value.", default=1000),
     exponents: bool = opt.switch(
         "Compute Lyapunov exponents, to separate strange (chaotic) from undecided motions.", default=True
     ),

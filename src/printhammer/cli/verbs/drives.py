@@ -39,7 +39,7 @@ _MOST_RATES: Final = 200  # Largest number of rates; each takes seconds to minut
         "spacing": opt.text(
             "TIME",
             "Time between nodes of the current, e.g. '50 us' "
-            "(default: 0.6 of the time in which a pulse indents the pack).",
+            "(default: 0.6 times the duration of the indentation by a single pulse).",
         ),
         "tolerance": opt.TOLERANCE,
     },

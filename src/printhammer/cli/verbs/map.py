@@ -146,7 +146,7 @@ def _axes(
 
 
 def _complaints(chart: xr.Dataset) -> list[str]:
-    """Return one complaint for each status of runs that stopped early, with the rates of those runs."""
+    """Return one warning for each status with which runs stopped early; the warning names their rates."""
     from printhammer.maps.frequency import failed_rates
 
     complaints = []

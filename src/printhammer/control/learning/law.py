@@ -329,8 +329,9 @@ class LearningLaw:
     def started_anew(self, belief: Belief) -> LearningLaw | None:
         """Return a copy of the law that starts from a table tuned for the most probable hammer.
 
-        The dots from rest of the tuned hammer have the force and the arrival times of the nominal hammer. The
-        result is None if no table prints every dot.
+        Width and advance of the table's pulses are adjusted so that the dots from rest of the most probable
+        hammer have the force and the arrival times of the nominal dots. The result is None if no table
+        prints every dot.
         """
         task = self.entries.task
         (hammer,) = self.production.hammers(belief.modes[0].mean[None])

@@ -61,8 +61,8 @@ if TYPE_CHECKING:
 
 FORCE: Final = 0.9  # Default least force of an adequate dot, relative to the single pulse; arbitrary
 SPACING: Final = 0.6
-"""Default time between the nodes of the current, as a fraction of the time in which a single pulse indents
-the pack; rounded to a whole fraction of the period. Arbitrary."""
+"""Default time between the nodes of the current, as a fraction of the duration of the indentation by a single
+pulse; rounded to a whole fraction of the period. Arbitrary."""
 
 MOST_DOTS: Final = 1000  # Largest number of dots in a burst; arbitrary
 Least = Literal["positive work", "heat"]

@@ -237,10 +237,10 @@ class Shooting:
         return Chain(motion, ends[:-1] - states, by_parameter, by_state, ends_p[:-1], ends_s[:-1])
 
     def shown(self, shot: int, motion: FloatArray) -> FloatArray:
-        """Apply the sensor model: return the readings at the samples of a shot, at rest before the firing.
+        """Apply the sensor model: return the readings at the samples of a shot.
 
         `motion` is displacement and velocity on the grid, or derivatives of them, shape (g, 2, ...); the
-        readings have the shape (n, ...).
+        readings have the shape (n, ...). Samples before the firing read the rest position.
         """
         plan = self.plans[shot]
         flat = motion.reshape(len(motion), 2, -1)

@@ -323,7 +323,7 @@ def _judge(law: PackLaw, data: Data, solution: Solution) -> tuple[float, str]:
 
 
 def _notes(law: PackLaw, table: Readings, solution: Solution) -> list[str]:
-    """Return remarks on missing unloading rows, and on fitted turning points off the largest indentation."""
+    """Return remarks on missing unloading rows and on misfits of the largest indentation of a cycle."""
     if not len(law.turns):
         return ["without rows of unloading the hysteresis of the pack is taken from equation (5), not tested"]
     sentences = []

@@ -213,7 +213,7 @@ class File:
         return content
 
     def _alone(self) -> AbstractContextManager[None]:
-        """Return a context manager that locks the file; another process may write the content first."""
+        """Return a context manager that locks the file; check for the content again under the lock."""
         return nullcontext() if self._written is None else _alone(self._written / self.name)
 
 

@@ -1,4 +1,4 @@
-"""Event location within a step: change of the coil current's path, or end of a rest of the armature.
+"""Event location within a step: change of the coil's current path, or end of a rest of the armature.
 
 The event is the first root of an event function, called `gap`: a smooth function of the state that is
 positive until the event; see `printhammer.kernel.model.circuit.path_gap`. The Bernstein coefficients of the
@@ -170,7 +170,7 @@ def land_on_gap(
 def circuit_switch(
     start: Any, end: Any, electric: Electric, law: ForceLaw, control: Control
 ) -> tuple[int, Any, Electric]:
-    """Search a step off the backstop for a change of the coil current's path or the end of a rest.
+    """Search a step off the backstop for a change of the coil's current path or the end of a rest.
 
     Returns
     -------
@@ -201,7 +201,7 @@ def circuit_switch(
 
 @compiled
 def contact_gap(w: float, v: float, electric: Electric, hammer: Hammer, live: Any) -> float:
-    """Evaluate the event function of the coil current's path, `path_gap`, at a state in the backstop."""
+    """Evaluate `path_gap`, the event function for a change of current path, during a backstop contact."""
     return path_gap(hammer[POSITION] - w * w, v, electric, hammer, live)
 
 
@@ -209,7 +209,7 @@ def contact_gap(w: float, v: float, electric: Electric, hammer: Hammer, live: An
 def contact_gap_and_change(
     t: float, w: float, v: float, kv: float, electric: Electric, h: float, hammer: Hammer, live: Any
 ) -> tuple[float, float]:
-    """Evaluate the event function of the coil current's path in the backstop, and its change over `h`."""
+    """Evaluate `path_gap` during a backstop contact, and its change over `h`."""
     gap = contact_gap(w, v, electric, hammer, live)
     pause = SHARE * h
     pace = 2.0 * w * pause
@@ -222,7 +222,7 @@ def contact_gap_and_change(
 def land_on_gap_in_contact(
     start: Any, h: float, hammer: Hammer, drive: Drive
 ) -> tuple[float, float, float, float, Electric]:
-    """Locate a change of the coil current's path in a backstop step `h` of the regularised variable s.
+    """Locate a change of the coil's current path in a backstop step `h` of the regularised variable s.
 
     Returns
     -------

@@ -261,7 +261,7 @@ def path_may_change(live: Any) -> bool:
 
 @compiled
 def path_gap(x: float, v: float, electric: Electric, hammer: Hammer, live: Any) -> float:
-    """Return the event function of the coil current's path: of order one, positive until a change of path."""
+    """Return the event function for a change of current path: of order one, positive until the change."""
     kind, path = kind_of(live), path_of(live)
     scale = hammer[CURRENT_SCALE]
     if kind == SWITCHED_PIECE:
@@ -307,7 +307,7 @@ def next_path(t: float, x: float, electric: Electric, hammer: Hammer, live: Any)
 
 @compiled
 def enter_piece(t: float, x: float, electric: Electric, hammer: Hammer, live: Any) -> Electric:
-    """Select the coil current's path when a piece begins or an off-time ends; return the electric state."""
+    """Select the coil's current path when a piece begins or an off-time ends; return the electric state."""
     current = coil_current(x, electric, hammer, live)
     kind = kind_of(live)
     if kind == SWITCHED_PIECE and current >= live[6]:

@@ -122,16 +122,16 @@ def is_on_stop(mode: int) -> bool:
 
 @inlined
 def least_at_rest(mode: int, held: float) -> float:
-    """Return the lowest acceleration [m/s^2] with which an armature stays at rest.
+    """Return the lowest acceleration [m/s^2], by all forces but friction, at which an armature stays at rest.
 
-    `held` is the largest acceleration against which friction, or the resolution of the run, holds it.
+    `held` is the largest acceleration that friction balances, or that the run does not resolve.
     """
     return -math.inf if mode == RESTING else -held
 
 
 @inlined
 def most_at_rest(mode: int, held: float) -> float:
-    """Return the highest acceleration [m/s^2] with which an armature stays at rest; see `least_at_rest`."""
+    """Return the highest acceleration [m/s^2] at which an armature stays at rest; see `least_at_rest`."""
     if RIGID_FRONT and mode == RESTING_FRONT:
         return math.inf
     return held
