@@ -90,7 +90,7 @@ def main() -> None:
 
 
 def final_of(hammer: Hammer, tolerance: float, end: float) -> tuple[float, float, float]:
-    """Return displacement, m, velocity, m/s, and current, A, at the end of one pulse."""
+    """Return displacement [m], velocity [m/s] and current [A] at the end of one pulse."""
     drive = ph.PulseTrain(hammer.waveform, rate=800.0, pulses=1)
     motion = ph.simulate(hammer, drive, duration=end, tolerance=tolerance)
     (x,), (v,), (i,) = *motion.at([end]), motion.driven_at([end])

@@ -63,7 +63,7 @@ class Pulse:
         self.state, self.parameters = self.integrator.state, self.integrator.pars
 
     def run(self, end: float) -> tuple[float, float, float]:
-        """Integrate to `end`, s; return displacement, m, velocity, m/s, and current, A."""
+        """Integrate to `end` [s]; return displacement [m], velocity [m/s] and current [A]."""
         self.end, self.phase = end / _TIME, 0
         self.integrator.time = 0.0
         self._contact(inside=True)

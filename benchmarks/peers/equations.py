@@ -48,7 +48,7 @@ def hammer_constants(task: Task) -> FloatArray:
 
 @lru_cache(maxsize=32)
 def current_pieces(task: Task, end: float) -> FloatArray:
-    """Return the smooth pieces of the current up to time `end`, s: rows (begin, end, A, B, rate).
+    """Return the smooth pieces of the current up to time `end` [s]: rows (begin, end, A, B, rate).
 
     The current of a piece is A + B exp(-rate (t - begin)), A. Between pulses it is zero.
     """

@@ -34,7 +34,7 @@ class Stretch(NamedTuple):
     t : float
         End time, s.
     state : array, shape (2,)
-        Displacement, m, and velocity, m/s, at the end time.
+        Displacement [m], and velocity [m/s] at the end time.
     event : int
         Index of the guard function that ended the stretch; -1 at the requested end.
     at : array
@@ -59,7 +59,7 @@ class Solver(Protocol):
         state: FloatArray,
         times: FloatArray,
     ) -> Stretch:
-        """Integrate from time `begin`, s, to `end`, s, or to the first event."""
+        """Integrate from time `begin` [s] to `end` [s] or to the first event."""
 
 
 def event_split(task: Task, end: float, grid: FloatArray, solver: Solver) -> FloatArray:

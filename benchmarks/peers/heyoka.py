@@ -274,7 +274,7 @@ class Batch:
         return bool(self.running)
 
     def run(self) -> FloatArray:
-        """Integrate all members; return displacement, m, and velocity, m/s, at their ends."""
+        """Integrate all members; return displacement [m] and velocity [m/s] at their ends."""
         self.at = list(range(self.width))
         self.next = self.running = self.width
         integrator = self.integrator

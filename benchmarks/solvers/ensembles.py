@@ -185,7 +185,7 @@ def _errors(
 
 
 def _rounds(works: list[Callable[[], object]], rounds: int, say: Say) -> list[list[float]]:
-    """Time each function once in every round; return the times, s, by function."""
+    """Time each function once in every round; return the times [s], by function."""
     for work in works:
         work()
     samples: list[list[float]] = [[] for _ in works]

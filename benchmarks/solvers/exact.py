@@ -38,7 +38,7 @@ def ensemble(task: Task, members: int) -> FloatArray:
 
 
 def trusted(hammer: Hammer, drive: Drive, end: float, times: FloatArray, stroke: float) -> FloatArray:
-    """Return the reference displacement at times, s, in m; NaN from the horizon of the run onward.
+    """Return the reference displacement [m] at times [s]; NaN from the horizon of the run onward.
 
     At the horizon, two references with the tolerances 1e-13 and 1e-14 differ by 1e-10 of the stroke; later
     comparisons are meaningless.

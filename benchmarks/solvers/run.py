@@ -69,7 +69,7 @@ def run(
 
 
 def _compiling(engine: str) -> float:
-    """Return the time, s, to compile the code of an engine in a process with an empty cache."""
+    """Return the time [s] to compile the code of an engine in a process with an empty cache."""
     with tempfile.TemporaryDirectory(prefix="printhammer-bench-") as folder:
         done = subprocess.run(
             [sys.executable, "-c", _COMPILING, engine],

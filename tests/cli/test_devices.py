@@ -30,7 +30,7 @@ PAPER = 0.28e-3
 
 
 def timed(monkeypatch: pytest.MonkeyPatch, flight: float) -> None:
-    """Let every single pulse fly for a time, s, without a run."""
+    """Let every single pulse fly for a time [s] without a run."""
     monkeypatch.setattr(window, "window_of", lambda *_: window.Window(20.0 * flight, flight))
 
 

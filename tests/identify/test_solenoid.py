@@ -24,7 +24,7 @@ MADE = {
 
 
 def write_table(path: Path, rows: list[tuple[float, float]]) -> Path:
-    """Write what a circuit of 900 turns shows at gaps, m, and currents, A."""
+    """Write what a circuit of 900 turns shows at gaps [m] and currents [A]."""
     c = ReluctanceMagnet(turns=900.0, closed_at=0.0, **MADE).packed(0.0)
     lines = ["gap [mm],current [mA],force [N],linkage [mWb]"]
     lines += [

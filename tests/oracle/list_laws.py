@@ -130,7 +130,7 @@ class Stop:
 
 @dataclass(frozen=True)
 class System:
-    """Mass, lists of forces and contacts, and the scales of displacement, m, and velocity, m/s, of errors."""
+    """Mass, lists of forces and contacts, and the scales of displacement [m] and velocity [m/s] of errors."""
 
     mass: float
     forces: tuple[Spring | Damping | Constant, ...] = ()

@@ -69,7 +69,7 @@ class Run:
         return [event.time for event in self.events if event.kind == kind and name in (None, event.name)]
 
     def at(self, times: Sequence[float] | Array) -> tuple[Array, Array]:
-        """Displacements, m, and velocities, m/s, at times of the run, each by a step of order 8."""
+        """Displacements [m], and velocities [m/s] at times of the run, each by a step of order 8."""
         starts = [step.t for step in self.steps]
         states = []
         for t in times:

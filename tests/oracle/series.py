@@ -46,7 +46,7 @@ class Step:
     v: Array
 
     def at(self, time: Array) -> tuple[Array, Array]:
-        """Return displacements, m, and velocities, m/s."""
+        """Return displacements [m] and velocities [m/s]."""
         s = (time - self.t) / self.h
         return self.ref + horner(self.y, s), horner(self.v, s)
 
@@ -83,7 +83,7 @@ class ReferenceRun:
         return self.steps[-1].t + self.steps[-1].length if self.steps else 0.0
 
     def at(self, times: ArrayLike) -> tuple[Array, Array]:
-        """Displacement, m, and velocity, m/s, at any times of the run; NaN after its end."""
+        """Displacement [m], and velocity [m/s] at any times of the run; NaN after its end."""
         wanted = np.atleast_1d(np.asarray(times, dtype=float))
         x, v = np.full(wanted.size, math.nan), np.full(wanted.size, math.nan)
         places = np.searchsorted([step.t for step in self.steps], wanted, side="right") - 1

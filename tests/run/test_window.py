@@ -109,7 +109,7 @@ def test_a_device_that_does_not_strike_or_settle_is_not_waited_for_without_end()
 
 
 def oscillators(count: int) -> Iterator[tuple[float, float, float, float, float]]:
-    """Mass, kg, damping, N s/m, stiffness, N/m, of linear oscillators; force, N, and width, s, of a pulse."""
+    """Mass, kg, damping, N s/m, stiffness, N/m, of linear oscillators; force [N] and width [s] of a pulse."""
     random = np.random.default_rng(38)
     for _ in range(count):
         mass, time, quality, width = 10.0 ** random.uniform([-4.0, -4.0, -1.0, -4.0], [-1.0, -1.5, 1.5, -1.5])

@@ -350,7 +350,7 @@ def impact_train(
     ----------
     touches : Section, Regime, Hammer or array
         A section from `printhammer.section`; or a regime, or a hammer with the keywords `firing`, whose
-        section is computed; or at least nine impact times, s, ascending.
+        section is computed; or at least nine impact times [s], ascending.
     window : float or str, optional
         Length of the windows for the Fano factor, s, or text with a unit; by default ten periods of the
         drive, or ten mean intervals without a drive. With a window of one period, every train with one dot

@@ -156,7 +156,7 @@ def _exceeds(drive: Drive, limit: float) -> bool:
 
 
 def hang_up_range(context: Context) -> tuple[float | None, list[Motion], float]:
-    """Find the hang-up range: lowest rate, Hz; motions from that rate on; highest rate simulated, Hz.
+    """Find the hang-up range: lowest rate [Hz]; motions from that rate on; highest rate simulated, Hz.
 
     The highest rate is the last rate of the claim, or the highest that the current limit permits. The lowest
     rate is None if the armature does not hang up at the highest rate.
@@ -337,7 +337,7 @@ def erratic_pairs(
 ) -> tuple[BoolArray, BoolArray]:
     """Return masks of neighbouring rates between which a late dot changes, and of rates with unequal dots.
 
-    A dot changes if it is printed at only one of the two rates, or if its flight times, s, differ by more
+    A dot changes if it is printed at only one of the two rates, or if its flight times [s] differ by more
     than `flight_time_change_s`; dots before `first_dot` do not count. Dots vary if one is lost, or if their
     flight times differ by more than `flight_time_spread_s`. Both input tables have one row per rate; the
     masks have shapes (rates - 1,) and (rates,).
@@ -354,7 +354,7 @@ def erratic_share(
 ) -> tuple[float | None, float | None]:
     """Compute the fraction of erratic pairs of rates, from the first rate with unequal dots up to hang-up.
 
-    Returns the fraction and that first rate, Hz; None if dots vary at no rate, or only above the hang-up rate
+    Return the fraction and that first rate [Hz]; None if dots vary at no rate, or only above the hang-up rate
     `hang_up`, Hz. The masks `erratic` and `varies` are from `erratic_pairs`.
     """
     if not varies.any():

@@ -18,7 +18,7 @@ _LATTICE: Final = 101  # Points along each axis of the window; arbitrary
 
 
 def window() -> tuple[FloatArray, FloatArray]:
-    """Return centre and half-widths of the window of Fig. 11: displacement, m, and velocity, m/s."""
+    """Return centre and half-widths of the window of Fig. 11: displacement [m] and velocity [m/s]."""
     settings = claims()["poincare_window"].settings
     low, high = np.array([settings["window_x_m"], settings["window_v_m_per_s"]]).T
     return 0.5 * (low + high), 0.5 * (high - low)

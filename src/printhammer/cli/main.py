@@ -1,7 +1,7 @@
 """The program `printhammer`: its verbs and its exit status.
 
 Exit status: 0 for success; 1 if a run stopped early, or with ``--strict`` a claim fails; 2 for bad input,
-described in one sentence on the standard error; 130 after Ctrl-C.
+described in one sentence on standard error; 130 after Ctrl-C.
 
 `MODULES` lists all verbs of the command line, in the order of the help. A command line that begins with the
 name of a verb imports the module of this verb alone.

@@ -343,7 +343,7 @@ def tables_beside(path: Path, *names: str | None) -> list[Path]:
 
 
 def announce_compiling() -> None:
-    """Print a remark on the standard error before each compilation of machine code."""
+    """Print a remark to standard error before each compilation of machine code."""
     from printhammer.run.simulate import announce_compiling as announce
 
     announce(say)

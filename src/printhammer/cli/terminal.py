@@ -1,6 +1,6 @@
-"""Output of the command line: results on the standard output, messages on the standard error.
+"""Output of the command line: results to standard output, messages to standard error.
 
-Progress displays appear on the standard error, and only if it is a terminal.
+Progress displays appear on standard error, and only if it is a terminal.
 """
 
 from __future__ import annotations
@@ -63,18 +63,18 @@ def _print(text: str) -> None:
 
 
 def complain(sentence: str) -> None:
-    """Print one line on the standard error."""
+    """Print one line to standard error."""
     text = " ".join(sentence.split())
     _print(f"[red]printhammer:[/red] {escape(text)}")
 
 
 def say(sentence: str) -> None:
-    """Print a remark on the standard error, so that piped output contains results only."""
+    """Print a remark to standard error, so that piped output contains results only."""
     _print(f"[dim]{escape(sentence)}[/dim]")
 
 
 def warn(sentence: str) -> None:
-    """Print a warning on the standard error."""
+    """Print a warning to standard error."""
     _print(f"[yellow]warning:[/yellow] {escape(sentence)}")
 
 

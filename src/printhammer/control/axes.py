@@ -248,7 +248,7 @@ def tune_along(
     Raises
     ------
     InputError
-        The axis is unknown or the values do not ascend; other errors are those of `printhammer.tune`.
+        The axis is unknown or the values do not ascend; for other errors see `printhammer.tune`.
     """
     if axis not in AXES:
         raise InputError.of("axis", axis, f"one of {', '.join(AXES)}")

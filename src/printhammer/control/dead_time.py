@@ -51,8 +51,8 @@ def header_text(
 ) -> str:
     """Render dead times and pulse widths as a C header (C99); units: mV, 0.1 degC and ns.
 
-    `tables` maps names to arrays of times, s, with one row per rail `voltage`, V, and one column per coil
-    `temperature`, degC; NaN is written as 0. `blow` is the impact speed, m/s, at the tabulated pulse widths.
+    `tables` maps names to arrays of times [s] with one row per rail `voltage` [V] and one column per coil
+    `temperature` [degC]; NaN is written as 0. `blow` is the impact speed [m/s] at the tabulated pulse widths.
     """
     from printhammer import __version__
 
@@ -267,11 +267,11 @@ def dead_time(
     hammer : Hammer
         The hammer, whose waveform must be a driver on a rail.
     voltage : sequence of float or str, optional
-        Rail voltages, V, in any order; by default the rail of the waveform, and 10 % below and above.
+        Rail voltages [V] in any order; by default the rail of the waveform, and 10 % below and above.
     temperature : sequence of float or str, optional
-        Coil temperatures, degC; by default 20, 60 and 100 degC.
+        Coil temperatures [degC]; by default 20, 60 and 100 degC.
     blow : float or str, optional
-        Impact speed, m/s, for which widths are computed; by default the impact speed of the hammer's own
+        Impact speed [m/s] for which widths are computed; by default the impact speed of the hammer's own
         pulse at nominal rail and temperature, which may be out of reach on a lower rail or with a warmer
         coil.
 
@@ -347,7 +347,7 @@ def _reference(hammer: Hammer, waveform: Waveform, tolerance: float) -> tuple[_F
 
 
 def _fire(hammer: Hammer, pulse: Waveform, span: float, tolerance: float) -> _Fired:
-    """Simulate one firing from rest for `span`, s; the outcome is NaN without an impact."""
+    """Simulate one firing from rest for `span` [s]; the outcome is NaN without an impact."""
     from printhammer.drive.trains import PulseTrain
     from printhammer.run.simulate import simulate
 

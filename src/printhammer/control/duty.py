@@ -109,7 +109,7 @@ def read_temperature(value: float | str, name: str) -> float:
 
 
 def _share(feed: str, temperature: float) -> float:
-    """Return the coil heat per dot at a temperature, degC, divided by the heat per dot at 20 degC."""
+    """Return the coil heat per dot at a temperature [degC], divided by the heat per dot at 20 degC."""
     warm = 1.0 + COPPER * (temperature - REFERENCE)
     return {"voltage": 1.0 / warm, "current": warm, "energy": 1.0}[feed]
 
@@ -246,7 +246,7 @@ def thermal_duty(
     ambient : sequence of float or str, optional
         Ambient temperatures, degC.
     burst : sequence of float or str, optional
-        Burst rates, Hz, for which to compute steady temperature, time to the limit and largest duty cycle; by
+        Burst rates [Hz] for which to compute steady temperature, time to the limit and largest duty cycle; by
         default the largest continuous rate at any of the ambient temperatures.
     feed : str, optional
         Quantity that the driver keeps constant as the coil warms: "voltage", "current" or "energy".
@@ -405,7 +405,7 @@ def heat_of(hammer: Hammer) -> DotHeat:
 
 
 def _copper_loss(hammer: Hammer, drive: PulseTrain) -> tuple[float, float]:
-    """Simulate one firing until the current has decayed; return coil heat, J, and decay time, s."""
+    """Simulate one firing until the current has decayed; return coil heat [J] and decay time [s]."""
     from printhammer.run.simulate import simulate
 
     span = 4.0 * drive.waveform.support

@@ -397,11 +397,11 @@ class Sampling(Declared):
         return slow if self.delay == 0.0 else np.interp(times - self.delay, times, slow)
 
     def clipped(self, values: FloatArray) -> FloatArray:
-        """Clip values, A or V, to the range of the converter."""
+        """Clip values [A or V] to the range of the converter."""
         span = math.inf if self.full_scale is None else self.full_scale
         return np.clip(values, 0.0, span)
 
     def read(self, values: FloatArray, rng: np.random.Generator) -> FloatArray:
-        """Return readings of true values, A or V, of any shape, with noise, quantisation and clipping."""
+        """Return readings of true values [A or V] of any shape, with noise, quantisation and clipping."""
         noisy = values + self.noise * rng.standard_normal(values.shape)
         return self.clipped(np.rint(noisy / self.step) * self.step)

@@ -299,7 +299,7 @@ def unit_record(unit: Hammer, estimator: ImpactEstimator, probe: Sampling) -> tu
 def errors_of(
     estimator: ImpactEstimator, records: Sequence[Any], dots: int, rng: np.random.Generator
 ) -> tuple[FloatArray, BoolArray]:
-    """Return the errors of estimated impact times, s, and a mask of the estimates that are not flagged.
+    """Return the errors of estimated impact times [s] and a mask of the estimates that are not flagged.
 
     `records` are the signals and flight times from `unit_record`; dot number n uses record n modulo the
     number of records.

@@ -75,9 +75,9 @@ def thermal_limit(
     Parameters
     ----------
     ambient, rate : sequence of float or str
-        Ambient temperatures, degC, and the largest dot rates at these temperatures, Hz.
+        Ambient temperatures [degC] and the largest dot rates at these temperatures, Hz.
     voltage : sequence of float or str, optional
-        Rail voltages, V, of the rates; by default one common rail.
+        Rail voltages [V] of the rates; by default one common rail.
 
     Raises
     ------

@@ -282,7 +282,7 @@ class _Look:
     ) -> dict[str, FloatArray]:
         """Compute the derivatives of depth, force, work, loss and contact time of a dot on a pack.
 
-        `speed` and `later` are the derivatives of speed, m/s, and time of the touch, s, and `touch` the
+        `speed` and `later` are the derivatives of touch speed [m/s] and touch time [s], and `touch` the
         columns before the touch.
         """
         changes: dict[str, FloatArray] = {}

@@ -97,7 +97,7 @@ def carry_columns(
     marks : array, shape (m,)
         Ascending times at which the columns are returned, s.
     initial : array, shape (3, n), with a circuit (3, n) or (6, n)
-        Changes of displacement, m, velocity, m/s, and latest local maximum, m, at the first mark; rows 3 to
+        Changes of displacement [m], velocity [m/s] and latest local maximum [m] at the first mark; rows 3 to
         5, zero by default, are changes of the flux linkages of the coil and of its shorted turn, Wb, and of
         the reservoir voltage, V. If no current flows, the displacement determines the linkage, and the given
         change of the linkage is ignored.
@@ -200,7 +200,7 @@ def flow(
 def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
     """Return the derivatives of the rest state at time 0 with respect to n constants, shape (3, n).
 
-    The rows are displacement, m, velocity, m/s, and latest local maximum, m. If a pulse with a sharp edge is
+    The rows: displacement [m], velocity [m/s] and latest local maximum [m]. If a pulse with a sharp edge is
     fired at time 0, a shift of its firing changes the initial velocity. With a coil circuit, the shape is (6,
     n), for a start without current.
     """
@@ -224,7 +224,7 @@ def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
 def _released(hammer: Hammer, push: float, before: float) -> float:
     """Return the net force [N] after a jump `push` of the force on a resting armature; 0 if still at rest.
 
-    `before` is the sum of the forces, N, that a stop or friction balances until the jump.
+    `before` is the sum of the forces [N] that a stop or friction balances until the jump.
     """
     after, damping = push + before, hammer.damping
     if isinstance(damping, DryFriction):
@@ -293,7 +293,7 @@ def pack_push_changes(
 
 
 def pack_push_rate(problem: Problem, record: Record, t: float) -> float:
-    """Return the rate of change of the pack force, N/s, at a time, s; NaN off the loading branch."""
+    """Return the rate of change of the pack force, N/s, at a time [s]; NaN off the loading branch."""
     row = problem.resample(record, np.array([t]))[0]
     if int(row[9]) != M.LOADING:
         return math.nan

@@ -214,7 +214,7 @@ def _travel(hammer: Hammer) -> float:
 
 
 def _is_possible(hammer: Hammer, state: FloatArray) -> bool:
-    """Whether a displacement, m, and a velocity, m/s, are a valid initial state of a hammer."""
+    """Whether a displacement [m] and a velocity [m/s] are a valid initial state of a hammer."""
     try:
         initial_state(hammer, state.tolist())
     except InputError:

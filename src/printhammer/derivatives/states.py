@@ -36,7 +36,7 @@ _FEWEST: Final = 8
 class TangentMap(Declared):
     """Derivative of the state at one time with respect to the state at an earlier time.
 
-    The state is displacement, m, and velocity, m/s; on the unloading branch of a pack with memory also the
+    The state is displacement [m] and velocity [m/s]; on the unloading branch of a pack with memory also the
     displacement of the latest local maximum, m (0 in `state_at_start` and `state_at_end` if the state does
     not include a memory). If a voltage drives the coil, the flux linkages of the coil and of its shorted
     turn, Wb, and the voltage of the reservoir, V, follow if the circuit has them. Without a current, the
@@ -153,7 +153,7 @@ def tangent_map(
     start, end : float
         Times, s, in a run that begins at time 0. At a discontinuity, the state after it is used.
     state : sequence of float, optional
-        Displacement, m, velocity, m/s, and any further components at time 0, as for `printhammer.simulate`;
+        Displacement [m], velocity [m/s] and any further components at time 0, as for `printhammer.simulate`;
         by default the rest state.
     tolerance : float, optional
         Error allowed in one step of the run.
@@ -196,7 +196,7 @@ def problem_between(
     state: Sequence[float] | None,
     tolerance: float,
 ) -> Problem:
-    """Build the problem of a tangent map from `start` to `end`, s; check the arguments of `tangent_map`."""
+    """Build the problem of a tangent map from `start` to `end` [s]; check the arguments of `tangent_map`."""
     if not (math.isfinite(start) and math.isfinite(end) and 0.0 <= start < end):
         raise InputError(
             f"start = {start!r} s and end = {end!r} s",

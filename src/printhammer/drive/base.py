@@ -51,7 +51,7 @@ class Drive:
 
     @property
     def times(self) -> FloatArray:
-        """Firing times, s, ascending, read-only."""
+        """Firing times [s], ascending, read-only."""
         return self._times
 
     @property
@@ -97,7 +97,7 @@ class Drive:
     def kernel_arrays(self) -> tuple[FloatArray, IntArray, FloatArray, bool, bool]:
         """Return the arrays of the drive for the kernel, as a tuple.
 
-        The arrays are the firing times, s, the first row of each firing's segment table, and all segment
+        The arrays are the firing times [s], the first row of each firing's segment table, and all segment
         tables, stacked by `printhammer.drive.segments.stacked`. Two flags follow: whether pulses replace each
         other, and whether the drive is a force.
         """
@@ -128,7 +128,7 @@ class Drive:
 
     @property
     def peak(self) -> float:
-        """Largest absolute value of the total current, A, or force, N; exact if pulses do not overlap."""
+        """Largest absolute value of the total current [A] or force [N]; exact if pulses do not overlap."""
         several = self.overlapping
         if several == 1:
             return self.largest_pulse
@@ -173,7 +173,7 @@ class Drive:
         return self.overlapping
 
     def _values(self, time: FloatArray, pulse: IntArray) -> FloatArray:
-        """Return the values, A or N, of the pulses with given indices at given times, s."""
+        """Return the values [A or N] of the pulses with given indices at given times [s]."""
         return evaluate(self._segments, time, self._times[pulse])
 
     def __eq__(self, other: object) -> bool:

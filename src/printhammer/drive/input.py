@@ -50,7 +50,7 @@ def read_positive(value: float | str, si: str, name: str) -> float:
 
 
 def period_of_rate(rate: float | str) -> float:
-    """Parse a rate, Hz, and return its period, s.
+    """Parse a rate [Hz] and return its period [s].
 
     Firing k of a train is at k times its period, so that a rate and its period yield identical firing times.
     """
@@ -96,7 +96,7 @@ def even_times(
 
     Returns
     -------
-    The firing times, s; the name of the passed argument, "rate" or "period", and its value; the period, s.
+    The firing times [s]; the name of the passed argument, "rate" or "period", and its value; the period [s].
     """
     steps = np.arange(count, dtype=np.float64)
     if rate is not None:
@@ -123,7 +123,7 @@ def read_times(at: Iterable[float | str]) -> FloatArray:
 
 
 def checked_times(times: npt.ArrayLike) -> FloatArray:
-    """Validate firing times, s; return a read-only array."""
+    """Validate firing times [s]; return a read-only array."""
     result = np.array(times, dtype=np.float64)
     if result.ndim != 1 or not 1 <= result.size <= MOST_PULSES:
         raise InputError(

@@ -33,7 +33,7 @@ class PulseSequence(Drive):
     waveforms
         Waveform of each firing; all currents or all forces.
     at
-        Firing times, s, ascending, one for each waveform.
+        Firing times [s], ascending, one for each waveform.
     overlap
         "add": overlapping pulses add up; "replace": each firing cuts off the preceding pulse.
     start
@@ -104,7 +104,7 @@ class PulseSequence(Drive):
 
     @property
     def peak(self) -> float:
-        """Largest absolute value of the total current, A, or force, N; exact if pulses do not overlap."""
+        """Largest absolute value of the total current [A] or force [N]; exact if pulses do not overlap."""
         if self._waveform.replaces:
             return self.largest_pulse
         whole = np.append(self._ends()[:-1] <= self._times[1:], True)
@@ -126,7 +126,7 @@ class PulseSequence(Drive):
         return result
 
     def with_times(self, times: Iterable[float | str]) -> PulseSequence:
-        """Return a drive with the same waveforms at new firing times, s, one for each waveform.
+        """Return a drive with the same waveforms at new firing times [s], one for each waveform.
 
         Raises
         ------

@@ -133,12 +133,12 @@ def series_of(fields: Any) -> float:
 
 
 def put_on(fields: Any, table: Any, row: int, at: float, upper: float, lower: float) -> int:
-    """Write the on segment of a driver, from time `at`, s; return the index of the next row."""
+    """Write the on segment of a driver, from time `at` [s]; return the index of the next row."""
     return put(table, row, at, SWITCHED, fields[_VOLTAGE], series_of(fields), upper, lower)
 
 
 def put_off(fields: Any, table: Any, row: int, at: float) -> int:
-    """Write the off segment of a driver, from time `at`, s, and the end row; return the number of rows."""
+    """Write the off segment of a driver, from time `at` [s] and the end row; return the number of rows."""
     decay = fields[len(fields) - 1]
     against = fields[_DECAY_VOLTAGE]
     if math.isnan(against):

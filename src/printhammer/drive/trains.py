@@ -73,7 +73,7 @@ class PulseTrain(_Pulsed):
     rate, period
         Firings per second, Hz, or the time between them, s; one of the two.
     at
-        Firing times, s, ascending, instead of a rate or period.
+        Firing times [s], ascending, instead of a rate or period.
     pulses
         Number of firings; by default nine, as in the bursts of the paper, or one without rate and period.
     overlap

@@ -70,7 +70,7 @@ def inked(
 ) -> FloatArray:
     """Render dots; return optical densities of the paper's pixels from the top left, shape (rows, columns).
 
-    The dots are given by centres, m, densities and a common diameter, m, and are clipped at the edges of the
+    The dots are given by centres [m], densities and a common diameter [m], and clipped at the edges of the
     sheet. The pixel size is at least `finest`, m.
     """
     size, rows, columns = sheet.pixels(finest)

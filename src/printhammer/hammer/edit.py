@@ -37,7 +37,7 @@ def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, sour
     The key names a constant or option, such as "mass" or "pack.stiffness", a table, such as "backstop", or
     an entry of a list, such as "contact.pole". The value of a constant is text with a unit, a number in SI or
     a `Constant`; the value of a table is a part, a waveform or a mapping; None deletes the key. `status` and
-    `source` are those of new constants.
+    `source` are assigned to new constants.
     """
     section, _, name = key.rpartition(".")
     if key in SELECTORS:

@@ -483,7 +483,7 @@ def _check_order(contents: Contents) -> None:
 
 
 def _has_force(part: MagnetPart | SpringPart, place: float) -> bool:
-    """Whether a magnet or spring has a finite force at a displacement, m; always True for a spring."""
+    """Whether a magnet or spring has a finite force at a displacement [m]; always True for a spring."""
     if isinstance(part, SpringPart):
         return True
     return math.isfinite(import_module(part.module).magnet_force(part.packed(0.0), place, 0.0))

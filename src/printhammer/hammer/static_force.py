@@ -56,7 +56,7 @@ class StaticForce:
     Magnet, spring and the elastic force of the backstop are functions of x; the pack acts on its loading
     branch, as when fresh paper is pressed slowly. A `rigid` backstop excludes positions below its surface.
     `limits`, m, is the range in which the laws are valid and no rigid backstop is penetrated. `low`
-    and `high`, m, bound the default search for equilibria: from the lower limit to the platen, the end of the
+    and `high` [m] bound the default search for equilibria: from the lower limit to the platen, the end of the
     pack or the upper limit, and at most 1 m from the origin.
     """
 
@@ -126,7 +126,7 @@ class StaticForce:
         return derivative(self.spring, x, step)
 
     def anchors(self) -> list[float]:
-        """Return the positions, m, near which the search grid for equilibria is refined."""
+        """Return the positions [m] near which the search grid for equilibria is refined."""
         places = [self.low, self.high, self.statics.position, self.front, self.hammer.origin, 0.0]
         return sorted({place for place in places if self.low <= place <= self.high})
 

@@ -255,7 +255,7 @@ def rest_position(s: Statics, work: Work, out: Any) -> int:
     Returns
     -------
     int
-        Outcome, such as `RESTS`. For `RESTS`, ``out[0]`` is the position, m; otherwise ``out[1]`` is the
+        Outcome, such as `RESTS`. For `RESTS`, ``out[0]`` is the position [m]; otherwise ``out[1]`` is the
         number stated in the error message: end of the range, m, or force at the backstop, N.
     """
     first, last = reach_of(FARTHER[0], s)

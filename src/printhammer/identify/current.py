@@ -70,7 +70,7 @@ def probe_current(
 ) -> FloatArray:
     """Simulate the probe current [A] at ascending times `t` [s] for a coil that is switched on at time 0.
 
-    The armature starts at rest or is locked at a displacement, m; `tau` is the time constant of the probe, s.
+    The armature starts at rest or is locked at a displacement [m]; `tau` is the probe's time constant [s].
     Before time 0 the current is zero.
 
     Raises

@@ -24,8 +24,8 @@ def fit(
     Parameters
     ----------
     kind : str
-        "magnet": F0, Am, Bm (and Bs, As) from forces over displacement and current; "solenoid": the
-        magnetic circuit of the law `reluctance` from forces and inductances over the gap; "spring": Bs, As
+        "magnet": F0, Am, Bm (and Bs, As) from forces against displacement and current; "solenoid": the
+        magnetic circuit of the law `reluctance` from forces and inductances against the gap; "spring": Bs, As
         from forces of the spring alone; "pack": the stiffness from load cycles; "backstop": l/k, and l, from
         rebounds; "motion": mass, damping and so on from records of single shots; "coil": resistance,
         inductance and so on from records of the current while a voltage is applied.

@@ -20,7 +20,7 @@ from printhammer.support.tables.readings import Readings
 
 
 def time_constant(bandwidth: float | None) -> float:
-    """Return the time constant, s, of a first-order sensor with the bandwidth, Hz; 0 for None (unlimited)."""
+    """Return the time constant [s] of a first-order sensor with a bandwidth [Hz]; 0 for None (unlimited)."""
     return 0.0 if bandwidth is None else 1.0 / (2.0 * math.pi * bandwidth)
 
 
@@ -44,8 +44,8 @@ def bandwidth_of(table: Readings) -> float | None:
 def lowpass_motion(times: FloatArray, x: FloatArray, v: FloatArray, tau: float) -> FloatArray:
     """Low-pass filter the displacements of motions that are at rest before the first time.
 
-    `x` and `v` contain the displacements, m, and velocities, m/s, of several motions, or their derivatives,
-    at ascending times, s; shape (times, motions), as the result. Between the times the displacement is the
+    `x` and `v` contain the displacements [m] and velocities [m/s] of several motions, or their derivatives,
+    at ascending times [s]; shape (times, motions), as the result. Between the times the displacement is the
     cubic Hermite interpolant.
     """
     if tau == 0.0 or len(times) < 2:
@@ -65,7 +65,7 @@ def lowpass_motion(times: FloatArray, x: FloatArray, v: FloatArray, tau: float) 
 
 
 def lowpass_lines(times: FloatArray, values: FloatArray, tau: float) -> FloatArray:
-    """Low-pass filter a piecewise linear signal, given by values at ascending times, s, shape (n,).
+    """Low-pass filter a piecewise linear signal, given by values at ascending times [s], shape (n,).
 
     At the first time the output equals the input.
     """
@@ -81,7 +81,7 @@ def lowpass_lines(times: FloatArray, values: FloatArray, tau: float) -> FloatArr
 
 
 def lowpass_waveform(segments: FloatArray, t: npt.ArrayLike, tau: float) -> FloatArray:
-    """Low-pass filter a waveform, A or N, fired at time 0; return the output at ascending times, s.
+    """Low-pass filter a waveform [A or N], fired at time 0; return the output at ascending times [s].
 
     The waveform is a segment table (`printhammer.drive.segments`) with finite support; the time constant
     is positive.

@@ -123,7 +123,7 @@ def integrate(
     front, position : float
         Displacements of the pack front and the backstop, m; +inf and -inf for an absent pack and backstop.
     state : (x, v)
-        Initial displacement, m, and velocity, m/s.
+        Initial displacement [m] and velocity [m/s].
     t_end : float
         Duration of the run, s.
     scheme : {"trapezoid", "runge-kutta-4"}
@@ -142,7 +142,7 @@ def integrate(
     reload_along_unloading : bool
         Whether reloading inside a contact follows the unloading branch up to the local maximum.
     far : float
-        Absolute displacement, m, beyond which the motion counts as diverged.
+        Absolute displacement [m] beyond which the motion counts as diverged.
 
     Returns
     -------

@@ -63,7 +63,7 @@ def map_dataset(
     attributes: Mapping[str, Any],
     notes: Mapping[str, Mapping[str, str]] | None = None,
 ) -> xr.Dataset:
-    """Build the Dataset of a map over rates, Hz, and times from the first firing, s.
+    """Build the Dataset of a map over rates [Hz] and times from the first firing, s.
 
     `variables` are arrays in SI by name, including `displacement`, with the dimensions of `LAYOUT`.
     `attributes` belong to the Dataset; `notes` are attributes of single variables, by name.
@@ -180,7 +180,7 @@ def frequency_map(
     hammer : Hammer
         The hammer.
     rates : array, optional
-        Firing rates, Hz or text with units, ascending; by default 512 from 500 Hz to 2 kHz for a
+        Firing rates [Hz] or text with units, ascending; by default 512 from 500 Hz to 2 kHz for a
         flight time of 0.28 ms, lower for a slower device; see `printhammer.run.window.time_scale`.
     pulses : int, optional
         Number of firings at each rate.
@@ -262,7 +262,7 @@ def rms_difference(computed: xr.Dataset, measured: xr.Dataset) -> tuple[FloatArr
     rates : array, shape (n,)
         Rates common to both maps, Hz.
     difference : array, shape (n,)
-        Root mean square of the difference of their displacements, m, over the times at which both are
+        Root mean square of the difference of their displacements [m] over the times at which both are
         known; NaN if no such time exists.
     """
     rows, others = matching(computed, measured)

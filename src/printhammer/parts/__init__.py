@@ -30,7 +30,7 @@ damping   ``damping_force(c, v)``; with dry friction also ``FRICTION`` = True an
 argument      meaning
 ============  ===============================================================================================
 ``c``         packed constants, a float64 array, in the order that the module states
-``x``, ``v``  displacement, m, and velocity, m/s
+``x``, ``v``  displacement [m] and velocity [m/s]
 ``current``   current of the coil, A
 ``linkage``   flux linkage of the coil, Wb, including that of a constant series ``inductance``, H
 ``peak``      displacement of the latest local maximum inside this contact of the pack, m
@@ -39,7 +39,7 @@ argument      meaning
 ``v_in``      velocity before an impact, m/s, positive at the front, negative at the backstop
 ============  ===============================================================================================
 
-Forces are in N, positive toward the paper. The force is minus the slope of the energy, J; for the magnet, at
+Forces are in N, positive toward the paper. The force is minus the slope of the energy [J]; for the magnet, at
 zero current. Force and flux linkage of a magnet are slopes of one coenergy: ``magnet_emf`` is the slope of
 the linkage along x and that of the force along the current, ``magnet_inductance`` the slope of the linkage
 along the current, and ``magnet_current`` its inverse. Functions that a module omits are taken from

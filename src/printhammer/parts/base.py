@@ -176,7 +176,7 @@ class BackstopPart(Part):
     """Base class of backstops.
 
     A rigid backstop defines `RIGID` and `backstop_rebound`; any other backstop defines `backstop_elastic`,
-    `backstop_viscous` and `backstop_energy`. A subclass has the constant `position`, the displacement, m, at
+    `backstop_viscous` and `backstop_energy`. A subclass has the constant `position`, the displacement [m] at
     which the armature first touches the backstop.
     """
 

@@ -72,8 +72,8 @@ class Store:
     Raises
     ------
     InputError
-        The folder contains other data, or results of another identity; another process holds the lock; the
-        folder cannot be written; zarr is not installed. Existing data are kept.
+        The folder contains other data, or results of a sweep with other settings; another process holds the
+        lock; the folder cannot be written; zarr is not installed. Existing data are kept.
     """
 
     def __init__(self, path: str | Path, layout: Layout, now: str) -> None:

@@ -289,7 +289,7 @@ def sticks_of(record: Record) -> list[Stick]:
 
 
 def extrema(problem: Problem, record: Record, sign: float) -> tuple[FloatArray, FloatArray]:
-    """Locate all local maxima of `sign` * displacement; return their times, s, and displacements, m."""
+    """Locate all local maxima of `sign` * displacement; return their times [s] and displacements [m]."""
     nodes = record.nodes
     before, after = sign * nodes[:-1, 2], sign * nodes[1:, 2]
     # The two nodes of an impact on a rigid surface, at the same time, are an extremum, too.

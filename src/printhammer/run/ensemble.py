@@ -86,7 +86,7 @@ class Strobes(Result):
 
     @property
     def electric(self) -> FloatArray | None:
-        """Currents, A, and capacitor voltage, V, shape (members, strobes, 3); None without a circuit."""
+        """Currents [A], and capacitor voltage [V], shape (members, strobes, 3); None without a circuit."""
         parts = [part for part in (self.current, self.turn, self.reservoir) if part is not None]
         return np.stack(parts, axis=2) if parts else None
 
@@ -331,10 +331,10 @@ class Ensemble:
         extra : bool, optional
             Whether to store every extra contact; only with `dots`.
         strobes : str or sequence of arrays, optional
-            Times of stored states: every firing ("firings"), or ascending times, s, one array for each
+            Times of stored states: every firing ("firings"), or ascending times [s], one array for each
             member.
         times : array, optional
-            Ascending times, s, at which the displacement is stored.
+            Ascending times [s] at which the displacement is stored.
         x : float32 array, shape (M, T), optional
             Array for the displacements; by default a new array.
         threads : int, optional

@@ -191,8 +191,8 @@ class Motion(Result, fields=False):
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, Mapping[str, FloatArray]]:
         """Return all curves of a plot at the given times of the run [s], in one pass.
 
-        The curves are displacement, m, velocity, m/s, current in the coil, A, or force of the drive, N,
-        voltage across the coil, V (zero unless the drive is a voltage), and the forces, N, by name.
+        The curves are displacement [m], velocity [m/s], coil current [A] or drive force [N],
+        voltage across the coil [V] (zero unless the drive is a voltage), and the forces [N], by name.
         """
         table = self._resampled(t)
         if self._problem.laws.circuit:
@@ -245,16 +245,16 @@ class Motion(Result, fields=False):
         return table
 
     def at(self, t: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return (x, v), m and m/s, at times of the run, s; at a jump of the velocity, after the jump."""
+        """Return displacement [m] and velocity [m/s] at times of the run, s; after a jump at its instant."""
         table = self._resampled(t)
         return table[:, 0], table[:, 1]
 
     def state_at(self, t: float) -> tuple[float, ...]:
         """Return the state at a time [s] of the run, from which another run can start: see `simulate`.
 
-        Displacement, m, velocity, m/s, branch of the pack (-1 outside the pack) and memory, m; under a
-        voltage also the currents in the coil and in its shorted turn, A, and the voltage of the supply's
-        capacitor, V. A run that begins with this state and with a firing continues exactly as this run does.
+        Displacement [m], velocity [m/s], branch of the pack (-1 outside the pack) and memory [m]; under a
+        voltage also the currents in the coil and in its shorted turn [A], and the voltage of the supply's
+        capacitor [V]. A run that begins with this state and with a firing continues exactly as this run does.
 
         Raises
         ------

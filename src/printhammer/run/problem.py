@@ -268,7 +268,7 @@ class Problem:
         return np.empty((count, node_width(self.laws)))
 
     def run(self, end: float) -> Record:
-        """Integrate from the initial state to time `end`, s; return the record of the run."""
+        """Integrate from the initial state to time `end` [s]; return the record of the run."""
         # A generous size: unused memory costs nothing, but a repeated run does.
         flights = min(max(end - self.start, 0.0) * self.scales[1] / self.scales[0], _MOST_FLIGHTS)
         capacity = _NODES + int(_NODES_A_FLIGHT * flights)
@@ -293,7 +293,7 @@ class Problem:
         contacts: FloatArray,
         state: FloatArray,
     ) -> tuple[int, int, int, int]:
-        """Integrate to time `end`, s, or to a pause, from the start or from `state`."""
+        """Integrate to time `end` [s] or to a pause, from the start or from `state`."""
         status, used, touched, steps = self.kernel.run(
             (drive, self.constants, self.control, self.bounds, max_steps),
             float(end),
@@ -304,7 +304,7 @@ class Problem:
         return status, used, touched, steps
 
     def in_stretches(self, end: float, capacity: int, take: Callable[[Iterator[Stretch]], T]) -> T:
-        """Integrate to time `end`, s, and process the record in stretches, so that memory does not grow.
+        """Integrate to time `end` [s] and process the record in stretches, so that memory does not grow.
 
         `take` receives an iterator of stretches of at most `capacity` nodes, and need not exhaust it; if a
         contact alone has more nodes, `take` is called again with longer stretches. Returns its result.
@@ -330,7 +330,7 @@ class Problem:
                 contacts[0] = contacts[touched - 1]
 
     def resample(self, record: Record, times: FloatArray) -> FloatArray:
-        """Return states and forces at ascending times, s, shape (times, `columns`), from the kernel."""
+        """Return states and forces at ascending times [s], shape (times, `columns`), from the kernel."""
         out = np.empty((times.size, self.columns))
         self.kernel.resample(times, record.nodes, self.drive_arrays(), self.constants, out)
         return out

@@ -261,7 +261,7 @@ class Regime(Declared):
         return train, float(train.times[before])
 
     def moments(self, train: Drive, firings: int, phase: float | None = None) -> FloatArray:
-        """Return the section times, s, shape (firings + 1,), of a drive returned by `train`.
+        """Return the section times [s], shape (firings + 1,), of a drive returned by `train`.
 
         A section lies `phase` periods after each firing, by default the phase of the regime.
         """

@@ -80,7 +80,7 @@ class SchemeProblem(Problem):
         return getattr(module, name, None) or getattr(absent, name)
 
     def integrate(self, end: float, moments: FloatArray | None = None) -> schemes_1983.SchemeRun:
-        """Integrate to time `end`, s; return the states at the step ends, or at given times."""
+        """Integrate to time `end` [s]; return the states at the step ends, or at given times."""
         hammer = self.hammer
         return schemes_1983.integrate(
             self.laws,
@@ -102,7 +102,7 @@ class SchemeProblem(Problem):
     def strobed(
         self, moments: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray, str]:
-        """Return time, displacement, velocity, mode and memory at given times, s, and the status.
+        """Return time, displacement, velocity, mode and memory at given times [s] and the status.
 
         After a failure of the scheme, these values are NaN, and the mode is -1.
         """
@@ -118,7 +118,7 @@ class SchemeProblem(Problem):
         return t, x, v, mode, memory, run.status
 
     def run(self, end: float) -> Record:
-        """Integrate to time `end`, s; a diverged run has the status "step underflow"."""
+        """Integrate to time `end` [s]; a diverged run has the status "step underflow"."""
         run = self.integrate(end)
         nodes = self._nodes(run.t, run.x, run.v)
         return Record(

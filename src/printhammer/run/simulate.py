@@ -60,7 +60,7 @@ def simulate(
     state : sequence of float or str, optional
         Displacement [m] and velocity [m/s] at time 0, as numbers or text with units; by default the rest
         state. For a start inside the pack, mode and memory may be added, see
-        `printhammer.run.ensemble.Strobes`. With a voltage drive, the coil current, A, may be added, or three
+        `printhammer.run.ensemble.Strobes`. With a voltage drive, the coil current [A] may be added, or three
         values: the currents in the coil and in its shorted turn, A, and the voltage of the supply's
         capacitor, V. By default the currents are zero and the capacitor is charged. `Motion.state_at` returns
         all components.

@@ -142,7 +142,7 @@ def typical_current(hammer: Hammer, drive: Drive) -> float:
 
 
 def current_scale(hammer: Hammer, drive: Drive) -> float:
-    """Return the scale that normalises differences of the coil current, A; 1 without a voltage drive."""
+    """Return the scale that normalises differences of the coil current [A]; 1 without a voltage drive."""
     return typical_current(hammer, drive) if drive.quantity == "voltage" else 1.0
 
 

@@ -104,7 +104,7 @@ def time_scale(hammer: Hammer, waveform: Waveform | None = None) -> float:
 
 
 def scaled_rate(hammer: Hammer, rate: float, waveform: Waveform | None = None) -> float:
-    """Divide a rate, Hz, stated for the paper's hammer, by the time scale of a device."""
+    """Divide a rate [Hz], stated for the paper's hammer, by the time scale of a device."""
     return rate / time_scale(hammer, waveform)
 
 

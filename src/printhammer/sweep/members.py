@@ -34,7 +34,7 @@ _OF_DRIVE: Final = ("waveform", "drive", "at")
 
 @dataclass(frozen=True)
 class Member:
-    """One run of a sweep: hammer, drive, end time, s, and initial displacement, m, and velocity, m/s."""
+    """One run of a sweep: hammer, drive, end time [s], initial displacement [m] and velocity [m/s]."""
 
     hammer: Hammer
     drive: Drive

@@ -167,7 +167,7 @@ def _unsettled(
 def _moments(
     members: Members, outputs: Outputs, *, ending: bool
 ) -> tuple[list[FloatArray] | None, list[Any], list[int]]:
-    """Return each member's output times, s, and the array indices of the firings and of the end time.
+    """Return each member's output times [s] and the array indices of the firings and of the end time.
 
     `ending` states whether the end time is an output time.
     """

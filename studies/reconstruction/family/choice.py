@@ -60,7 +60,7 @@ def at_gauge(
 ) -> dict[str, float]:
     """Return constants with the same motion, scaled to the print force and current of the search.
 
-    See `scaled`; `print_force` is the peak force, N, of the dot of a single pulse with these constants.
+    See `scaled`; `print_force` is the peak force [N] of the dot of a single pulse with these constants.
     """
     amplitude = constants["waveform.amplitude"]
     return scaled(constants, units, PRINT_FORCE / print_force, CURRENT / amplitude)

@@ -123,7 +123,7 @@ def conclude(hammer: Hammer, context: Context | None = None) -> Conclusions:
 
 
 def rate_from_rest(context: Context) -> float | None:
-    """Return the rate, Hz, up to which all patterns of eight slots from rest are within limits, or None.
+    """Return the rate [Hz] up to which all patterns of eight slots from rest are within limits, or None.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def rate_from_rest(context: Context) -> float | None:
 
 
 def settle_out(context: Context) -> float:
-    """Return the time, s, at which the last rebound higher than `SETTLED` times the stroke ends.
+    """Return the time [s] at which the last rebound higher than `SETTLED` times the stroke ends.
 
     Raises
     ------
@@ -161,7 +161,7 @@ def settle_out(context: Context) -> float:
 
 
 def chaos_onset(context: Context) -> float | None:
-    """Return the longest strobe time, s, at which a train is classified strange, or None."""
+    """Return the longest strobe time [s] at which a train is classified strange, or None."""
     settings = claims()["no_period_doubling_cascade"].settings
     first, last = settings["first_strobe_time_s"], settings["last_strobe_time_s"]
     # Rounded so that the strobe times are short decimal numbers.
@@ -179,7 +179,7 @@ def chaos_onset(context: Context) -> float | None:
 
 
 def flight_times(context: Context) -> tuple[float, dict[str, float | None]]:
-    """Return the largest flight-time spread of bursts, s, and the lowest rates, Hz, that exceed the limits.
+    """Return the largest flight-time spread of bursts [s] and the lowest rates [Hz] that exceed the limits.
 
     The spread of a burst is the peak-to-peak difference of the flight times of its struck dots. The rates are
     given for the limits "engraved_s" and "dot_matrix_s" of the claim `flight_time_spread`; None if the spread

@@ -215,7 +215,7 @@ def print_forces(hammers: Sequence[Hammer]) -> FloatArray:
 def compared(constants: Sequence[Mapping[str, float]], forces: Sequence[float]) -> list[FloatArray]:
     """Return the constants of hammers, unscaled and scaled to the common gauge, each of shape (n, k).
 
-    A constant that a hammer lacks is taken from the shipped hammer; `forces` are the peak forces, N, of the
+    A constant that a hammer lacks is taken from the shipped hammer; `forces` are the peak forces [N] of the
     dots of a single pulse.
     """
     keys = _keys(constants)

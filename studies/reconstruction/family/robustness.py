@@ -41,7 +41,7 @@ class Statement(Declared):
 
 
 def _tolerated(name: str) -> float:
-    """Return the spread of flight times, s, that a kind of printing tolerates according to the paper."""
+    """Return the spread of flight times [s] that a kind of printing tolerates according to the paper."""
     return float(claims()["flight_time_spread"].settings[name])
 
 

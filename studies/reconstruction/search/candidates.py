@@ -66,7 +66,7 @@ class Candidate:
 
     @property
     def state(self) -> tuple[float, float]:
-        """Displacement, m, and velocity, m/s, at rest."""
+        """Displacement [m], and velocity [m/s] at rest."""
         return self.rest, 0.0
 
 

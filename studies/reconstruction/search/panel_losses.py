@@ -219,7 +219,7 @@ def _haste(states: FloatArray, scales: FloatArray, period: int) -> float:
 
 
 def _closest(states: FloatArray, period: int) -> FloatArray:
-    """Return displacement, m, and velocity, m/s, where the train came closest to repeating."""
+    """Return displacement [m] and velocity [m/s] where the train came closest to repeating."""
     apart = np.abs((states[period:, :2] - states[:-period, :2]) / _scales()[:2]).max(axis=1)
     return np.asarray(states[int(np.nanargmin(apart)), :2] if np.isfinite(apart).any() else states[0, :2])
 

@@ -357,7 +357,7 @@ def basins(
         The hammer, or a regime; a hammer requires the keywords of `printhammer.Regime.of`. States are those
         at a firing, independent of the phase of the regime.
     x, v : tuple, optional
-        Smallest and largest displacement, m, and velocity, m/s, or text with a unit, and number of values,
+        Smallest and largest displacement [m] and velocity [m/s] or text with a unit, and number of values,
         both ends included; by default the window of `printhammer.run.regime` and 128 values.
     firings : int, optional
         Number of firings per round, at least 4; the last half of them, at most 128, is classified.

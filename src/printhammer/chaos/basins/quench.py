@@ -179,7 +179,7 @@ class TwoPulseDrive(Drive):
 
     @staticmethod
     def firings(apart: float, gap: float) -> FloatArray:
-        """Compute the four firing times, s: two before the run, and the two firings that print the dots."""
+        """Compute the four firing times [s]: two before the run, and the two firings that print the dots."""
         return np.array([gap, apart, 2.0 * apart, 2.0 * apart + gap])
 
     @property
@@ -188,7 +188,7 @@ class TwoPulseDrive(Drive):
         return float(self._times[_FIRST])
 
     def with_firings(self, times: FloatArray) -> Self:
-        """Return a copy with new firing times, s, as computed by `firings`."""
+        """Return a copy with new firing times [s] as computed by `firings`."""
         result = copy(self)
         result._times = times
         return result
@@ -280,7 +280,7 @@ def quench_map(
 def two_pulse_drives(first: Waveform, seconds: Sequence[Waveform], last: float) -> list[TwoPulseDrive]:
     """Build one drive per second pulse: `first`, then that second pulse; runs last at most `last` s.
 
-    A run begins in the rest state at the time `begin` of its drive, from which times, s, are measured. The
+    A run begins in the rest state at the time `begin` of its drive, from which times [s] are measured. The
     second pulse is fired after half of `last`; `with_firings` sets other times.
     """
     largest = max(first.peak, *(second.peak for second in seconds))
@@ -365,7 +365,7 @@ def _highest(grid: FloatArray, x: FloatArray, after: FloatArray) -> tuple[FloatA
 
 
 def _top(t: FloatArray, x: FloatArray, v: FloatArray) -> FloatArray:
-    """Interpolate the highest local maximum of each sampled motion, m, shape (M,); NaN without a maximum.
+    """Interpolate the highest local maximum of each sampled motion [m], shape (M,); NaN without a maximum.
 
     The velocity, shape (M, T), is taken as linear between samples.
     """

@@ -323,7 +323,7 @@ def follow_doubled(
     the eigenvector whose multiplier is -1; its parameter is also an unknown, and may lie on either side of
     the doubling. The orbit is accepted if, to first order, it lies in that direction, with the parameter and
     the multipliers of the doubling. Otherwise the search is repeated closer to the doubling. `doubled` is the
-    map applied twice; the other arguments are those of `follow`. Raises InputError if no such orbit is found.
+    map applied twice; for the other arguments see `follow`. Raises InputError if no such orbit is found.
     """
     widths = np.asarray(scales, dtype=np.float64)
     jacobian = point.node.value.jacobian

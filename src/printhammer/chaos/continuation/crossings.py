@@ -133,7 +133,7 @@ def follow_crossing(
     """Follow, in both directions, the curve that crosses a known curve at one of its nodes.
 
     The first point of the crossing curve is sought at a scaled distance along its tangent; if no fixed point
-    is found, the distance is reduced. The other arguments are those of `follow`.
+    is found, the distance is reduced. For the other arguments see `follow`.
 
     Raises
     ------

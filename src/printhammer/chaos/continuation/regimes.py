@@ -155,7 +155,7 @@ def regimes(
     hammer : Hammer or Regime
         The hammer, or a regime, whose rate is ignored.
     rates : tuple
-        Smallest and largest rate, Hz or text with a unit.
+        Smallest and largest rate [Hz] or text with a unit.
     longest : int, optional
         Largest orbit period to search for, in firings.
     seeds : int, optional

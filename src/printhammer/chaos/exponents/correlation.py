@@ -3,8 +3,8 @@
 The correlation sum C(r) is the fraction of pairs of states closer than r; on an attractor of dimension D2 it
 scales as r^D2 if r is neither so large that the shape of the attractor matters nor so small that few pairs
 remain (P. Grassberger and I. Procaccia, Physica D 9 (1983) 189). Pairs close in time are excluded (J.
-Theiler, Phys. Rev. A 34 (1986) 2427). The dimension is the slope of ln C over ln r on a *plateau*: the widest
-range over which the local slope stays within a tolerance.
+Theiler, Phys. Rev. A 34 (1986) 2427). The dimension is the slope of ln C against ln r on a *plateau*: the
+widest range over which the local slope stays within a tolerance.
 
 Limitations: N states do not resolve distances below about N^(-2/D2) of the size of the attractor, and a set
 with gaps has fluctuating slopes for any number of states. The interval therefore covers every slope on the
@@ -185,7 +185,7 @@ def correlation_sums(states: FloatArray, radius: FloatArray, theiler: int) -> tu
 
 
 def local_slopes(radius: FloatArray, sums: FloatArray) -> FloatArray:
-    """Fit the local slope of ln C over ln r at each distance by a straight line through its neighbours."""
+    """Fit the local slope of ln C against ln r at each distance by a straight line through its neighbours."""
     slopes = np.full(len(radius), np.nan)
     half = _PIECE // 2
     for k in range(half, len(radius) - half):

@@ -103,7 +103,7 @@ def spread(regime: Regime, count: int, visited: FloatArray) -> FloatArray:
     The rectangle contains the window, the states `visited` and the range up to the pack. If backstop and pack
     do not both bound the displacement, the rectangle extends over at least six half-widths of the window on
     either side: in the bouncing-ball model, an orbit with one impact per period rises to five half-widths.
-    A row is displacement, m, and velocity, m/s.
+    A row is displacement [m] and velocity [m/s].
     """
     window = regime.window
     low, high = np.array([window.x[0], window.v[0]]), np.array([window.x[1], window.v[1]])

@@ -81,7 +81,7 @@ class Manifolds(Result, rows="point"):
         return f"manifolds of the {self.orbit.name} of {self.orbit.regime.hammer.name}"
 
     def points(self, number: int) -> FloatArray:
-        """Return the points of curve `number`: displacements, m, and velocities, m/s, shape (n, 2)."""
+        """Return the points of curve `number`: displacements [m] and velocities [m/s], shape (n, 2)."""
         rows = self.curve == number
         return np.column_stack([self.x[rows], self.v[rows]])
 

@@ -81,7 +81,7 @@ def shown(points: FloatArray, period: int) -> BoolArray:
 def settled(regime: Regime, points: FloatArray, period: int, scales: FloatArray) -> Settled:
     """Determine the settled orbit of a motion whose states agree `period` firings apart.
 
-    Points, shape (m, k), are displacement, m, velocity, m/s, and further components of the state, at
+    Points, shape (m, k), are displacement [m], velocity [m/s] and further components of the state, at
     successive sections; the scales, shape (k,), are the half-widths of the strobe window. If the strobe map
     has no derivative, because a section falls into the pack or on a touch without velocity, or because a
     current flows at the section, the states alone decide.

@@ -196,7 +196,7 @@ def margin_of(problem: Problem, record: Record) -> float:
 
 
 def turns(problem: Problem, record: Record) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Locate the displacement extrema of a run; return times, s, displacements, m, and signs (1: maximum)."""
+    """Locate the displacement extrema of a run: times [s], displacements [m] and signs (1: maximum)."""
     nodes = record.nodes
     before, after = nodes[:-1, 2], nodes[1:, 2]
     rows = np.flatnonzero(
@@ -326,7 +326,7 @@ def mirror_image(regime: Regime, state: FloatArray, tolerance: float) -> FloatAr
 
 
 def _center(hammer: Hammer) -> float | None:
-    """Return the position, m, about which the contacts of a hammer are symmetric; None without symmetry."""
+    """Return the position [m] about which the contacts of a hammer are symmetric; None without symmetry."""
     front, backstop = hammer.pack, hammer.backstop
     if front is None and backstop is None:
         return hammer.origin

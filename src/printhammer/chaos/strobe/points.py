@@ -160,7 +160,7 @@ def strobe(
     transient : int, optional
         Number of firings to discard before the first point.
     state : sequence of float or str, optional
-        Displacement, m, velocity, m/s, or text with units, and further components of the state at the first
+        Displacement [m], velocity [m/s] or text with units, and further components of the state at the first
         firing, as for `printhammer.simulate`; by default the rest state.
     tolerance : float, optional
         As for `printhammer.simulate`.
@@ -215,7 +215,7 @@ def strobes(
     points, transient, verdict
         As for `strobe`, for all trains.
     states : sequence, optional
-        Displacement, m, velocity, m/s, and further components of the state at the first firing of each train,
+        Displacement [m], velocity [m/s] and further state components at the first firing of each train,
         as for `printhammer.simulate`, all of one form; by default the rest state.
     firings : tuple of int, optional
         First and last firing that are classified; the very first firing is number 1.

@@ -180,7 +180,8 @@ class States:
         """Return cycle length, in firings, and number of rests of a motion that rests on the backstop.
 
         None if the motion does not rest. The cycle is 0 if the motion does not repeat; then at least two
-        rests are required. Cycles of less than 5 firings are excluded, since rounding does not change them.
+        rests are required. Cycles shorter than `LONG_CYCLE` firings are excluded, since rounding does not
+        change their length.
         """
         if not is_memoryless(train.regime):
             return None
@@ -296,7 +297,7 @@ def _at_finer(
 def _ensemble(
     trains: Sequence[Train], ends: Sequence[float], tolerance: float, states: FloatArray | None = None
 ) -> Ensemble:
-    """Build the ensemble that runs trains to given times, s; `states` replace their initial states."""
+    """Build the ensemble that runs trains to given times [s]; `states` replace their initial states."""
     begun = [train.state for train in trains if train.state is not None]
     own = np.array(begun) if len(begun) == len(trains) else None
     return Ensemble(
@@ -311,7 +312,7 @@ def _ensemble(
 def _in_stretches(
     trains: Sequence[Train], every: Sequence[FloatArray], effort: Effort
 ) -> tuple[FloatArray, FloatArray, IntArray, FloatArray, list[str], FloatArray]:
-    """Compute the states of trains at given times, s, one row per train; also statuses and end times.
+    """Compute the states of trains at given times [s], one row per train; also statuses and end times.
 
     Each run lasts one period, so that the time and its rounding error stay small.
     """

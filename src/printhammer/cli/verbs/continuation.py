@@ -20,7 +20,7 @@ _CHART: Final = "Chart of two parameters"
 
 
 def read_state(written: str, name: str) -> tuple[float, float]:
-    """Parse a state, such as '46.2 um, 12 mm/s', as displacement, m, and velocity, m/s."""
+    """Parse a state, such as '46.2 um, 12 mm/s', as displacement [m] and velocity [m/s]."""
     from printhammer.drive.input import read_number
 
     parts = [part.strip() for part in written.split(",")]

@@ -377,7 +377,7 @@ def print_(
 
 
 def _warn_of_hammer(text: str | None, hammer: Hammer) -> None:
-    """Print a warning if the text to print is the name of a hammer or of a file, as other verbs expect."""
+    """Print a warning if the text to print is the name of a hammer or of a file, as other commands expect."""
     from printhammer.hammer.hammer import shipped
 
     if text is None or text in (hammer.name, hammer.path):

@@ -161,7 +161,7 @@ def lyapunov(
 def _periods(
     period: str | None, rate: str | None, lowest: str | None, highest: str | None, steps: int | None
 ) -> FloatArray:
-    """Return the firing periods, s, selected by the options --period, --rate, or --from and --to."""
+    """Return the firing periods [s] selected by the options --period, --rate, or --from and --to."""
     import numpy as np
 
     from printhammer.drive.input import read_positive

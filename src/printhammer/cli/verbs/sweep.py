@@ -103,7 +103,7 @@ _LINE_EVERY: Final = 10.0  # Interval between progress lines, s; arbitrary
 
 
 class SweepProgress:
-    """Progress of a sweep on the standard error: a bar on a terminal, else a line every ten seconds.
+    """Progress of a sweep on standard error: a bar on a terminal, else a line every ten seconds.
 
     Attributes
     ----------

@@ -207,7 +207,7 @@ _PANEL: Final = "The sensor"
             "Longest gap that is distinguished, in slots; longer gaps count as rest.", default=2
         ),
         "members": opt.whole(
-            "Number of simulated hammers on which the sequence of test lines is selected.", default=400
+            "Number of simulated hammers used to select the sequence of test lines.", default=400
         ),
         "forgetting": opt.number("Fraction of the earlier corrections that each stage undoes.", default=0.02),
         "doubt": opt.number(

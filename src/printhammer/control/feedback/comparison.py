@@ -173,13 +173,13 @@ def feedback(
     hammer : Hammer
         The nominal hammer, with a pack, a backstop and a waveform that is a current.
     rate : float or str
-        Slot rate, Hz, or text with a unit.
+        Slot rate [Hz] or text with a unit.
     driven : Hammer, optional
         The driven hammer; by default the nominal hammer.
     sensor : PositionSensor, optional
         Sensor of the controller; by default with noise of 1 % of the stroke and a delay of 20 us.
     current : float or str, optional
-        Largest absolute value of the driver's current, A; by default 2 A, or the peak of the hammer's own
+        Largest absolute value of the driver's current [A]; by default 2 A, or the peak of the hammer's own
         pulse if it is larger.
     edge : float or str, optional
         Time constant of the driver, s; by default the decay time constant of the hammer's own waveform.

@@ -76,7 +76,7 @@ class Ahead(NamedTuple):
     """Prediction for a control action: the push into the pack, the next throw, and the next pack contact.
 
     `fire`, `leaves` and `touch` are the times of the throw, of departure from the pack and of the next touch,
-    s after the present touch. `width` is the width of the push, s; `kind` and `speed`, m/s, are those of the
+    s after the present touch. `width` is the width of the push, s; `kind` and `speed` [m/s] describe the
     next touch.
     """
 
@@ -206,7 +206,10 @@ class Controller:
         return np.diag([_PLACE_ERROR * self.stroke, _SPEED_ERROR, loop.learned.scale_error]) ** 2
 
     def decide(self, now: Sequence[tuple[Loop, int]], policy: Policy) -> None:
-        """Choose the pulses after the next pack contacts; `now` pairs each run with its dot index."""
+        """Choose the pulses that follow the next pack contacts.
+
+        `now` contains, for each run, its state and the index of the dot printed by its next contact.
+        """
         kind = np.array([loop.kind for loop, _dot in now])
         speed = np.array([loop.speed for loop, _dot in now])
         touch = np.array([loop.touch for loop, _dot in now])

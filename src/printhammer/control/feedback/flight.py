@@ -53,7 +53,7 @@ _PLACES, _CURRENTS = 97, 129  # Grid size of the force table: displacements, cur
 class FreeForce:
     """Force of magnet and spring, N, interpolated in a table over displacement and current.
 
-    The table covers displacements from `low` to `high`, m, and currents up to `largest`, A, of either sign.
+    The table covers displacements from `low` to `high` [m] and currents up to `largest` [A] of either sign.
     """
 
     def __init__(self, hammer: Hammer, low: float, high: float, largest: float) -> None:
@@ -80,8 +80,8 @@ class FreeForce:
 class Expected:
     """Prior mean and covariance of time, speed and current scale at the next pack contacts of M runs.
 
-    `time`, s, and `speed`, m/s, are those of the contacts; `scale` is the relative deviation of all currents
-    from nominal. `covariance`, shape (M, 3, 3), is that of displacement at `time`, m, speed, m/s, and scale.
+    `time` [s] and `speed` [m/s] describe the contacts; `scale` is the relative deviation of all currents
+    from nominal. `covariance`, shape (M, 3, 3), covers displacement [m] at `time`, speed [m/s] and scale.
     """
 
     time: FloatArray
@@ -131,7 +131,7 @@ def flight_from_samples(
 ) -> Flight:
     """Estimate flights from sensor samples; predict the next contact with the pack at `front`, m.
 
-    `accelerations` maps displacements, m, times, s, and scales, all broadcastable to the shape (M, K), to
+    `accelerations` maps displacements [m], times [s] and scales, all broadcastable to the shape (M, K), to
     accelerations of a flying armature, m/s².
     """
     times, shown, used, error = samples
@@ -296,7 +296,7 @@ class Contacts:
         steps: FloatArray,
         samples: Samples,
     ) -> FloatArray:
-        """Simulate the nominal and four perturbed contacts; return displacements, m, shape (5, M, N)."""
+        """Simulate the nominal and four perturbed contacts; return displacements [m], shape (5, M, N)."""
         hammers, drives, states, strobes = [], [], [], []
         plain = [loop.recent(self._plant.driver) for loop in loops]
         stronger = [drive.scaled(1.0 + _FACTOR_STEP) for drive in plain]

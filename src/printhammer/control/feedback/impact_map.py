@@ -68,7 +68,7 @@ class ForceMap:
         return int(np.argmin(np.abs(self.back)))
 
     def release_for(self, force: float) -> FloatArray:
-        """Return the release times, s, shape (T, B), for a peak force; NaN if the current is too weak.
+        """Return the release times [s], shape (T, B), for a peak force; NaN if the current is too weak.
 
         The release time is 0 if the touch exceeds the force without a push.
         """
@@ -131,7 +131,7 @@ def force_map(plant: Plant) -> ForceMap:
 
 
 def released_forces(plant: Plant, forces: ForceMap, keys: list[tuple[int, float, float]]) -> FloatArray:
-    """Simulate peak forces for keys (touch index, release time, s, return current, A); NaN if failed."""
+    """Simulate peak forces for keys (touch index, release time [s], return current [A]); NaN if failed."""
     long = _WATCHED * plant.single.flight_time
     drives = [
         plant.driver.drive([first_pulse(int(forces.kind[row]), release, back, long, plant.driver)])

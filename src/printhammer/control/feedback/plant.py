@@ -200,8 +200,8 @@ class Learned:
 class Touched:
     """Pack contact whose sensor samples correct the estimated position of the pack's front.
 
-    `start` is before and `end` after the contact, s. At the start, `state` contains displacement, m, speed,
-    m/s, and current scale, and `covariance`, shape (3, 3), their covariances.
+    The times `start` [s] and `end` [s] enclose the contact. At the start, `state` contains displacement [m],
+    speed [m/s] and current scale, and `covariance`, shape (3, 3), their covariances.
     """
 
     start: float

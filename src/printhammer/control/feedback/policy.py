@@ -138,7 +138,7 @@ _EFFORT: Final = 0.1  # Cost of the largest return current over a whole period; 
 class Committed(NamedTuple):
     """Decisions already carried out at M pack contacts in progress; only the next throw is still open.
 
-    `back` is the return current, A, `force` the printed force relative to the single pulse, and `time` the
+    `back` is the return current [A], `force` the printed force relative to the single pulse, and `time` the
     time since the touch, s.
     """
 
@@ -148,7 +148,7 @@ class Committed(NamedTuple):
 
 
 class Policy:
-    """Cost-to-go of all actions at one slot period, s; `limits` normalise the deviations of the dots."""
+    """Cost-to-go of all actions at one slot period [s]; `limits` normalise the deviations of the dots."""
 
     def __init__(self, fronts: Fronts, period: float, limits: Limits) -> None:
         self.fronts = fronts

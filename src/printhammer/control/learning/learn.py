@@ -330,7 +330,7 @@ def learn(
     The unit prints test lines; a sensor measures the impact time and, optionally, the force of each dot, with
     noise. From these readings, the constants of the unit and the offset and gain of the sensor are estimated
     by maximum a posteriori estimation with a Laplace approximation. The prior standard deviation of the
-    offset is the `offset` of the sensor, or 25 us if the sensor has none; that of the gain is 1 %. Iterative
+    offset is the `offset` of the sensor, or 25 us if the sensor has none; for the gain it is 1 %. Iterative
     learning control then corrects advance, width and brakes of a table that was tuned for the nominal hammer
     and the variability of the production. The first line is printed in open loop. The table is used only if
     the posterior explains the readings, and if no posterior sample prints fewer dots of the test cycle and of

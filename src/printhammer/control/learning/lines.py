@@ -240,7 +240,7 @@ class Press:
     hammers: Sequence[Hammer]
 
     def ladder(self, rungs: Sequence[Rung]) -> tuple[FloatArray, FloatArray]:
-        """Simulate test pulses (a ladder); return flight times, s, and normalised forces, shape (M, dots)."""
+        """Simulate test pulses (a ladder); return flight times [s] and normalised forces, shape (M, dots)."""
         return printed(self.order_ladder(rungs), self.task)
 
     def line(

@@ -68,9 +68,9 @@ def law_for(
     threads: int | None = None,
     report: Callable[[], None] = lambda: None,
 ) -> tuple[LearningLaw, CompensationTable]:
-    """Prepare learning for a hammer at a slot rate, Hz; return the learning law and its starting table.
+    """Prepare learning for a hammer at a slot rate [Hz]; return the learning law and its starting table.
 
-    Arguments are those of `printhammer.learn`.
+    For the arguments see `printhammer.learn`.
     """
     if not 0.0 < forgetting < 1.0:
         raise InputError.of("forgetting", forgetting, "a number above 0 and below 1")

@@ -120,6 +120,6 @@ class Production:
 def _readings_of(
     line: Printing[tuple[DotTable, Judgement]], force: float
 ) -> Printing[tuple[FloatArray, FloatArray]]:
-    """Extract flight times, s, and forces, as fractions of `force`, from the dots of a print job."""
+    """Extract flight times [s] and forces, as fractions of `force`, from the dots of a print job."""
     dots, _judgement = yield from line
     return dots.flight_time, dots.peak_force / force

@@ -58,7 +58,7 @@ class ImpactSensor(Declared):
             raise InputError.of("seed", self.seed, "a whole number not below 0", file="sensor")
 
     def read(self, flight: FloatArray, force: FloatArray, unit: int, run: int) -> Readings:
-        """Simulate readings of N dots from true flight times, s, and forces; NaN for lost dots."""
+        """Simulate readings of N dots from true flight times [s] and forces; NaN for lost dots."""
         rng = np.random.default_rng((self.seed, unit, run))
         time = (1.0 + self.gain) * flight + self.delay + self.noise * self._noise(rng, flight.size)
         if self.offset:

@@ -110,8 +110,8 @@ class SupplyCheck(Declared):
 class LeastWork(Result, rows="node"):
     """A burst that prints adequate dots with least coil work, from rest to rest.
 
-    The Dataset contains motion and power over time and the pack contacts; the data frame contains the nodes
-    of the current. Saved as CSV, the nodes are a sampled waveform
+    The Dataset contains motion and power against time, and the pack contacts; the data frame contains the
+    nodes of the current. Saved as CSV, the nodes are a sampled waveform
     (`printhammer.drive.waveforms.shapes.Sampled`), which, fired once, reproduces the drive of the burst.
     """
 
@@ -314,7 +314,7 @@ class LeastWork(Result, rows="node"):
         }
 
     def entries(self) -> Entries:
-        """Return motion, current and coil power over time, and the pack contacts."""
+        """Return motion, current and coil power against time, and the pack contacts."""
         motion, dots = self.motion, self.contacts
         power = coil_power(self.hammer, motion.x, motion.v, motion.force["magnet"])
         forces = [np.nan if dot.peak_force is None else dot.peak_force for dot in dots]
@@ -390,13 +390,13 @@ def least_work(
     hammer : Hammer
         The hammer, with magnet, spring, pack, backstop and waveform.
     rate : float or str, optional
-        Dot rate, Hz, or text with a unit.
+        Dot rate [Hz] or text with a unit.
     dots : int, optional
         Number of dots.
     force : float, optional
         Least force of a dot, relative to the single pulse.
     largest : float or str, optional
-        Limit of the absolute current, A, or text with a unit; by default 2 A or the hammer's peak current.
+        Limit of the absolute current [A] or text with a unit; by default 2 A or the hammer's peak current.
     slew : float, optional
         Slope limit of the current, A/s; by default the steepest rise of the hammer's waveform.
     least : str, optional

@@ -71,7 +71,7 @@ def least_work_rates(
     hammer : Hammer
         The hammer to drive.
     rates : sequence of float or str
-        Dot rates, Hz, or text with a unit.
+        Dot rates [Hz] or text with a unit.
     dots : int, optional
         Number of dots of each burst.
     progress : callable, optional

@@ -142,7 +142,7 @@ _REACH, _SHRINKS = 0.25, 0.7
 def printing_profile(
     shares: FloatArray, largest: float, duration: float, arrival: float, nodes: int
 ) -> FloatArray:
-    """Return currents, A, shape (n, nodes), that brake, hold and throw the armature.
+    """Return currents [A], shape (n, nodes), that brake, hold and throw the armature.
 
     `shares`, shape (n, `PRINTING_SHARES`), in [0, 1], are three current levels and two switching times.
     `largest` is the current limit, A; the slot lasts `duration`, and its dot is due at `arrival`, both in s.
@@ -155,9 +155,9 @@ def printing_profile(
 
 
 def landing_profile(shares: FloatArray, largest: float, duration: float, nodes: int) -> FloatArray:
-    """Return currents, A, shape (n, nodes - 1), that brake the armature and lower it onto the backstop.
+    """Return currents [A], shape (n, nodes - 1), that brake the armature and lower it onto the backstop.
 
-    The arguments are those of `printing_profile`, for shares of shape (n, `LANDING_SHARES`); the last node,
+    The arguments are as for `printing_profile`, with shares of shape (n, `LANDING_SHARES`); the last node,
     where the current is zero, is omitted.
     """
     caught = 0.7 * duration * shares[:, 2]
@@ -221,7 +221,7 @@ _INSIDE: Final = 1.0 - 1e-9  # Factor on current and slope limits: rounding erro
 class NodePlan:
     """Partial plan of a burst with piecewise-linear current: planned nodal currents and resulting state.
 
-    Arguments are times, s: the slot `period`, the time `past` from a pack contact to the end of its slot, the
+    Arguments are times [s]: the slot `period`, `past` from a pack contact to the end of its slot, the
     node `spacing`, and the `flight` time of the single pulse.
     """
 

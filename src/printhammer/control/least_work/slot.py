@@ -160,7 +160,7 @@ class Task:
         )
 
     def end(self, begin: SlotState, currents: FloatArray, duration: float) -> SlotState:
-        """Return the state at the end of a slot with given nodal currents, A, shape (nodes,)."""
+        """Return the state at the end of a slot with given nodal currents [A], shape (nodes,)."""
         path = np.concatenate([[begin.current], currents])[np.newaxis]
         ensemble = self._ensemble(begin, path, duration, self.tolerance)
         return end_of(ensemble, duration, float(currents[-1]))
@@ -203,7 +203,7 @@ class CoilForce:
 
     Its error is about 1e-8 of the largest force. Results of a search are recomputed with the law itself, see
     `printhammer.run.energy`. The hammer needs magnet, pack and backstop; the spline covers currents up to
-    `largest`, A, of either sign.
+    `largest` [A] of either sign.
     """
 
     def __init__(self, hammer: Hammer, largest: float) -> None:

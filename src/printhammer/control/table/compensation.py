@@ -177,7 +177,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return np.asarray(self.deviation.max(axis=1))
 
     def at(self, rate: float | str) -> Settings:
-        """Interpolate the table at a rate, Hz, or text with a unit.
+        """Interpolate the table at a rate [Hz] or text with a unit.
 
         Between two rates of the table, each entry is interpolated linearly in the period. Where the brake
         pulses of the two entries differ, or one fires before a rebound and the other after it, the nearer

@@ -60,7 +60,7 @@ def whole_ticks(
     """Round the times of a table to whole ticks [s], without overlap of pulses.
 
     Where rounding to the nearest tick makes two pulses overlap, the brake pulse begins later or is shorter,
-    or the dot is fired later, by a tick or two. The arguments are those of `look_ahead`, with arrays of shape
+    or the dot is fired later, by a tick or two. The arguments are as for `look_ahead`, with arrays of shape
     (rates, entries).
     """
     rounded = {name: np.rint(values / tick) for name, values in times.items()}

@@ -168,7 +168,7 @@ def judge_table(
     table : CompensationTable
         Table to compare with open loop.
     rates : sequence of float or str, optional
-        Slot rates, Hz, or text with a unit; by default those of the table or, if the table is long, five
+        Slot rates [Hz] or text with a unit; by default those of the table or, if the table is long, five
         rates halfway between its rates.
     perturbations : sequence of Perturbation, optional
         Deviations of the driven hammers; by default the `PERTURBATIONS` that apply to the hammer's laws.

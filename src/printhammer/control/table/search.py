@@ -170,7 +170,7 @@ def _look_closely(task: Task, periods: FloatArray, groups: list[Ways]) -> None:
 
 
 def searched(task: Task, period: float) -> Ways:
-    """Run the multi-start search for one period, s; return the best candidates, best first.
+    """Run the multi-start search for one period [s]; return the best candidates, best first.
 
     Candidates with a brake pulse are searched, if allowed, only if the best candidate without a brake pulse
     is poor.

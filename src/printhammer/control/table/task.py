@@ -144,7 +144,7 @@ class Task:
         return max(_TAIL, FLIGHTS * self.single.nominal.flight_time, _CONTACT * self.single.left)
 
     def earliest(self, delay: FloatArray, brake: FloatArray) -> FloatArray:
-        """Return the earliest firing time, s, measured from the slot of the preceding dot.
+        """Return the earliest firing time [s] measured from the slot of the preceding dot.
 
         By then the armature has left the pack, so that no dot uses energy returned by the pack of the
         preceding dot, and a brake pulse has decayed so far that the current stays within its limit.
@@ -160,7 +160,7 @@ class Task:
     ) -> tuple[FloatArray, BoolArray]:
         """Simulate drives; return deviations from the single-pulse dot, and a mask of extra contacts.
 
-        The drives have a firing for each of `slots` (drives, dots), the slot times, s, NaN-padded; a
+        The drives have a firing for each of `slots` (drives, dots), the slot times [s], NaN-padded; a
         simulation continues for `tail` after `ends` (drives,), s.
 
         Returns

@@ -167,7 +167,7 @@ def tune(
         A hammer with a pack, a backstop and a waveform that has a width: a current, or a driver of the coil,
         for which widths are times on the rail.
     rate, rates : float or str, or sequence of them, optional
-        Slot rates, Hz, or text with a unit. By default an automatic grid from 100 Hz, where every dot is
+        Slot rates [Hz] or text with a unit. By default an automatic grid from 100 Hz, where every dot is
         printed from rest, to the highest rate at which the table is within the limits, in steps of `STEP`,
         refined where the solution branch changes; both ends are lower for a slow device.
     history : int, optional
@@ -344,7 +344,7 @@ def _tune_rows(
 ) -> Draft:
     """Tune rows for the given rates; an entry without a solution has an infinite deviation.
 
-    An `open_ended` draft ends below the first rate without a solution. `around` are offsets, s, from each
+    An `open_ended` draft ends below the first rate without a solution. `around` are offsets [s] from each
     period to additional periods at which candidates are searched.
     """
     draft = blank(task, rates)

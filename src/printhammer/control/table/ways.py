@@ -44,7 +44,7 @@ def solve(
 
     The method is Levenberg-Marquardt (J. Nocedal and S. J. Wright, *Numerical Optimization*, ch. 10).
 
-    The values of a dot are its firing time (or advance) and width, s; `start` contains the initial guesses.
+    The values of a dot are its firing time (or advance) and width [s]; `start` contains the initial guesses.
     `measure(values, active, shifts)` returns the deviations of the dots with the indices `active` for each of
     the shifts of their values, as fractions of the limits, NaN for a lost dot; shape (active, shifts,
     deviations). Derivatives are finite differences with `steps`, s, forward in time and backward in width. A
@@ -90,7 +90,7 @@ def changes(
     most: FloatArray,
     longest: float = LONGEST_STEP,
 ) -> FloatArray:
-    """Compute the Levenberg-Marquardt step of firing time and width, s, shape (dots, 2).
+    """Compute the Levenberg-Marquardt step of firing time and width [s], shape (dots, 2).
 
     `off`, shape (dots, deviations), are the deviations; `slopes`, shape (dots, deviations, 2), are their
     derivatives with respect to firing time (or advance) and width, 1/s. The step of the width is clipped to
@@ -163,7 +163,7 @@ class Ways(NamedTuple):
         return Ways(*(values[which] for values in self))
 
     def at(self, period: float) -> Ways:
-        """Return the candidates for a new period, s; firing times relative to the slot are unchanged."""
+        """Return the candidates for a new period [s]; firing times relative to the slot are unchanged."""
         moved = self.fired + (period - self.period)
         return self._replace(period=np.full(self.size, period), fired=moved)
 

@@ -111,7 +111,7 @@ class Waveform(BaseModel):
         """Return a copy of the waveform with its values scaled by `factor`."""
 
     def value(self, tau: npt.ArrayLike) -> FloatArray:
-        """Return values, A or N, at times tau after firing, s; right-continuous, 0 outside the support."""
+        """Return values [A or N] at times tau [s] after firing; right-continuous, 0 outside the support."""
         return evaluate(self.segments(), tau)
 
     @property

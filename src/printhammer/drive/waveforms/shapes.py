@@ -36,7 +36,7 @@ _ROUNDING: Final = 1e-14  # Relative difference between times that counts as rou
 class Chain(Waveform):
     """Several consecutive waveforms in one firing, each at an offset, with a zero drive in between.
 
-    `parts` are pairs of the offset, s or a string with a unit, and the waveform, in ascending order; all
+    `parts` are pairs of the offset [s] or a string with a unit, and the waveform, in ascending order; all
     are currents or all are forces. A waveform may begin once the preceding one has ended or decayed to `TAIL`
     of its peak; the remainder is cut off. The edges of a waveform lie at the rounded sums of offset and edge.
     """
@@ -88,7 +88,7 @@ class Chain(Waveform):
 
 
 def _validate(parts: object) -> tuple[tuple[float, Waveform], ...]:
-    """Validate offsets, s, and waveforms; no waveform may begin before the preceding one is over."""
+    """Validate offsets [s] and waveforms; no waveform may begin before the preceding one is over."""
     try:
         pairs = [tuple(pair) for pair in parts]  # type: ignore[attr-defined]
     except TypeError:

@@ -105,9 +105,9 @@ _NOTE: Final = (0.4, 0.09)  # Width and height of the note on loops, fractions o
 def force_loops(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
     """Draw Fig. 5: the sum of all forces, equation (2), against displacement after a single pulse.
 
-    The area of a clockwise loop is energy given to the armature, that of a counter-clockwise loop energy lost
-    by the armature; arrow heads show the direction. The inset shows the motion after the second touch of the
-    backstop, if any. The motion lasts 4 ms by default; `duration` is in s, or text with a unit.
+    The area of a clockwise loop is energy given to the armature, the area of a counter-clockwise loop energy
+    lost by the armature; arrow heads show the direction. The inset shows the motion after the second touch of
+    the backstop, if any. The motion lasts 4 ms by default; `duration` is in s, or text with a unit.
     """
     motion = fired(hammer, duration=duration)
     times = times_of(motion)
@@ -245,7 +245,7 @@ def statics(hammer: Hammer, *, currents: Sequence[float] = CURRENTS) -> Figure:
     Parameters
     ----------
     currents : sequence of float, optional
-        Coil currents, A; currents outside the range of the magnet's law are skipped.
+        Coil currents [A]; currents outside the range of the magnet's law are skipped.
 
     Raises
     ------

@@ -90,7 +90,7 @@ _POST: Final = 0.13
 
 @dataclass(frozen=True)
 class _View:
-    """Oblique projection of time, s, displacement, m, and rate, Hz, onto the plane of the figure."""
+    """Oblique projection of time [s], displacement [m] and rate [Hz] onto the plane of the figure."""
 
     times: tuple[float, float]
     heights: tuple[float, float]

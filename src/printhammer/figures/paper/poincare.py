@@ -50,7 +50,7 @@ def poincare(
     strobes : sequence of Strobe, optional
         Strobe points from `printhammer.chaos.strobes`; by default those of the hammer.
     periods : sequence, optional
-        Strobe times, s, or text with a unit.
+        Strobe times [s] or text with a unit.
     points : int, optional
         Points in each panel, counted from the first firing.
     printed : mapping, optional

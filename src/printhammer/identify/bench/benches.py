@@ -96,7 +96,7 @@ def magnet(
     displacements: npt.ArrayLike | None = None,
     currents: npt.ArrayLike | None = None,
 ) -> Bench:
-    """Compute the static force on the armature at given displacements, m, and coil currents, A."""
+    """Compute the static force on the armature at given displacements [m] and coil currents [A]."""
     if hammer.magnet is None:
         raise InputError(
             f"{hammer.path}: the hammer has no [magnet]",
@@ -294,7 +294,7 @@ BENCHES: Final[dict[str, Callable[..., Bench]]] = {
 def _record(
     sensor: Sensor, duration: float | str | None, before: float | str, least: float = CYCLE
 ) -> tuple[int, int, float, float]:
-    """Return the first and last sample index of a record, the sampling rate, Hz, and the duration, s."""
+    """Return the first and last sample index of a record, the sampling rate [Hz] and the duration [s]."""
     from printhammer.drive.input import read_number, read_positive
 
     rate = sensor.sampling_rate

@@ -134,7 +134,7 @@ def measure(
     Parameters
     ----------
     kind : str
-        "magnet": static force of magnet and spring over displacement and current; "spring": force of the
+        "magnet": static force of magnet and spring against displacement and current; "spring": force of the
         spring alone; "pack": load cycles; "backstop": rebound speeds; "motion": record of one shot;
         "current": record of the coil current in one voltage-driven shot.
     sensor : Sensor or mapping, optional

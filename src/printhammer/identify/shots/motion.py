@@ -206,7 +206,7 @@ def fit_motion(
     Returns
     -------
     Fit
-        The fit, of kind "motion"; abscissa and data are times, s, and displacements, m.
+        The fit, of kind "motion"; abscissa and data are times [s] and displacements [m].
 
     Raises
     ------

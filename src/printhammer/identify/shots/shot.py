@@ -287,7 +287,7 @@ class Pulse(Declared, eq=False):
 def fit_pulse(where: str, t: FloatArray, current: FloatArray, waveform: Waveform | None, tau: float) -> Pulse:
     """Fit waveform constants to a recorded current; if the fit is poor, use the record as the waveform.
 
-    `t` are ascending times, s, with the firing at 0, and `current` the readings, A, both of shape (n,);
+    `t` contains ascending times [s], with the firing at 0, and `current` the readings [A], both (n,);
     `waveform` gives the initial guess, and `tau` is the time constant of the sensor, s. Error messages begin
     with `where`.
     """

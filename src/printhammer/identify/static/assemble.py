@@ -131,8 +131,8 @@ def stretch_p_value(signs: FloatArray) -> float:
     """Return an upper bound of the p-value of the longest run of excluded rows of one sign.
 
     The null hypothesis is gross errors at random rows: a run of k rows begins at any of the n rows with
-    probability (1/2)^(k - 1) q^k, with q the fraction of excluded rows. `signs` are those of the residuals, 0
-    for used rows. NaN without two consecutive excluded rows.
+    probability (1/2)^(k - 1) q^k, with q the fraction of excluded rows. `signs` contains the signs of the
+    residuals, 0 for used rows. NaN without two consecutive excluded rows.
     """
     longest = length = 0
     for before, here in zip([0.0, *signs.tolist()], signs.tolist(), strict=False):

@@ -62,7 +62,7 @@ def rebound(z: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 class RestitutionLaw:
-    """Rebound speed as a function of impact speed, m/s, both positive, shape (m,); parameters p = [l/k]."""
+    """Rebound speed as a function of impact speed [m/s], both positive, shape (m,); parameters p = [l/k]."""
 
     def __init__(self, speed: FloatArray) -> None:
         self.speed = speed

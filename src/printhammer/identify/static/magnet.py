@@ -1,4 +1,4 @@
-"""Fit the magnet to forces over displacement and current: F0, Am and Bm of equation (3).
+"""Fit the magnet to forces against displacement and current: F0, Am and Bm of equation (3).
 
   F(x, I) = F0 - (Am - Bm I)^2 / sqrt(x) + Bs - (Bs / As)(x - b)
 
@@ -23,7 +23,7 @@ from printhammer.support.tables.readings import Readings, read_table
 
 
 class TotalLaw:
-    """Force of magnet and spring at measured displacements, m, and currents, A, shape (m,).
+    """Force of magnet and spring at measured displacements [m] and currents [A], shape (m,).
 
     If the position b of the backstop, m, is known, p = [F0, Am, Bm, Bs, As]; otherwise p = [C, Am, Bm, K] and
     the force is C - K x - (Am - Bm I)^2 / sqrt(x). A NaN current marks a row of the spring alone. `zero` is

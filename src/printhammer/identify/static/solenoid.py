@@ -169,7 +169,7 @@ def _check_factor(
 
 
 class CircuitLaw:
-    """Logarithms of force and linkage at m gaps, m, and currents, A, shape (2 m,); p contains `CONSTANTS`."""
+    """Logarithms of force and linkage at m gaps and currents (SI), shape (2 m,); p contains `CONSTANTS`."""
 
     def __init__(self, gap: FloatArray, current: FloatArray, turns: float) -> None:
         self.turns = turns

@@ -1,4 +1,4 @@
-"""Fit the spring to its force over displacement: Bs and As of equation (4).
+"""Fit the spring to its force against displacement: Bs and As of equation (4).
 
     F = Bs - (Bs / As)(x - b)
 

@@ -91,7 +91,7 @@ def note(folder: Path, name: str, seconds: float) -> None:
 
 
 def expected(folders: Iterable[Path], name: str) -> float:
-    """Return the expected compile time, s: recorded here, else on another machine, else typical."""
+    """Return the expected compile time [s]: recorded here, else on another machine, else typical."""
     mine = maker()
     records = [read(folder) for folder in folders]
     own = [entry for entries in records if (entry := _own(entries, mine)) is not None]

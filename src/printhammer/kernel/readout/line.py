@@ -34,10 +34,10 @@ def write_slots(slots: Any, rate: float, first: float, firings: Any) -> None:
 def fault_of(ratio: float, late: float, more: float, limits: Any) -> int:
     """Return the first fault of a dot on the paper.
 
-    `ratio` is the peak force of the dot over that of the single pulse, `late` the arrival time less that of
-    the single pulse [s], and `more` the number of extra contacts beyond those of the single pulse.
-    `limits` holds the largest absolute deviation of the force, relative, that of the arrival [s], and the
-    largest number of extra contacts.
+    `ratio` is the peak force of the dot divided by the peak force of the single pulse, `late` the arrival
+    time [s] relative to the single pulse, and `more` the number of extra contacts beyond those of the single
+    pulse. `limits` contains the largest relative force deviation, the largest absolute deviation of the
+    arrival time [s], and the largest number of extra contacts.
     """
     if more > limits[2]:
         return EXTRA

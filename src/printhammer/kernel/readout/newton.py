@@ -248,7 +248,7 @@ def has_settled(states: Any, scales: Any, orbit: Any, search: Any, outcome: int,
     Parameters
     ----------
     states : float64 array, shape (n, any)
-        States at successive firings: displacement, m, velocity, m/s, and more columns, which are ignored.
+        States at successive firings: displacement [m], velocity [m/s] and more columns, which are ignored.
     scales : float64 array
         Half-widths of the window, m and m/s, first.
     orbit : float64 array, shape (m, 10)

@@ -107,7 +107,7 @@ def smooth_bounds(node: Any, after: Any, bounds: Any, hammer: Hammer) -> Any:
 def field_slope(x: float, v: float, value: float, scales: Any, bounds: Any, hammer: Hammer) -> float:
     """Return the derivative of magnet and spring force with respect to displacement [N/m].
 
-    The spring force includes its dissipative part, at the velocity `v` [m/s]; `value` is that of the drive.
+    The spring force includes its dissipative part, at the velocity `v` [m/s]; `value` is the drive value.
     `scales` holds the scales of displacement and velocity; `bounds` is the result of `smooth_bounds`.
     """
     to_end = min(x - bounds[0], bounds[1] - x)

@@ -32,7 +32,7 @@ class Grid:
 
 
 def gather(rows: Iterable[tuple[float, float, float]], what: str, quantity: str) -> Grid:
-    """Collect points in any order into a complete grid: displacement, m, current, A, and the quantity.
+    """Collect points in any order into a complete grid: displacement [m], current [A] and the quantity.
 
     Error messages begin with `what`.
 
@@ -173,7 +173,7 @@ class GridMagnet(MagnetPart):
         x, current : sequence of float
             Displacements, m, and currents, A.
         values : sequence of sequence of float
-            Forces, N, or flux linkages, Wb, shape (len(x), len(current)).
+            Forces [N], or flux linkages [Wb], shape (len(x), len(current)).
         file : str, optional
             Name of a CSV file, stored but not read.
         """
@@ -210,5 +210,5 @@ class GridMagnet(MagnetPart):
         return (self._table.current[0], self._table.current[-1])
 
     def content(self) -> Mapping[str, Any]:
-        """Return the points of the table, which identify the magnet: x, m; current, A; values, SI."""
+        """Return the entries of the table for the digest of the hammer: x, current and values, SI."""
         return {"x": self._table.x, "current": self._table.current, self.quantity: self._table.values}

@@ -72,7 +72,7 @@ def _unsaturated(p: float, q: float, y: float) -> float:
 
 
 def magnet_force(c: Any, x: float, current: float) -> float:
-    """Return the magnetic force, N; NaN outside the range of the law."""
+    """Return the magnetic force [N]; NaN outside the range of the law."""
     length = _gap_inductance(c, x)
     if not length > 0.0:
         return math.nan
@@ -87,7 +87,7 @@ def magnet_energy(c: Any, x: float) -> float:
 
 
 def magnet_linkage(c: Any, x: float, current: float) -> float:
-    """Return the flux linkage, Wb; NaN outside the range of the law."""
+    """Return the flux linkage [Wb]; NaN outside the range of the law."""
     length = _gap_inductance(c, x)
     if not length > 0.0:
         return math.nan

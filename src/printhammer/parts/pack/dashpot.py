@@ -43,7 +43,7 @@ def pack_unloading(c: Any, x: float, v: float, q: float) -> float:
 
 
 def pack_switch(c: Any, x: float, v: float) -> float:
-    """Return the contact force, N, whose sign changes where the force is cut off; 1 if the pack may pull."""
+    """Return the contact force [N] whose sign changes where the force is cut off; 1 if the pack may pull."""
     if c[3] != 0.0:
         return 1.0
     return float(c[0] * (x - c[2]) + c[1] * v)

@@ -2,7 +2,7 @@
 
     Fs = sum of forces and contacts + sum of S(x)
 
-S is the curve of `printhammer.parts.samples` through samples of a force over the displacement, NaN outside
+S is the curve of `printhammer.parts.samples` through samples of a force against displacement, NaN outside
 their range. Its slope, or with shape-preserving cubics its curvature, jumps at each sample. Source: the
 measurement in the file that the entry names. Validity: displacements between the first and the last sample.
 Weakness: the curve also follows the noise of the samples, and a hysteresis is lost.

@@ -112,7 +112,7 @@ class Friction(Term):
 
 
 class SampledForce(Term):
-    """Force sampled over the displacement, from a CSV file.
+    """Force sampled against displacement, from a CSV file.
 
     The file has one sample per line, in any order, and units in its heading, ``displacement [mm],force [N]``;
     the force is positive toward the paper. Between the samples the curve is a shape-preserving cubic or a
@@ -142,7 +142,7 @@ class SampledForce(Term):
 
 
 def _samples_of(path: Path) -> tuple[tuple[float, float], ...]:
-    """Read the samples of a force from a table: displacements, m, ascending, and forces, N.
+    """Read the samples of a force from a table: displacements [m], ascending, and forces [N].
 
     Raises InputError if the table cannot be read, or has fewer than two samples, more than `MOST_SAMPLES`, or
     two samples at the same displacement.

@@ -216,7 +216,7 @@ def delayed_trains(
 
     Each hammer has its own delay, s; see `delayed_train`. One ensemble per firing simulates all trains.
 
-    `patience` is the longest time, s, to wait after each firing for the end of the pack contact, and `pulses`
+    `patience` is the longest time [s] to wait after each firing for the end of the pack contact, and `pulses`
     the number of firings of a complete train. The trains start from rest, or from `states`: displacement, m,
     and velocity, m/s. `hopeless` is called with the dots of the unfinished trains and their indices, and
     returns a mask of the trains to abandon. Further `options` are the `tolerance` of the simulations and

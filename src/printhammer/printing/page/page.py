@@ -369,7 +369,7 @@ def print_page(
     what : Pattern or str
         Requested dots; a text is set in the built-in font of nine wires.
     rate : float or str
-        Slot rate, Hz, or text with a unit: the largest firing rate of a wire. The carriage moves one pitch
+        Slot rate [Hz] or text with a unit: the largest firing rate of a wire. The carriage moves one pitch
         per slot.
     waveform : Waveform, optional
         Waveform of every firing in open loop, and of the single pulse; by default the waveform of the hammer.

@@ -300,7 +300,7 @@ def quality(
     hammer : Hammer
         The hammer to drive.
     rate : float or str
-        Slot rate, Hz, or text with a unit.
+        Slot rate [Hz] or text with a unit.
     pattern : str, int or bool array, optional
         Requested dots by slot: text such as "10110111", 1 for a dot; a number of dots in consecutive slots;
         or a boolean mask. By default one period of the binary de Bruijn cycle of order 8, which contains

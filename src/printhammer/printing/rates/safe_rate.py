@@ -222,7 +222,7 @@ def safe_rate(
         Single-pulse dot with which all dots are compared; by default that of `hammer`. If the drive was
         designed for another hammer, pass the single-pulse dot of that other hammer.
     first, last, step : float or str, optional
-        The grid of rates, Hz, or text with a unit; by default 100 Hz to 4 kHz, every 5 Hz, scaled down for a
+        The grid of rates [Hz] or text with a unit; by default 100 Hz to 4 kHz, every 5 Hz, scaled down for a
         device slower than the paper's hammer. In open loop the default grid omits lower rates at which the
         device is exactly at rest at each pulse.
     stop : bool, optional
@@ -425,7 +425,7 @@ def all_pass(
 ) -> BoolArray:
     """Whether all patterns, from rest and long, are within limits, for each case (hammer and rate).
 
-    Arguments are those of `printhammer.printing.dots.trial.attempt`.
+    For the arguments see `printhammer.printing.dots.trial.attempt`.
     """
     options: dict[str, Any] = {"limits": limits, "effort": effort}
     patterns = from_rest(every=strategy is not open_loop)
@@ -451,7 +451,7 @@ def safe_rates(
 ) -> FloatArray:
     """Compute the safe rates [Hz] of many hammers on an ascending grid of rates [Hz].
 
-    Other arguments are those of `all_pass`. The dots of each hammer are compared with its own entry of
+    For the other arguments see `all_pass`. The dots of each hammer are compared with its own entry of
     `singles`; progress counts the hammers whose safe rate is known. The rate is NaN if not even the first
     rate of the grid passes, and the last rate of the grid if all pass.
     """

@@ -192,7 +192,7 @@ def tolerance_yield(
     hammer : Hammer
         The design hammer.
     rate : float or str, optional
-        Slot rate, Hz, or text with a unit, at which all patterns from rest and the long patterns must be
+        Slot rate [Hz] or text with a unit, at which all patterns from rest and the long patterns must be
         within limits. Without a rate, the safe rate of each hammer is computed.
     number : int, optional
         Number of hammers.

@@ -96,7 +96,7 @@ def multipliers(
 ) -> FloatArray:
     """Compute the multipliers of rows with a dot in every `step`-th slot, shape (hammers,).
 
-    Each row belongs to a hammer and a rate, Hz; see `printhammer.derivatives.rows.row_multipliers`. The
+    Each row belongs to a hammer and a rate [Hz]; see `printhammer.derivatives.rows.row_multipliers`. The
     multipliers are NaN for a closed loop, which corrects errors itself.
     """
     if hasattr(strategy, "along"):

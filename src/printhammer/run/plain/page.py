@@ -181,7 +181,7 @@ def find_rest(constants: Any, limits: Any, grid: Any, points: Any, found: Any, o
     found : float64 array, shape (24576, 3)
         Working space.
     out : float64 array, shape (2,)
-        Rest position, m; for a refusal, the numbers in its message.
+        Rest position [m]; for a refusal, the numbers in its message.
 
     Returns
     -------
@@ -220,7 +220,7 @@ def fill_supply(constants: Any, limits: Any, about: Any, out: Any) -> int:
     about : float64 array, shape (14,)
         Numbers about the pulse; see `printhammer.drive.tables.pulse`.
     out : float64 array, shape (4,)
-        For a weak hold: hold current and largest current, A, voltage, V, resistance, ohm. For a falling
+        For a weak hold: hold current and largest current [A], voltage [V], resistance, ohm. For a falling
         linkage: inductance of the coil and least inductance, H, displacement, m.
 
     Returns
@@ -296,7 +296,7 @@ def fill_scales(
 def begin_window(about: Any, rest: float, front: float, out: Any) -> int:
     """Write the smallest window of a device, s; return whether a single pulse has to confirm the window.
 
-    `about` are the numbers about the pulse, `rest` and `front` positions, m; `front` is NaN without a pack.
+    `about` are the numbers about the pulse, `rest` and `front` positions [m]; `front` is NaN without a pack.
     """
     support = about[tables.SUPPORT]
     out[0] = least_window(support, about[tables.REPLACES] != 0.0)

@@ -73,8 +73,8 @@ def part_of_window(position: float, front: float) -> float:
 def write_half_widths(way: float, speed: float, position: float, front: float, out: Any) -> None:
     """Write the half-widths of the strobe window, m and m/s; see `printhammer.run.regime.window_of`.
 
-    `way` and `speed` are the scales of a hammer that starts at its origin, m and m/s; `position` and `front`
-    are those of backstop and pack, m, NaN if missing.
+    `way` and `speed` are the scales of a hammer that starts at its origin, m and m/s; `position` is the
+    position of the backstop and `front` the front of the pack, m; NaN if missing.
     """
     part = part_of_window(position, front)
     out[0], out[1] = part * way, part * speed
@@ -173,10 +173,10 @@ def largest_force(x: float, current: float, push: float, s: Statics) -> float:
 def typical_scales(
     mass: float, current: float, push: float, period: float, state: tuple[float, float], s: Statics
 ) -> tuple[float, float]:
-    """Return a typical displacement, m, and speed, m/s; see `printhammer.run.problem.scales_of`.
+    """Return a typical displacement [m] and speed [m/s]; see `printhammer.run.problem.scales_of`.
 
-    `current` and `push` are the largest current, A, and force of the drive, N; `period` is that of the drive,
-    s, NaN without a period.
+    `current` and `push` are the largest current [A] and force [N] of the drive; `period` is the drive's
+    period [s], NaN without a period.
     """
     origin = origin_of(s)
     if s.position > -math.inf and s.front < math.inf:
@@ -220,7 +220,7 @@ def last_window(least: float, way: float, speed: float) -> float:
 def is_window(ok: bool, flight: float, x: float, v: float, rest: float, front: float, wait: float) -> bool:
     """Whether a window is long enough: it holds `FLIGHTS` flight times and ends with the armature at rest.
 
-    `ok` is whether the single pulse was completed, `flight` its flight time, s, NaN without a dot; `x` and
+    `ok` is whether the single pulse was completed, `flight` its flight time [s], NaN without a dot; `x` and
     `v`, m and m/s, are the state at the end of the window `wait`, s.
     """
     if not ok:
