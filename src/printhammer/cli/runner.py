@@ -3,7 +3,7 @@
 A verb is a function declared with `verb`; its parameters are its options and, optionally, a `Job`. The runner
 parses the options, checks before the computation that every output file is new and writable, loads the
 hammer, and announces compilation. The verb computes and returns an `Answer`. The runner prints the answer,
-writes the files, prints complaints, and sets the exit status. `firing_of` parses the periodic drive of the
+writes the files, prints warnings, and sets the exit status. `firing_of` parses the periodic drive of the
 verbs that analyse chaos: period, rate, or drive file.
 """
 
@@ -89,7 +89,7 @@ class Answer:
     complaints: Sequence[str] = ()
     """Reasons for exit status 1, printed on the standard error."""
     failed: bool = False
-    """Whether the exit status is 1 even without a complaint."""
+    """Whether the exit status is 1 even without a warning."""
     interrupted: bool = False
     """Whether Ctrl-C stopped the computation; the answer then covers what was computed until then."""
 
@@ -193,7 +193,7 @@ class Job:
         self.screen.print(f"[dim]wrote[/dim] {escape(str(path))}", soft_wrap=True)
 
     def end(self, answer: Answer) -> int:
-        """Show the answer, write its files, print its complaints; return the exit status."""
+        """Show the answer, write its files, print its warnings; return the exit status."""
         if answer.shown or answer.note:
             self.show(*self.worded(list(answer.shown)), note=self.worded(answer.note))
         for name, content in answer.files.items():
@@ -361,7 +361,7 @@ def check_endings(paths: Iterable[Path], endings: Sequence[str], option: str = "
 
 
 def ended_early(statuses: Iterable[object], total: int | None = None) -> list[str]:
-    """Return one complaint, with run count and statuses, if any status is not "ok"; else an empty list."""
+    """Return one warning, with run count and statuses, if any status is not "ok"; else an empty list."""
     every = [str(status) for status in statuses]
     failed = [status for status in every if status != "ok"]
     kinds = ", ".join(sorted(set(failed)))

@@ -67,7 +67,7 @@ def spring_viscous(c: Any, x: float, v: float) -> float:
 
 
 def spring_switch(c: Any, v: float) -> float:
-    """Return 1, without a sign change: the dissipative force has no kink."""
+    """Return 1, which never changes sign: the dissipative force has no kink."""
     return 1.0
 
 
@@ -87,7 +87,7 @@ def pack_unloading(c: Any, x: float, v: float, q: float) -> float:
 
 
 def pack_switch(c: Any, x: float, v: float) -> float:
-    """Return 1, without a sign change: the pack law has no kink inside a contact."""
+    """Return 1, which never changes sign: the pack law has no kink inside a contact."""
     return 1.0
 
 
@@ -122,7 +122,7 @@ def backstop_energy(c: Any, w: float) -> float:
 
 
 def backstop_switch(c: Any, w: float, v: float) -> float:
-    """Return 1, without a sign change: the backstop law has no kink inside a contact."""
+    """Return 1, which never changes sign: the backstop law has no kink inside a contact."""
     return 1.0
 
 

@@ -1,4 +1,4 @@
-"""Results, declared once: Dataset, table, files, docstring, HTML repr and figure follow from the fields."""
+"""Results, declared once: Dataset, table, files, docstring and HTML repr are generated from the fields."""
 
 from printhammer.results.declare import Column, Declared, column, coordinate, derived, part, scalar
 from printhammer.results.files import ENDINGS, Reopened, reopen, save_dataset

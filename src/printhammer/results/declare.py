@@ -2,8 +2,8 @@
 
 `column`, `coordinate`, `scalar` and `part` declare the fields of a `printhammer.results.Result`, and
 `derived` adds a property to its table. Dataset, table, files, the Attributes section of the docstring and the
-HTML repr follow from the declarations. `Declared` is the base of classes that have declared fields but are
-not results.
+HTML repr are generated from the declarations. `Declared` is the base of classes that have declared fields but
+are not results.
 
 The formatting functions show results and their fields in notebooks.
 """

@@ -10,9 +10,10 @@ A result class is a frozen dataclass whose fields declare their units and meanin
 ...     time: FloatArray = column("s", "time of the fall", "fall", more="nan where it did not land")
 ...     tolerance: float = scalar("1", "error allowed in one step")
 
-Dataset, table, files, docstring and HTML repr follow from the declarations. `printhammer.figures.plots`
-registers the plot function of a class by the name of the class. A class overrides `entries` for units that
-depend on the instance and for arrays that are not fields, and `notes` for further attributes.
+Dataset, table, files, docstring and HTML repr are generated from the declarations.
+`printhammer.figures.plots` registers the plot function of a class by the name of the class. A class overrides
+`entries` for units that depend on the instance and for arrays that are not fields, and `notes` for further
+attributes.
 
 `stacked` combines results of one class along a new dimension.
 

@@ -307,7 +307,8 @@ class Problem:
         """Integrate to time `end` [s] and process the record in stretches, so that memory does not grow.
 
         `take` receives an iterator of stretches of at most `capacity` nodes, and need not exhaust it; if a
-        contact alone has more nodes, `take` is called again with longer stretches. Returns its result.
+        contact alone has more nodes, `take` is called again with longer stretches. The result of `take` is
+        returned.
         """
         while True:
             try:

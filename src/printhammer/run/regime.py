@@ -62,11 +62,11 @@ PAPER_WINDOW: Final = Window(PAPER_X, PAPER_V)
 def window_of(hammer: Hammer, drive: Drive) -> Window:
     """Return the window of strobe plots for a hammer under a drive.
 
-    The window is that of Fig. 11 if backstop and pack have the positions of the paper. For other hammers the
-    half-widths are a sixth of the distance from backstop to pack, as in Fig. 11, and a sixth of the speed
-    that the largest force imparts to the armature over that distance; without a backstop or without a pack,
-    the half-widths are the scales of the hammer (`printhammer.run.problem.scales_of`). As in Fig. 11 the
-    backstop, or the origin, lies a quarter of the width from the left.
+    The window is that of Fig. 11 if backstop and pack have the positions stated in Hendriks (1983). For other
+    hammers the half-widths are a sixth of the distance from backstop to pack, as in Fig. 11, and a sixth of
+    the speed that the largest force imparts to the armature over that distance; without a backstop or without
+    a pack, the half-widths are the scales of the hammer (`printhammer.run.problem.scales_of`). As in Fig. 11
+    the backstop, or the origin, lies a quarter of the width from the left.
     """
     place, front = hammer.position, hammer.front
     place = math.nan if place is None else place

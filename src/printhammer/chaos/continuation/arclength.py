@@ -236,7 +236,7 @@ def _half(
 
 
 def _is_joined(follower: Corrector, here: Node, ahead: Node, length: float) -> bool:
-    """Whether a corrected point continues the curve: near the prediction, aligned, multipliers close."""
+    """Whether a corrected point is near its prediction, with a similar tangent and similar multipliers."""
     predicted = follower.point(here) + length * here.tangent
     near = float(np.linalg.norm(follower.point(ahead) - predicted)) <= _FARTHEST * length
     return near and float(here.tangent @ ahead.tangent) >= _LEAST_COSINE and not _has_leap(here, ahead)

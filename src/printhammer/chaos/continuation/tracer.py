@@ -69,7 +69,7 @@ def read_bounds(
 
 @dataclass
 class Tracer:
-    """Tracer of the branches of one regime in one parameter."""
+    """Continuation of the branches of one regime in one parameter."""
 
     regime: Regime
     parameter: str

@@ -95,7 +95,7 @@ def _is_same(one: CurvePoint, other: CurvePoint) -> bool:
 
 
 class CurveTracer:
-    """Tracer of the bifurcation curves of one kind in a plane of two parameters."""
+    """Continuation of the bifurcation curves of one kind in a plane of two parameters."""
 
     def __init__(self, plane: Plane, kind: str, steps: Steps) -> None:
         self.plane, self.kind, self.steps = plane, kind, steps

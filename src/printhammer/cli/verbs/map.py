@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
 
 _BURST: Final = "Bursts"
-_FEW: Final = 6  # Largest number of rates named in a complaint; arbitrary
+_FEW: Final = 6  # Largest number of rates named in a warning; arbitrary
 _count = partial(opt.whole, panel=_BURST)
 
 

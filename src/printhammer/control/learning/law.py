@@ -402,7 +402,7 @@ class LearningLaw:
         return np.asarray(np.einsum("m,kmd->kd", unit.weights, by_hammer) + unit.more)
 
     def _slopes(self, hammer: Hammer, corrections: FloatArray) -> Printing[FloatArray]:
-        """Compute the sensitivity G of the deviations by differences, shape (2 dots, inputs)."""
+        """Compute the sensitivity G of the deviations by finite differences, shape (2 dots, inputs)."""
         rows = [corrections, *(corrections + np.eye(len(corrections)))]
         off = yield from self._off([hammer] * len(rows), rows)
         return np.asarray((off[1:] - off[0]).T)

@@ -73,8 +73,8 @@ SUPPLY: Final = (-0.03, -0.01, -0.003, -0.001, 0.0, 0.001, 0.003, 0.01, 0.03)
 Shape = Literal["free", "pulses"]
 # Allowed currents: any current within the limits, or the hammer's pulses with free times and widths
 SHAPES: Final = get_args(Shape)
-# Time from the touch to the end of a slot, as a fraction of the time in which a single pulse indents the
-# pack; arbitrary
+# Time from the touch to the end of a slot, as a fraction of the duration of the indentation by a single
+# pulse; arbitrary
 _PAST_PEAK: Final = 1.2
 _SPARE: Final = 5e-4  # Relative margin on the force of a planned dot; arbitrary
 # Motional energy below which a hammer counts as at rest, as a fraction of the pack loss of a dot; arbitrary
@@ -406,7 +406,7 @@ def least_work(
         see `printhammer.control.least_work.pulses`; "pulses" ignores `slew` and `spacing`.
     spacing : float or str, optional
         Time between nodes of the current, s, or text with a unit, rounded to a whole fraction of the period;
-        by default `SPACING` times the time in which a single pulse indents the pack.
+        by default `SPACING` times the duration of the indentation by a single pulse.
 
     Returns
     -------

@@ -36,7 +36,7 @@ DECAYS: Final = ("diode", "zener", "rail")
 
 
 class _Driver(Waveform):
-    """Base class of drivers: supply switched on for a time, and the path of the current afterwards."""
+    """Base class of drivers, which switch a supply on for a time and then let the current decay."""
 
     quantity: QuantityName = "voltage"
     voltage: float = measured("V", "V", "voltage of the supply", gt=0.0)

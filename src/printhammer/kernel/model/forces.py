@@ -110,7 +110,7 @@ def friction(mode: int, memory: float, hammer: Hammer) -> float:
 
 @inlined
 def hold_limit(hammer: Hammer) -> float:
-    """Return the largest acceleration [m/s^2] from which dry friction holds an armature at rest."""
+    """Return the largest acceleration [m/s^2], by all other forces, that static friction balances."""
     return float(friction_force(hammer[DAMPING:SPRING], 1.0) * hammer[INVERSE_MASS])
 
 

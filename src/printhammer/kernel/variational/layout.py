@@ -113,7 +113,10 @@ class Carried(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """Scales, bounds of the step (see `smooth_bounds`), parameter array, drive and forcing."""
+    """Arguments shared by the derivatives in a step: scales, bounds, parameter array, drive and forcing.
+
+    The bounds are the result of `smooth_bounds`.
+    """
 
     scales: Any
     bounds: Any

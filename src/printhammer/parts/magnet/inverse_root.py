@@ -3,7 +3,7 @@
     Fm = F0 - (Am - Bm I)^2 / sqrt(x)
 
 Source: F. Hendriks, IBM J. Res. Develop. 27 (1983), equation (3), a fit to forces measured at several
-currents. The same coenergy, W' = F0 x - 2 (Am - Bm I)^2 sqrt(x), links the flux
+currents. The same coenergy, W' = F0 x - 2 (Am - Bm I)^2 sqrt(x), determines the flux linkage
 
     lambda = dW'/dI = 4 Bm (Am - Bm I) sqrt(x),
 

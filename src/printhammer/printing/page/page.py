@@ -280,7 +280,7 @@ class Page(Result, rows="dot"):
     @property
     @derived("1", "largest pack force over the largest pack force of the single pulse", "dot")
     def force_ratio(self) -> FloatArray:
-        """Peak force of each requested dot over the single-pulse peak force; NaN for a lost dot."""
+        """Peak force of each requested dot divided by the single-pulse force; NaN for a lost dot."""
         return self.peak_force / self.nominal.force
 
     @property

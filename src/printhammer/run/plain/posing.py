@@ -53,14 +53,14 @@ PAPER_FRONT: Final = 203.2e-6
 """Position of the pack front in Hendriks (1983), m (0.008 inch)."""
 
 SAME: Final = 1e-3
-"""Relative tolerance within which positions are equal to the positions of the paper."""
+"""Relative tolerance within which positions are equal to those of Hendriks (1983)."""
 
 PART: Final = 1.0 / 6.0
 """Half-width of the strobe window of Fig. 11, as a fraction of the distance from backstop to pack."""
 
 
 def is_the_paper(position: float, front: float) -> bool:
-    """Whether backstop and pack have the positions of the paper, m; NaN for a missing part."""
+    """Whether backstop and pack have the positions stated in Hendriks (1983), m; NaN for a missing part."""
     near = abs(position - PAPER_BACKSTOP) <= SAME * max(abs(position), PAPER_BACKSTOP)
     return near and abs(front - PAPER_FRONT) <= SAME * max(abs(front), PAPER_FRONT)
 
