@@ -322,7 +322,7 @@ class ImpactTrain(Result):
         return {name: getattr(self.source, name, None) for name in ("surface", "first", "last", "wanted")}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return the Dataset variables: times over `impact`, histogram, autocorrelation over `lag`."""
+        """Return the Dataset variables: times along `impact`, histogram, autocorrelation along `lag`."""
         number = np.arange(1, len(self.times) + 1, dtype=np.int32)
         places = {
             "impact": ("1", "number of the impact", "impact", number),

@@ -366,7 +366,7 @@ def erratic_share(
 
 @measures("chaotic_region", *WHOLE)
 def chaotic_region(context: Context, claim: Claim) -> Measured:
-    """Measure the fraction of neighbouring rates below hang-up between which a late dot changes."""
+    """Measure the fraction of pairs of neighbouring rates below hang-up that differ in a late dot."""
     rates = rates_of(claim.settings)
     pulses = claim.settings["pulses"]
     dots = context.dots([PulseTrain(context.waveform, rate=rate, pulses=pulses) for rate in rates])

@@ -425,7 +425,7 @@ def firing_of(
     from printhammer.drive.file import load_drive
     from printhammer.drive.trains import PulseTrain
 
-    opt.check_unset(train, f"no such option with --drive {file}")
+    opt.check_unset(train, f"--drive {file} without this option")
     drive = load_drive(file, hammer.waveform)
     job.check(*tables_beside(file, getattr(drive.waveform, "file", None)))
     if math.isinf(drive.waveform.support) and drive.period is not None:

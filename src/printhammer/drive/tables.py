@@ -163,7 +163,7 @@ def chopper(fields: Any, table: Any) -> int:
 
 
 def peak_and_hold(fields: Any, table: Any) -> int:
-    """Write the table of a peak-and-hold driver: peak time, hold currents; return the number of rows."""
+    """Write the table of a peak-and-hold driver: supply on, then chopping; return the number of rows."""
     rows = put_on(fields, table, 0, 0.0, math.inf, 0.0)
     rows = put_on(fields, table, rows, fields[_OWN], fields[_OWN + 1], fields[_OWN + 2])
     return put_off(fields, table, rows, fields[_WIDTH])

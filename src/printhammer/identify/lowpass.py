@@ -45,7 +45,7 @@ def lowpass_motion(times: FloatArray, x: FloatArray, v: FloatArray, tau: float) 
     """Low-pass filter the displacements of motions that are at rest before the first time.
 
     `x` and `v` contain the displacements [m] and velocities [m/s] of several motions, or their derivatives,
-    at ascending times [s]; shape (times, motions), as the result. Between the times the displacement is the
+    at ascending times [s]; shape (times, motions), like the result. Between the times the displacement is the
     cubic Hermite interpolant.
     """
     if tau == 0.0 or len(times) < 2:

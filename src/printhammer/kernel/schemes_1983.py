@@ -192,7 +192,7 @@ def integrate(
 
 
 def drive_value(time: float, table: Any, replace: bool) -> float:
-    """Return the drive at a time, A or N: the sum of all active pulses, or the latest pulse alone.
+    """Return the drive value [A or N] at a time: the sum of all active pulses, or the latest pulse alone.
 
     The table holds firing times, first rows of the firings, rows of the waveforms and the number of earlier
     firings.

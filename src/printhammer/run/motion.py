@@ -203,7 +203,7 @@ class Motion(Result, fields=False):
 
     @cached_property
     def switchings(self) -> tuple[FloatArray, tuple[str, ...]]:
-        """Times at which the current of the coil changed its path, s, and the new paths: see `PATHS`."""
+        """Times [s] at which the coil current changed its path, and the new paths; see `PATHS`."""
         if not self._problem.laws.circuit:
             return np.zeros(0), ()
         times, paths = self._record.nodes[:, 0], self._record.nodes[:, -1]

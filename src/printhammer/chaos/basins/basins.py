@@ -309,7 +309,7 @@ class Basins(Result, rows="v x"):
         }
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return the Dataset variables: cells over `v` and `x`, attractor properties over `attractor`."""
+        """Return the Dataset variables: cells along `v` and `x`, attractor properties along `attractor`."""
         own = super().entries()
         codes = ", ".join(f"{label} {name}" for label, name in self.names.items())
         own["label"] = replace(own["label"][0], attrs={"codes": codes}), self.labels

@@ -330,7 +330,7 @@ class Branch(Result):
         return {"first_end": first, "last_end": last, "stable_ranges": stable}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return the Dataset variables: properties of the orbits over `orbit`, events over `event`."""
+        """Return the Dataset variables: properties of the orbits along `orbit`, events along `event`."""
         own = super().entries()
         own["value"] = replace(own["value"][0], unit=self.unit, meaning=self.parameter), self.values
         for name in ("real", "imag"):

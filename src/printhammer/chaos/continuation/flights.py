@@ -46,7 +46,7 @@ _SLOWER: Final = (0.98, 0.9, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.02, 0.005)
 
 
 class Flight(Declared):
-    """Flight between two impacts on a surface, without a force of this surface close to the two impacts."""
+    """Motion between two impacts on a surface; close to both impacts the surface exerts no force."""
 
     end: FloatArray = part("displacement [m] and velocity [m/s] at the end, shape (2,)")
     jacobian: FloatArray = part("derivative with respect to the state at the start, shape (2, 2)")

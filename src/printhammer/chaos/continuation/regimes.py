@@ -112,7 +112,7 @@ class Branches(Result):
         return {**{name: getattr(first, name, None) for name in names}, **ends, "stable_ranges": stable}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return the Dataset variables of all branches over `branch`, padded with NaN or -1."""
+        """Return the Dataset variables of all branches along `branch`, padded with NaN or -1."""
         return stacked(self.found, "branch", Branch)
 
     def to_dataframe(self) -> pd.DataFrame:

@@ -200,7 +200,7 @@ class BifurcationCurve(Result, rows="point"):
         }
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return the Dataset variables: curve over `point`, trains from rest over `value` and `main`."""
+        """Return the Dataset variables: curve along `point`, trains from rest along `value` and `main`."""
         own = super().entries()
         for k, (name, axis) in enumerate((("first", "main"), ("second", "value"))):
             own[name] = Column(self.units[k], self.names[k], ("point",), name=name), getattr(self, name)

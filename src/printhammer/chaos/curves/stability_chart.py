@@ -117,7 +117,7 @@ class StabilityChart(Result):
         )
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return the Dataset variables: trains from rest over `value` and `main`, curves over `curve`."""
+        """Return the Dataset variables: trains from rest along `value` and `main`, curves along `curve`."""
         # At least one of each: a dimension of length 0 has another meaning in the classic NetCDF format.
         most, count = max((len(curve.first) for curve in self.curves), default=1), max(len(self.curves), 1)
         table = np.full((2, count, most), np.nan)

@@ -129,7 +129,7 @@ class LyapunovChart(Result, rows="period"):
         return _chart(points.hammer, points.drive, firings, points.tolerance, rows)
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return the Dataset variables: all columns over `period`, exponents also over `exponent`."""
+        """Return the Dataset variables: all columns along `period`, exponents also along `exponent`."""
         return {**super().entries(), "exponent": EXPONENT}
 
     def to_dataframe(self) -> pd.DataFrame:

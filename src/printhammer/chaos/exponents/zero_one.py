@@ -124,7 +124,7 @@ class ZeroOne(Result):
         return {"shown_angle": float(self.angles[self.shown])}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return the Dataset variables: correlations over `angle`, displacements and path over steps."""
+        """Return the Dataset variables: correlations along `angle`, displacements and path along steps."""
         places = {"step": ("number of steps", len(self.displacement)), "number": ("place", self.length)}
         return super().entries() | {
             name: (

@@ -86,7 +86,7 @@ class Manifolds(Result, rows="point"):
         return np.column_stack([self.x[rows], self.v[rows]])
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return the Dataset variables: states over `point`; kind and reason for the end of each curve."""
+        """Return the Dataset variables: states along `point`; kind and reason for the end of each curve."""
         own = super().entries()
         ends = np.array(self.ends, "U16")
         own["end"] = Column("", "reason for the end of the curve", ("curves",), name="end"), ends

@@ -219,7 +219,7 @@ class Orbit(Result):
         return {**super().provenance, "period": self.regime.period}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return the Dataset variables: states over `firing`, multipliers, and scalars of the orbit."""
+        """Return the Dataset variables: states along `firing`, multipliers, and scalars of the orbit."""
         own = super().entries()
         # Under a continuous periodic force there are firings but no dots.
         for name in ("flight_time", "peak_force"):

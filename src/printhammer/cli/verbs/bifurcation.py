@@ -189,7 +189,7 @@ def basins(
         "Largest period, in firings, of the saddle orbits whose manifolds are drawn."
     ),
     quench: bool = opt.switch(
-        "Map the force or loss of the dot of a second pulse, against gap and width, instead of basins.",
+        "Map where the second of two pulses prints a dot, against gap and width, instead of basins.",
         panel=_QUENCH,
     ),
     units: Units = opt.UNITS,
@@ -208,9 +208,9 @@ def basins(
     if quench:
         of_basins = {name: passed.get(name) for name in ("period", "rate", "overlap", "drive", "x", "v")}
         more = {name: passed.get(name) for name in ("firings", "rounds")}
-        opt.check_unset({**of_basins, **more, "box": box, "saddles": saddles}, "no such option with --quench")
+        opt.check_unset({**of_basins, **more, "box": box, "saddles": saddles}, "--quench without this option")
     else:
-        opt.check_unset(of_quench, "--quench with it")
+        opt.check_unset(of_quench, "this option only with --quench")
         firing = firing_of(job, hammer, passed, 1.05e-3, ", or --quench")
     if saddles is not None:
         read_count(saddles, "saddles")

@@ -114,7 +114,7 @@ def impact_time(
         from printhammer.control.recorded_impacts import recorded_impacts
 
         opt.check_unset(
-            {"noise": noise, "sampling-rate": sampling_rate, "bits": bits}, "no such option with --record"
+            {"noise": noise, "sampling-rate": sampling_rate, "bits": bits}, "--record without this option"
         )
         probe = {name: passed[name] for name in ("signal", "delay", "bandwidth") if name in passed}
         impacts = recorded_impacts(hammer, record, columns=columns, **probe)
@@ -199,7 +199,7 @@ def duty(
 
         opt.check_unset(
             {"heat": heat, **{name.replace("_", "-"): passed.get(name) for name in passed}},
-            "no such option with --rates",
+            "--rates without this option",
         )
         if hammer is not None:
             raise InputError(

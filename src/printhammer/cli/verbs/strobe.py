@@ -133,7 +133,7 @@ def lyapunov(
         periods = _periods(period, rate, lowest, highest, steps)
     else:
         more = {"period": period, "rate": rate, "from": lowest, "to": highest, "steps": steps}
-        opt.check_unset(more, "no such option with --drive")
+        opt.check_unset(more, "--drive without this option")
         firing, periods = firing_of(job, hammer, passed), None
     if periods is None or len(periods) == 1:
         if periods is not None:

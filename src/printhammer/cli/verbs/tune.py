@@ -304,10 +304,10 @@ def learn(
     )
     if signal is not None:
         own = {"noise": noise, "offset-spread": offset_spread}
-        opt.check_unset(own, "--signal-noise instead, with --signal")
+        opt.check_unset(own, "--signal-noise instead, since --signal is set")
         readings |= _from_coil(job, hammer, signal, signal_noise)
     else:
-        opt.check_unset({"signal-noise": signal_noise}, "--signal as well")
+        opt.check_unset({"signal-noise": signal_noise}, "this option only with --signal")
     driven = None if unit is None else load(unit)
     passed["largest_current"] = current_bound(hammer, passed.get("largest_current"))
     passed.setdefault("driver", "switch" if pulse_of(hammer).quantity == "current" else "own")

@@ -348,7 +348,7 @@ def learn(
     unit : Hammer, optional
         The unit to calibrate; by default drawn from the variability with the seed.
     rate : float or str, optional
-        Slots per second, Hz, or text with a unit; by default 1275 Hz divided by the time scale of the device,
+        Slot rate [Hz] or text with a unit; by default 1275 Hz divided by the time scale of the device,
         but at least 1.25 times the rate up to which the device settles between pulses.
     driver, limits, history, reach, largest_current
         As for `printhammer.tune`; the default driver is a fast switch. With the driver "own", for a hammer

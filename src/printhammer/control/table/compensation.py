@@ -214,7 +214,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return self.delayed(own - nominal(driven, tolerance=DISPLAY_TOLERANCE).flight_time, driver, hammer)
 
     def delayed(self, later: float, driver: str, hammer: Hammer) -> CompensationTable:
-        """Return a copy with all pulses delayed by `later`, s, labelled with a hammer and its driver."""
+        """Return a copy with all pulses delayed by `later` [s], labelled with a hammer and its driver."""
         delay = np.where(self.brake_width > 0.0, self.brake_delay + later, self.brake_delay)
         return replace(
             self,

@@ -183,7 +183,7 @@ _FEW_QUENCH: Final = 0.01  # Fraction of forces beyond either end of the colour 
 
 @styled
 def plot_quench(quenches: QuenchMap) -> Figure:
-    """Draw a quench map, time between firings horizontal, width of the second pulse vertical.
+    """Draw a quench map: width of the second pulse against the time between the firings.
 
     Crosses mark the two cases of Fig. 6 of the paper if they lie within the axes.
     """

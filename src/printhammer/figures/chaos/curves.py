@@ -33,7 +33,7 @@ _REGION: Final = "#cfe3f1"
 
 @styled
 def plot_chart(chart: StabilityChart) -> Figure:
-    """Draw a stability chart, the first parameter horizontal, the second vertical.
+    """Draw a stability chart: the second parameter against the first parameter.
 
     Shaded: the train from rest settles to the period of the orbit; grey: its run stopped early.
     """
@@ -93,7 +93,7 @@ _NONE: Final = "#f1f1f1"
 
 @styled
 def plot(curve: BifurcationCurve, *, attractors: bool = True) -> Figure:
-    """Draw a bifurcation curve, the first parameter horizontal, the second vertical.
+    """Draw a bifurcation curve: the second parameter against the first parameter.
 
     The curve is heavy where stability is lost, and dashed where a period doubling is subcritical; points of
     codimension two are marked and named.

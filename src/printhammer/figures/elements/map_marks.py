@@ -108,7 +108,7 @@ def limits_of(*charts: xr.Dataset) -> tuple[float, float]:
 
 
 def picture(ax: Axes, chart: xr.Dataset, scales: Scales) -> QuadMesh:
-    """Draw the displacement of a map in colours, time horizontal, rate vertical; return the mesh.
+    """Draw the displacement in colours against time (horizontal) and rate (vertical); return the mesh.
 
     Firings and lost dots are drawn on top; see `firing_lines`.
     """

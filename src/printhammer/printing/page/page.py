@@ -376,7 +376,7 @@ def print_page(
     strategy, limits
         As for `printhammer.safe_rate`.
     head : Head, optional
-        Wire positions and diameter; by default that of `printhammer.printing.page.page.head_of`.
+        Wire positions and diameter; by default the result of `printhammer.printing.page.page.head_of`.
 
     Returns
     -------

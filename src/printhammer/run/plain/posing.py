@@ -146,7 +146,8 @@ def falling_place(low: float, high: float, current: float, coil: Coil) -> tuple[
     Returns
     -------
     tuple of float
-        Displacement, m, and derivative of the flux linkage by current, H; NaN and 0 if none is found.
+        Displacement [m] and derivative of the flux linkage with respect to current [H]; NaN and 0 if no
+        such displacement is found.
     """
     count = PLACES if high > low else 1
     for k in range(count):
