@@ -1,4 +1,4 @@
-"""The tangent flow through the circuit of a coil by differences of neighbouring runs; for tests."""
+"""The tangent flow through a coil circuit, from finite differences of runs; for tests."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ if TYPE_CHECKING:
 
 
 def problem_of(hammer: ph.Hammer, drive: Any, state: tuple[float, float] | None = None) -> Problem:
-    """The run of a hammer, whose differences can be taken."""
+    """Run of a hammer, suitable for finite differences."""
     return Problem(hammer, drive, initial_state(hammer, state), 0.0, SHARP)
 
 
 def units_of(problem: Problem) -> np.ndarray:
-    """Typical sizes of displacement, velocity, memory and electric state."""
+    """Typical magnitudes of displacement, velocity, memory and electric state."""
     way, speed = problem.scales
     linkage = problem.constants[LINKAGE_SCALE]
     voltage = max(
@@ -48,7 +48,7 @@ def units_of(problem: Problem) -> np.ndarray:
 
 
 def currents(problem: Problem, state: Any, path: float) -> tuple[float, float]:
-    """Currents in the coil, A, and in its shorted turn, of the flux linkages of a state."""
+    """Convert the flux linkages of a state to the currents in the coil and in its shorted turn, A."""
     hammer, x, linkage, main = problem.hammer, *(float(state[k]) for k in (0, 3, 4))
     coil = current_of(hammer, x, linkage, main) if path != BLOCKED else 0.0
     if not problem.constants[TURN_RESISTANCE] > 0.0:
@@ -80,7 +80,7 @@ def arrive(problem: Problem, state: Any, branch: int, path: float, start: float,
 
 
 def settled(difference: Any, size: float, levels: int, units: np.ndarray) -> np.ndarray:
-    """Extrapolate central differences of halved steps to zero; of all extrapolates the most settled one."""
+    """Extrapolate central differences of halved steps to zero; return the extrapolate that changes least."""
     rows: list[list[np.ndarray]] = []
     best, found = np.inf, np.zeros(len(units))
     for k in range(levels):
@@ -97,7 +97,7 @@ def settled(difference: Any, size: float, levels: int, units: np.ndarray) -> np.
 def deviation(
     hammer: ph.Hammer, drive: Any, start: float, end: float, size: float = 4e-6, levels: int = 5
 ) -> float:
-    """Difference between flow and differences of runs over the norm of the latter, in typical sizes."""
+    """Relative difference between the flow and differences of runs, in typical magnitudes."""
     problem = problem_of(hammer, drive)
     followed: Flow = follow(problem, np.array([start, end]), np.eye(6), renormalise=False)
     assert followed.status_name == "ok"
@@ -126,7 +126,7 @@ def deviation(
 def changed(
     hammer: ph.Hammer, drive: ph.PulseTrain, name: str, value: float
 ) -> tuple[ph.Hammer, ph.PulseTrain]:
-    """Hammer and drive with another value of a constant."""
+    """Hammer and drive with a changed constant."""
     section, _, last = name.rpartition(".")
     waveform, times = drive.waveform, drive.times.tolist()
     if section == "waveform":
@@ -142,7 +142,7 @@ def deviations(
 ) -> dict[str, float]:
     """Difference between the columns of constants and differences of runs from rest, by constant.
 
-    Over the norm of the latter, in typical sizes; a constant at an end of its range is left out.
+    The differences are relative, in typical magnitudes; a constant at an end of its range is omitted.
     """
     problem = problem_of(hammer, drive)
     wanted = []

@@ -1,4 +1,4 @@
-"""An independent integration of a coil under a driver, for tests: the current as state, SciPy's events.
+"""Independent integration of a coil under a driver, for tests: current as state, SciPy's event detection.
 
 Nothing is shared with the kernel: the state holds the current where the kernel has the flux linkage, laws and
 paths are written out anew, every step is short, and every event is a root of SciPy's dense output.
@@ -40,7 +40,7 @@ class Device:
 
 @dataclass
 class Phase:
-    """One phase of a driver from a time since the firing on."""
+    """One phase of a driver, from a time since the firing onward."""
 
     start: float
     voltage: float
@@ -54,7 +54,7 @@ class Phase:
 
 @dataclass
 class Run:
-    """What came of it."""
+    """Outcome of an integration."""
 
     t: list[float] = field(default_factory=list)
     switchings: list[tuple[float, str]] = field(default_factory=list)
@@ -80,7 +80,7 @@ def integrate(
     longest: float = math.inf,
     tolerance: float = 1e-12,
 ) -> Run:
-    """Integrate a device that a driver fires at given times from rest without current to `end`, s."""
+    """Integrate a device to `end`, s, from rest without current; a driver fires at given times."""
     run = Run()
     t, y = 0.0, np.array([*state, 0.0])
     edges = sorted({f + p.start for f in firings for p in phases} | {end})

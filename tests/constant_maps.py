@@ -1,4 +1,4 @@
-"""The derivative of a state with respect to constants, for tests of the flow that carries it."""
+"""The derivative of a state with respect to constants, for tests of the flow that propagates it."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 class ConstantMap(Declared):
-    """The derivative of the state at one time with respect to constants.
+    """Derivative of the state at one time with respect to constants.
 
     The state is that of `printhammer.derivatives.states.TangentMap`.
     """
@@ -60,13 +60,13 @@ class ConstantMap(Declared):
 
     @property
     def ok(self) -> bool:
-        """Whether the run went as asked."""
+        """Whether the run reached its end time."""
         return self.status == M.STATUS_NAMES[M.OK]
 
     def moving(
         self, state_map: FloatArray, start_moves: npt.ArrayLike = 0.0, end_moves: npt.ArrayLike = 0.0
     ) -> FloatArray:
-        """Return the matrix for a start and an end that move with the constants themselves.
+        """Return the matrix for start and end times that depend on the constants.
 
         The state z at a start that moves is held: d(state) = matrix - M z' ds + y' de, with M the tangent map
         of the state, z' and y' its rates at start and end. For the strobe map over one period that begins
@@ -114,12 +114,12 @@ def constant_map(
     Returns
     -------
     ConstantMap
-        With a status; a run that could not go on is no exception.
+        With a status; a run that ends early raises no exception.
 
     Raises
     ------
     InputError
-        As for the tangent map; a constant that is not known or at whose value nothing is differentiable.
+        As for the tangent map; an unknown constant, or a value at which no derivative exists.
     """
     problem = problem_between(hammer, drive, start, end, state, tolerance)
     wanted = parameters(hammer, drive, constants)

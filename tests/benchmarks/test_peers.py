@@ -1,4 +1,4 @@
-"""The peers of the benchmark: they solve the problem that is meant, and say it where they are absent."""
+"""The peer solvers of the benchmark: they solve the same problem, and a missing solver is reported."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The benchmark: the same problem for all, errors are what they say, who is absent is named. No speeds."""
+"""The benchmark: all solvers solve the same problem, errors are as stated, missing solvers are named."""
 
 from __future__ import annotations
 

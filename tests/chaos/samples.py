@@ -1,4 +1,4 @@
-"""One small result of every class of `printhammer.chaos` and `printhammer.derivatives`, by its name."""
+"""One small result of every class of `printhammer.chaos` and `printhammer.derivatives`, by class name."""
 
 from collections.abc import Callable
 from functools import cache

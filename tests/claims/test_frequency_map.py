@@ -106,7 +106,7 @@ def test_a_rate_without_a_dot_is_lost() -> None:
 
 
 def test_the_chaotic_region_is_that_of_the_map(context: Context) -> None:
-    """The same share from a map of the hammer, counted cell by cell."""
+    """The same fraction, counted cell by cell in a map of the hammer."""
     rates = np.arange(700.0, 1499.0, 3.0)
     table = ph.frequency_map(context.hammer, rates=rates)
     flights, struck = table.flight_time.values, table.struck.values

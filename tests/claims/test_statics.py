@@ -16,7 +16,7 @@ def measured(context: Context, name: str) -> dict[str, object]:
 
 
 def free_force(hammer: "ph.Hammer", x: float) -> float:
-    """Equations (3) and (4) at zero current, written out."""
+    """Equations (3) and (4) at zero current, evaluated directly."""
     c = {key: constant.si for key, constant in hammer.constants.items()}
     magnet = c["magnet.F0"] - c["magnet.Am"] ** 2 / math.sqrt(x)
     return magnet + c["spring.Bs"] * (1.0 - (x - c["backstop.position"]) / c["spring.As"])

@@ -23,7 +23,7 @@ class Found:
 
 
 class Given:
-    """Stands in for the runs: verdicts by strobe time in us, and what they become for changed hammers."""
+    """Replacement for the runs: verdicts by strobe time in us, also for changed hammers."""
 
     def __init__(self, names: dict[int, str], changed: dict[int, str] | None = None) -> None:
         self.names = names
@@ -118,7 +118,7 @@ def test_another_verdict_fails(context: Context, monkeypatch: pytest.MonkeyPatch
 
 
 def scanned(**windows: tuple[int, int]) -> dict[int, str]:
-    """Verdicts of a scan, period 1 but for windows given as (longest, shortest) strobe time in us."""
+    """Verdicts of a scan: period 1, except in windows given as (longest, shortest) strobe time in us."""
     names = dict.fromkeys(range(800, 3001), "period-1")
     for name, (high, low) in windows.items():
         names.update(dict.fromkeys(range(low, high + 1), name.rstrip("_").replace("_", "-")))

@@ -57,7 +57,7 @@ def contents(folder: Path) -> dict[Path, bytes]:
 def check_refusal(
     cli: Callable[..., Outcome], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Callable[..., None]:
-    """Return a function that runs a command line and checks that it is refused in one sentence."""
+    """Return a function that runs a command line and checks that it is rejected with one sentence."""
 
     def call(*arguments: object, said: str | tuple[str, ...]) -> None:
         monkeypatch.chdir(tmp_path)
@@ -81,11 +81,11 @@ def check_refusal(
 def refused(
     cli: Callable[..., Outcome], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Callable[..., None]:
-    """Run a command line that cannot be used: one sentence, status 2, no file written or changed."""
+    """Run an invalid command line: one sentence, exit status 2, no file written or changed."""
     return check_refusal(cli, tmp_path, monkeypatch)
 
 
 @pytest.fixture(scope="session")
 def hammer() -> ph.Hammer:
-    """The shipped hammer, which the tests here call by its name."""
+    """The shipped hammer, which these tests refer to by name."""
     return ph.load("hendriks-1983")

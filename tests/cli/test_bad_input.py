@@ -1,4 +1,4 @@
-"""Bad input: one sentence that names file, key, value and what was expected; status 2; nothing lost."""
+"""Bad input: one sentence with file, key, value and expectation; status 2; no data lost."""
 
 import subprocess
 import sysconfig
@@ -84,7 +84,7 @@ def bad_file(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     indirect=["bad_file"], ids=list(BAD_HAMMERS),
 )  # fmt: skip
 def test_bad_hammer(cli, bad_file: Path, expected: tuple[str, ...]) -> None:
-    """Every fault of a file once; test_registry.py has every verb refuse a faulty file."""
+    """Test every fault of a file once; test_registry.py tests that every verb rejects a faulty file."""
     before = {path: path.read_bytes() for path in bad_file.parent.iterdir()}
     outcome = cli("run", bad_file, "--out", bad_file.parent / "out.json")
     assert outcome.status == 2

@@ -1,4 +1,4 @@
-"""Every device in every verb: defaults of the device, refusals that name what is missing and the option."""
+"""Every device in every verb: device defaults, and errors that name the missing part and the option."""
 
 import math
 import re
@@ -30,7 +30,7 @@ PAPER = 0.28e-3
 
 
 def timed(monkeypatch: pytest.MonkeyPatch, flight: float) -> None:
-    """Let every single pulse fly for a time [s] without a run."""
+    """Replace the simulation of the single pulse by a given flight time [s]."""
     monkeypatch.setattr(window, "window_of", lambda *_: window.Window(20.0 * flight, flight))
 
 
@@ -189,7 +189,7 @@ def test_views_of_the_studio_are_listed_in_the_file() -> None:
 
 
 def test_pulses_that_do_not_interact_need_no_table() -> None:
-    """The relay is at rest to the last bit 34 ms after a pulse."""
+    """The relay is exactly at rest 34 ms after a pulse."""
     relay = ph.load("relay-5v")
     slowest = undisturbed_rate(relay)
     assert 25.0 < slowest < 30.0
@@ -221,7 +221,7 @@ def test_a_burst_needs_a_current() -> None:
 
 @pytest.mark.parametrize("name", ["impact-wire", "dot-peen", "relay-5v"])
 def test_a_record_of_the_current_is_as_long_as_the_pulse(name: str) -> None:
-    """The touch and the end of the pulse are in it, and for a fast device 4 ms."""
+    """The window contains the touch and the end of the pulse, and is 4 ms for a fast device."""
     hammer = ph.load(name)
     (dot,) = ph.simulate(hammer, ph.PulseTrain(hammer.waveform)).dots
     times = ph.measure("current", hammer, sensor={"sampling_rate": "100 kHz"}).values["time"]
@@ -238,6 +238,6 @@ def test_a_device_whose_armature_does_not_return_says_so(cli: Callable[..., Any]
 
 
 def test_whole_parameter_values_are_written_out(cli: Callable[..., Any]) -> None:
-    """Periods from 80 ms to 140 ms, in steps that two digits tell apart."""
+    """Periods from 80 ms to 140 ms, in steps that two digits resolve."""
     options = ["--values", "4", "--firings", "30", "--refine", "0", "--no-exponents"]
     assert not re.search(r"e\+\d", cli("bifurcation", "pot-magnet", *options).out)

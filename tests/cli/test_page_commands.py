@@ -1,4 +1,4 @@
-"""The commands on the pages run as printed, in a folder that has what a reader has by then."""
+"""The commands on the pages run as printed, in a folder with the files that a reader has at that point."""
 
 import re
 import shlex
@@ -96,13 +96,13 @@ def pages() -> Iterator[Any]:
 
 @pytest.fixture(autouse=True)
 def _two_stages(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Learn in two stages; two units of `tests/control/learning/test_units.py` learn in all."""
+    """Learn in two stages; `tests/control/learning/test_units.py` runs all stages for two units."""
     monkeypatch.setattr("printhammer.control.learning.learn.RUNS", RUNS[:2])
 
 
 @pytest.fixture(scope="module")
 def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with what the pages call by name, apart from what their own commands write."""
+    """A folder with the files that the pages refer to, except those that their own commands write."""
     folder = tmp_path_factory.mktemp("desk")
     hammer = ph.load("hendriks-1983")
     for name in ("my-hammer", "base", "known"):
@@ -134,7 +134,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def run_shortened(cli: Callable[..., Any], command: str) -> None:
-    """Run a command of a page, with fewer values where it takes minutes."""
+    """Run a command of a page, with fewer values if it takes minutes."""
     printed = f"{command}\n"
     for long, short in FEWER.items():
         printed = printed.replace(long, short)
@@ -164,7 +164,7 @@ def test_the_commands_on_a_page_run(
 
 
 def steps_of(script: str) -> Iterator[tuple[bool, str]]:
-    """Split a script of a shell into commands of the program, and what the shell itself does between them."""
+    """Split a shell script into commands of the program and the shell commands between them."""
     command = re.compile(r"^printhammer .*$", re.MULTILINE)
     script = script.replace(" \\\n", " ")
     place = 0

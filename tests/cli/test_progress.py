@@ -1,4 +1,4 @@
-"""How far a verb is: told where somebody looks, and nowhere else."""
+"""Progress displays of the verbs: shown on a terminal only."""
 
 import re
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from printhammer.cli.terminal import pace_of, progress_bar, say, status_line
 
 @pytest.fixture
 def terminal(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have the library take any stream for a terminal."""
+    """Make the library treat any stream as a terminal."""
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setenv("TERM", "xterm")
 

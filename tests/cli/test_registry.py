@@ -1,4 +1,4 @@
-"""What holds for every verb: its help, its example, and that bad input is told in one sentence."""
+"""Rules for every verb: its help, its example, and errors of one sentence for bad input."""
 
 import re
 import shlex
@@ -81,7 +81,7 @@ except SystemExit:
 
 
 def printed(cli: Callable[..., Any], words: list[str]) -> str:
-    """Return the example as a help shows it, which is what a user copies."""
+    """Return the example as the help shows it, ready to copy."""
     done = cli(*words, "--help")
     assert done.status == 0
     lines = done.out.partition("Example: ")[2].splitlines()
@@ -89,7 +89,7 @@ def printed(cli: Callable[..., Any], words: list[str]) -> str:
 
 
 def commands_of(shown: str) -> list[list[str]]:
-    """Return the words of the commands of an example, as a shell takes them."""
+    """Split the commands of an example into words, as a shell does."""
     assert all(line.endswith("\\") for line in shown.splitlines()[:-1])
     return [shlex.split(part) for part in shown.replace("\\\n", "").split(" && ")]
 
@@ -140,7 +140,7 @@ def test_the_example_in_the_help_runs(
 
 
 def written_by(verb: Verb) -> set[str]:
-    """Return what an example writes, by the names in it."""
+    """Return the files that an example writes, by their names in it."""
     words = verb.example.split()
     names = [words[k + 1] for k, word in enumerate(words) if word in ("--out", ">")]
     names += re.findall(r"[\w.]+\.jsonl?\b", verb.example)
@@ -148,7 +148,7 @@ def written_by(verb: Verb) -> set[str]:
 
 
 def test_the_examples_run_one_after_the_other_in_one_folder() -> None:
-    """Each writes files of its own; the tables of the bench are written over."""
+    """Every example writes its own files; the tables of the bench are overwritten."""
     written = [name for verb in VERBS for name in written_by(verb) if name not in ("build", "lab")]
     assert len(set(written)) == len(written)
 

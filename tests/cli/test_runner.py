@@ -1,4 +1,4 @@
-"""How the runner writes files, and what tables look like."""
+"""The runner: how files are written, and the layout of tables."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The verb `studio`: it writes the page and opens it; what it cannot use is refused."""
+"""The verb `studio`: it writes the page and opens it; invalid input is rejected."""
 
 import json
 import webbrowser
@@ -18,7 +18,7 @@ from printhammer.studio import launch, live
 
 @pytest.fixture
 def opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Pages that were opened in the browser; their folder is that of the test."""
+    """Pages opened in the browser; they are written to the folder of the test."""
     without_modules(monkeypatch)
     found: list[str] = []
     monkeypatch.setattr(webbrowser, "open", found.append)

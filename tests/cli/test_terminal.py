@@ -1,4 +1,4 @@
-"""What a terminal shows: all digits where it is narrow, names of files as they are, plain text in ASCII."""
+"""Terminal output: all digits on a narrow terminal, unchanged file names, plain text in ASCII."""
 
 import io
 import sys

@@ -1,4 +1,4 @@
-"""What verbs write: never over a file that is there, unless with --force; and by which names of options."""
+"""Files written by the verbs: no file is overwritten without --force; names of the output options."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Tables along the gap: dots are those of the design, between two values as well; the header compiles."""
+"""Tables along the gap: dots match the design, also between two values; the header compiles."""
 
 import subprocess
 from dataclasses import replace
@@ -42,7 +42,7 @@ def tables(steps: list[tuple[int, int]]) -> AxisTables:
 
 
 def check_dots(tables: AxisTables, gap: float, slots: tuple[int, ...]) -> None:
-    """Check that dots on a hammer with another gap are those of the design."""
+    """Check that dots on a hammer with another gap match the design."""
     hammer = ph.load("hendriks-1983-1")
     single = nominal(hammer)
     driven = perturbed(hammer, Perturbation(travel=gap))
@@ -122,7 +122,7 @@ int main(void) {{
 
 
 def test_each_table_states_the_multipliers_of_its_hammer(tables: AxisTables) -> None:
-    """The same by the drives of the strategy at the value as by the hammer of the tuning."""
+    """The drives of the strategy at a value equal those of the hammer that was tuned there."""
     again = tables.with_multipliers(ph.load("hendriks-1983-1"))
     for table, other in zip(tables.tables, again.tables, strict=True):
         assert np.isfinite(table.multiplier).all()
@@ -131,7 +131,7 @@ def test_each_table_states_the_multipliers_of_its_hammer(tables: AxisTables) -> 
 
 
 def ticks_between(tables: AxisTables, tick: float, value: int) -> list[list[int]]:
-    """Return the times of all histories at a value, nm, in ticks, by fractions of whole numbers."""
+    """Interpolate the times of all histories at a value, nm, in ticks, with integer arithmetic."""
     places = [round(place * 1e9) for place in tables.values]
     after = next((k for k, place in enumerate(places) if k and value <= place), len(places) - 1)
     share = Fraction(

@@ -1,4 +1,4 @@
-"""Dead time against rail and temperature, on a device that ships; the header as a compiler reads it."""
+"""Dead time against rail and temperature, for a shipped device; the header, read by a compiler."""
 
 import dataclasses
 import subprocess
@@ -57,7 +57,7 @@ def test_the_own_blow_needs_the_own_pulse(wire: ph.Hammer) -> None:
 
 
 def test_a_driver_whose_shortest_pulse_outlasts_the_flight_gives_its_own_blow() -> None:
-    """At its own rail any width gives the blow; a higher rail strikes harder, a lower one weaker."""
+    """At the nominal rail any width gives the blow; a higher rail hits harder, a lower rail more weakly."""
     flipper = ph.load("pinball-flipper")
     table = ph.dead_time(flipper, voltage=[49.0, 50.0, 51.0], temperature=[20.0])
     assert np.isnan(table.width[[0, 2], 0]).all()

@@ -72,7 +72,7 @@ def test_a_sample_of_labels_is_compared_at_a_tenth_of_the_tolerance(two: Basins)
 
 @pytest.mark.slow
 def test_labels_that_hang_on_the_tolerance_are_counted(hammer: "ph.Hammer") -> None:
-    """The orbit of a coarse tolerance is none at a finer one: pictures differ as the sample says."""
+    """At the finer tolerance every label differs; `changed` counts the sampled cells whose label differs."""
     coarse, fine = (ph.basins(hammer, period=0.98e-3, tolerance=each, **PLANE) for each in (1e-5, 1e-6))
     assert (coarse.labels != fine.labels).all()
     assert coarse.changed == coarse.compared == 9
@@ -158,7 +158,7 @@ def test_orbits_are_known_again_whatever_their_phase(hammer: "ph.Hammer") -> Non
 
 
 def slow_and_chaotic(begin: np.ndarray, firings: int, transient: int) -> Columns:
-    """Trains of the logistic map beside a coordinate that forgets its start in 2,000 firings."""
+    """Trains of the logistic map, with a second coordinate that forgets its start within 2,000 firings."""
     x, v, points = begin[:, 0].copy(), begin[:, 1].copy(), []
     for firing in range(firings):
         if firing >= transient:
@@ -172,7 +172,7 @@ def slow_and_chaotic(begin: np.ndarray, firings: int, transient: int) -> Columns
 def test_a_strange_attractor_that_is_approached_slowly_is_one(
     hammer: "ph.Hammer", monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A thousand firings after its start each of twelve trains is still far from all others."""
+    """A thousand firings after its start, each of twelve trains is still far from all other trains."""
 
     def run(
         regimes: list[Regime], states: np.ndarray, firings: int, transient: int, _effort: object

@@ -23,7 +23,7 @@ US = 1e-6
 
 @pytest.fixture(scope="module")
 def found(hammer: "ph.Hammer") -> QuenchMap:
-    """The two cases of Fig. 6 and what lies between them, the width of the first pulse among the widths."""
+    """Quench map around the two cases of Fig. 6; the width of the first pulse is among the widths."""
     width = hammer.waveform.width
     return ph.quench_map(
         hammer, gaps=(640e-6, 720e-6, 5), widths=(0.8 * width, 1.2 * width, 3), tolerance=TIGHT
@@ -223,7 +223,7 @@ def test_a_hammer_that_cannot_be_mapped_is_refused(hammer: "ph.Hammer") -> None:
 
 
 def test_a_driver_s_second_pulse_comes_after_its_own_gap() -> None:
-    """The latest firing of a driver replaces what was fired before; each cell is a run of its two pulses."""
+    """The latest firing of a driver replaces all earlier firings; each cell is a run of its two pulses."""
     hammer = ph.load("hendriks-1983").replace("coil", {"resistance": "28.6 ohm", "inductance": "6.5 mH"})
     rail = Rail(voltage=100.0, width=177e-6, decay="diode", decay_resistance=159.0)
     gaps, widths = (0.6e-3, 0.8e-3, 2), (120e-6, 180e-6, 2)

@@ -126,7 +126,7 @@ def test_no_fixed_point_near_the_start_is_told() -> None:
 
 
 def leaping(u: Any, p: float) -> MapValue:
-    """The fixed point 0, whose multiplier leaps from 0.5 to -300 where p is 0.4."""
+    """The fixed point 0, whose multiplier jumps from 0.5 to -300 at p = 0.4."""
     multiplier = 0.5 if p < 0.4 else -300.0
     return MapValue(multiplier * u, np.array([[multiplier]]), np.array([0.0]))
 

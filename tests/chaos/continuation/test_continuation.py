@@ -218,7 +218,7 @@ def test_grazings_are_named_as_the_constant_grows(
 
 @pytest.fixture(scope="module")
 def steep() -> Branch:
-    """A branch with doublings beside folds and grazings, within a ten-thousandth of its range."""
+    """A branch with doublings close to folds and grazings, within 1e-4 of its parameter range."""
     return ph.continuation(ph.load("hendriks-1983-1"), "period", ("1.1 ms", "1.33 ms"), period="1.25 ms")
 
 

@@ -1,4 +1,4 @@
-"""Parts of the curves of bifurcations by themselves: systems, normal forms, points, results."""
+"""Components of bifurcation curves, tested separately: systems, normal forms, points, results."""
 
 import dataclasses
 import math
@@ -39,7 +39,7 @@ def henon_curve(b: Bounds = (-0.3, 0.3), a: Bounds = (-1.0, 3.0), most: int = 50
 @pytest.mark.parametrize("kind", list(TESTS))
 @given(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5), st.floats(0.1, 2.0), st.floats(-0.9, 0.9))
 def test_the_system_of_a_map_and_its_derivative(kind: str, x: float, y: float, a: float, b: float) -> None:
-    """The residual of det(J - m I) or det(J) - 1, and the derivative of the whole by hand."""
+    """Residual of det(J - m I) or det(J) - 1, and its derivative, evaluated directly."""
     plane = known_maps.plane((-9.0, 9.0), (-9.0, 9.0))
     system = MultiplierSystem(plane, kind)
     with standing_in(HENON):
@@ -103,7 +103,7 @@ def test_a_rotation_is_resonant_after_half_turns(passages: int, angle: float, de
 
 
 def rigid_plane() -> Any:
-    """A plane over an oscillator with a rigid backstop."""
+    """Stability chart of an oscillator with a rigid backstop."""
     import printhammer as ph
 
     plane = known_maps.plane((-1.0, 1.0), (-1.0, 1.0))
@@ -131,7 +131,7 @@ def test_the_root_of_a_touch() -> None:
 
 @given(st.floats(0.1, 0.9), st.floats(-0.9, -0.1) | st.floats(0.1, 0.9), st.floats(0.1, 2.0), st.booleans())
 def test_sides_of_a_grazing_by_iteration(high: float, low: float, shear: float, up: bool) -> None:
-    """Orbits of the map u -> A (u + (0, root sqrt(depth))) + slope move, found by trial of both sides.
+    """Orbits of the map u -> A (u + (0, root sqrt(depth))) + slope move, found by trying both sides.
 
     A Nordmark map: with one touch in n periods, sqrt(depth) = 1 and the depth of second order.
     """

@@ -1,4 +1,4 @@
-"""How curves go on past a change of section, where they begin, and which events lie on one."""
+"""Bifurcation curves: continuation past a change of section, starting points, events on a curve."""
 
 import dataclasses
 from types import SimpleNamespace
@@ -31,7 +31,7 @@ def henon() -> Traced:
 
 @pytest.mark.parametrize(("beyond", "sign"), [(0.2, 1.0), (-0.25, -1.0)])
 def test_a_curve_goes_on_at_another_section(beyond: float, sign: float) -> None:
-    """At the first section there is no map beyond a value of the second constant, at another one there is."""
+    """Only the map at the first section is undefined beyond a value of the second constant."""
     image = known_maps.image_by(HENON)
 
     def image_of(at: Regime, state: Array, firings: int, tolerance: float, **options: Any) -> Image:

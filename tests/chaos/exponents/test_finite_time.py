@@ -1,4 +1,4 @@
-"""Finite-time exponents: what stretches of one train say, and what is refused."""
+"""Finite-time exponents: values over segments of one train, and rejected input."""
 
 import math
 

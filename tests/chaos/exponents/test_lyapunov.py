@@ -1,4 +1,4 @@
-"""Exponents of trains: what they agree with, what errors they have, what files hold them."""
+"""Lyapunov exponents of trains: agreement with other methods, standard errors, files."""
 
 import dataclasses
 import json
@@ -195,7 +195,7 @@ def test_bad_input(hammer: "ph.Hammer", call: Callable[["ph.Hammer"], object], k
 
 @pytest.mark.slow
 def test_both_tests_agree_on_the_panels_of_figure_11(hammer: "ph.Hammer") -> None:
-    """Whichever hammer ships; weak chaos and long cycles may need more firings before both decide."""
+    """Holds for any shipped hammer; weak chaos and long cycles may need more firings before both decide."""
     left, firings = list(printed_verdicts()), 1000
     assert len(left) == 12
     while left and firings <= 16000:

@@ -1,4 +1,4 @@
-"""Statistics of impact trains that are known."""
+"""Statistics of impact trains with known properties."""
 
 import math
 

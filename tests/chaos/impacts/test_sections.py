@@ -1,4 +1,4 @@
-"""Sections: touches are those of the motion, in bounded memory, for any number of threads."""
+"""Sections: touches equal those of the motion, in bounded memory, for any number of threads."""
 
 from collections.abc import Callable
 

@@ -27,7 +27,7 @@ def found() -> Orbits:
 
 @pytest.fixture(scope="module")
 def fast() -> Orbits:
-    """A strange train, whose pulses overlap and whose firings fall into the pack."""
+    """A strange train with overlapping pulses and firings during pack contacts."""
     return ph.orbits(ph.load(CRUDE), period=0.6e-3, **SMALL)
 
 
@@ -118,7 +118,7 @@ def test_states_at_the_firings_are_those_of_a_train(fast: Orbits) -> None:
 
 
 def test_the_search_does_not_depend_on_threads(hammer: ph.Hammer) -> None:
-    """The orbits on the branches that the search follows do not depend on threads either."""
+    """The orbits on the branches that the search follows do not depend on the number of threads."""
     seen: list[tuple[int, int]] = []
     options = {"period": 0.6e-3, "longest": 1, "starts": 100, "guesses": 8}
     found = ph.orbits(hammer, **options)

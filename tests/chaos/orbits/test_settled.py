@@ -1,4 +1,4 @@
-"""What states alone show of a period, and what Newton's method adds, on maps whose orbits are known."""
+"""Periods determined from states alone and with Newton's method, on maps whose orbits are known."""
 
 import numpy as np
 import pytest

@@ -126,7 +126,7 @@ def test_no_image_has_a_status(hammer: ph.Hammer) -> None:
 def test_the_derivative_holds_where_the_pack_is_touched_gently(
     hammer: ph.Hammer, way: float, beyond: float
 ) -> None:
-    """At a start velocity `beyond`, m/s, that at which the armature turns at the front."""
+    """The start velocity exceeds by `beyond`, m/s, the velocity at which the armature turns at the front."""
     regime = Regime.of(hammer, rate=600.0)
     x = hammer.position + way * (hammer.front - hammer.position)
 

@@ -26,7 +26,7 @@ def branches(states: np.ndarray) -> np.ndarray:
 
 
 def cycle(period: int, count: int, noise: float) -> np.ndarray:
-    """States that repeat after `period`, none of which is near another, with noise."""
+    """Noisy states that repeat after `period` firings; no two states of a period are close to each other."""
     angle = 2.0 * np.pi * np.arange(count) / period
     states = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(count)])
     return states + RANDOM.uniform(-0.5, 0.5, states.shape) * noise

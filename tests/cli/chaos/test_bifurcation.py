@@ -74,7 +74,7 @@ def test_a_transient_leaves_points_to_judge(cli: Callable) -> None:
 
 
 def test_defaults_are_those_of_the_library() -> None:
-    """With fewer firings more trains would be undecided in Python than on the command line."""
+    """With fewer firings, Python would classify more trains as undecided than the command line does."""
     verb = import_module("printhammer.cli.verbs.bifurcation").bifurcation
     assert int(signature(verb.call).parameters["firings"].default) == FIRINGS
     assert signature(ph.bifurcation).parameters["firings"].default == FIRINGS

@@ -1,4 +1,4 @@
-"""The verb `curve`, on the ball whose fold and doubling are known in closed form at any restitution."""
+"""The verb `curve`, on a bouncing ball whose fold and doubling are known in closed form."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The verbs of chaos under a force without end, from a drive file: a ball on a table that vibrates."""
+"""The chaos verbs with a continuous force from a drive file: a ball on a vibrating table."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -78,7 +78,7 @@ def test_defaults_are_those_of_the_library() -> None:
 
 
 def test_energies_in_the_table_are_those_that_there_are() -> None:
-    """The work of what drives the hammer, and the loss of a damping that it has."""
+    """Work of the drive on the hammer, and loss in its damping."""
 
     def names(name: str, **firing: Any) -> set[str]:
         return set(energies_of(Regime.of(ph.load(name), **firing)))

@@ -1,4 +1,4 @@
-"""The verb `fit coil`: records of the current as `measure current` writes them, and what comes of them."""
+"""The verb `fit coil`, on current records written by `measure current`."""
 
 from collections.abc import Callable
 from pathlib import Path

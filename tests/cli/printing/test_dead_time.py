@@ -40,7 +40,7 @@ def test_what_cannot_be_used(refused: Callable, words: tuple[str, ...], said: st
 
 
 def test_a_blow_weaker_than_the_shortest_pulse_gives(cli: Callable) -> None:
-    """The strong phase of this driver lasts longer than the flight."""
+    """The high-current phase of this driver lasts longer than the flight."""
     options = ["--blow", "4 m/s", "--voltage", "45 V, 50 V, 2", "--temperature", "20 degC, 60 degC, 2"]
     done = cli("dead-time", "pinball-flipper", *options)
     assert "At 4 of 4 pairs of rail and temperature the shortest pulse" in " ".join(done.out.split())

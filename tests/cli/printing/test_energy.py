@@ -34,7 +34,7 @@ def test_a_burst_and_its_files(cli: Callable, tmp_path: Path, unsearched: None) 
 def test_the_sensitivity_stands_beside_the_result_and_the_interpolation_in_the_file(
     cli: Callable, tmp_path: Path, unsearched: None
 ) -> None:
-    """The weakest dot has hardly more than the force that is asked for: 0.1 % less current is too little."""
+    """The weakest dot barely reaches the required force: a current that is 0.1 % smaller is insufficient."""
     asked: dict[str, Any] = {"rate": "400 Hz", "dots": 2, "largest": "1.2 A"}
     hammer, current = ph.load(CRUDE), tmp_path / "current.csv"
     burst = ph.least_work(hammer, force=0.3, **asked)

@@ -1,4 +1,4 @@
-"""The verb learn: a table for one unit, which other verbs refuse for another one."""
+"""The verb `learn`: a table for one unit, which other verbs reject for any other unit."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -10,7 +10,7 @@ from printhammer.control.learning.law import RUNS
 
 
 def test_a_unit_learns_its_table(cli: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """After two stages; two units in control/learning/test_units.py have all."""
+    """Two stages only; control/learning/test_units.py runs all stages for two units."""
     monkeypatch.setattr("printhammer.control.learning.learn.RUNS", RUNS[:2])
     unit, table, picture = tmp_path / "unit.toml", tmp_path / "learned.csv", tmp_path / "lines.png"
     ph.load("hendriks-1983-1").replace("magnet.Am", 0.282).save(unit)
@@ -31,7 +31,7 @@ def test_a_unit_learns_its_table(cli: Callable, tmp_path: Path, monkeypatch: pyt
 
 
 def test_the_offset_of_a_sensor_is_stated(cli: Callable, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A sensor that is late by a time, and a production of sensors that are late by different times."""
+    """A sensor with a constant delay, and a production whose sensors have different delays."""
     seen: list[ph.ImpactSensor] = []
 
     def stopped(_hammer: ph.Hammer, _unit: object, *, sensor: ph.ImpactSensor, **_more: object) -> None:

@@ -1,4 +1,4 @@
-"""The verb tune: tables, the report, and what is refused."""
+"""The verb `tune`: tables, the report, and rejected input."""
 
 import re
 import shlex

@@ -1,4 +1,4 @@
-"""The verb `map`: what it tells, what it writes, and what it refuses."""
+"""The verb `map`: messages, files and rejected input."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING

@@ -14,7 +14,7 @@ from printhammer.report.reconstruction.results import Results
 
 @pytest.fixture
 def quick_report(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have the verb write a report with few claims and one empty figure; the whole of it takes a while."""
+    """Make the verb write a report with few claims and one empty figure; the full report is slow."""
     whole = report.write_report
 
     def few(hammer, out, **options):

@@ -28,7 +28,7 @@ def dot_rows(text: str) -> list[list[float]]:
 def test_a_rate_alone_is_one_drive_wherever_it_is_said(
     cli, hammer: "ph.Hammer", tmp_path: Path, name: str, text: str
 ) -> None:
-    """In Python, in a drive file and on the command line: nine firings."""
+    """The default is nine firings in Python, in a drive file and on the command line."""
     assert hammer.waveform is not None
     drive = ph.PulseTrain(hammer.waveform, **{name: text})
     assert drive == ph.PulseTrain(hammer.waveform, **{name: text}, pulses=9)

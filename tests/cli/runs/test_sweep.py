@@ -39,7 +39,7 @@ def test_a_sweep_tells_how_its_members_ended(cli, spec: Path, tmp_path: Path) ->
 
 
 def test_members_that_are_not_at_rest_are_counted(cli, spec: Path, tmp_path: Path) -> None:
-    """An armature without a spring stays at its pole after a pulse, and a spring returns another one."""
+    """After a pulse, an armature without a spring stays at its pole; a spring returns the other armature."""
     for name, said in (("pot-magnet", "1 of them is not at rest"), ("relay-5v", "")):
         text = SPEC.replace("hendriks-1983", name).replace('"1 kHz"', '"5 Hz"')
         spec.write_text(re.sub("axis = .*", 'axis = [{ key = "mass", values = ["10 g"] }]', text), "utf-8")

@@ -1,4 +1,4 @@
-"""Thermal duty against closed forms, and the rates of a printer family against one limit of its coils."""
+"""Thermal duty against closed forms, and the rates of a printer family against one coil limit."""
 
 import math
 

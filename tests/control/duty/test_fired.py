@@ -46,7 +46,7 @@ def test_a_driver_is_not_on_longer_than_there_is_time() -> None:
 
 
 def test_dots_whose_currents_overlap_are_named() -> None:
-    """A pulse heats the coil more if the current of the pulse before is still there."""
+    """A pulse heats the coil more if the current of the preceding pulse has not decayed."""
     relay = ph.load("relay-5v")
     heat = heat_of(relay)
     assert relay.waveform.width < heat.lasts

@@ -1,4 +1,4 @@
-"""Comparisons made by hand. Helpers only."""
+"""Comparisons with invented numbers. Helpers only."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from printhammer.printing.dots.nominal import nominal
 
 
 def by_hand(hammer: ph.Hammer) -> Feedback:
-    """A comparison with numbers that nothing has computed, and a run without feedback."""
+    """A comparison with invented numbers, and a run without feedback."""
     assert hammer.waveform is not None
     motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform))
     times = np.linspace(0.0, 1e-4, 5)

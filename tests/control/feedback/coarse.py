@@ -1,6 +1,6 @@
 """A controller with coarse tables, which are computed in half a second. Helpers only.
 
-What it prints is poor; its tables must be what runs do all the same, and it must keep its bounds.
+The controller prints poorly, but its tables must agree with runs, and it must respect its limits.
 """
 
 import functools
@@ -42,7 +42,7 @@ def grids() -> Iterator[None]:
 
 @functools.cache
 def plant() -> Plant:
-    """A hammer whose magnet the driver all but bucks."""
+    """A hammer with a driver that nearly cancels the field of its magnet."""
     hammer = ph.load(HAMMER)
     return Plant(hammer, driver_of(hammer), nominal(hammer), 1)
 

@@ -1,4 +1,4 @@
-"""The closed loop with a coarse controller: what it keeps whatever its tables, its hammer and its noise."""
+"""The closed loop with a coarse controller: properties that hold for any tables, hammer and noise."""
 
 import itertools
 
@@ -27,7 +27,7 @@ def loops(
     by: Perturbation | None = None,
     rate: float = RATE,
 ) -> tuple[ph.Hammer, list[Loop]]:
-    """The hammer that is driven, and the runs of the closed loop on it."""
+    """The driven hammer, and the runs of the closed loop with it."""
     hammer = coarse.plant().hammer
     driven = hammer if by is None else perturbed(hammer, by)
     return driven, FeedbackStrategy(coarse.controller(), sensor, threads=1).loops(driven, patterns, rate)
@@ -46,7 +46,7 @@ def loops(
 def test_the_driver_keeps_its_limits(
     slots: tuple[int, ...], rate: float, current: float, travel: float, noise: float, seed: int
 ) -> None:
-    """Also on a hammer far from the nominal one, seen badly and too fast."""
+    """Also for a hammer far from nominal, with a noisy sensor and large currents."""
     by = Perturbation(current=current, travel=travel)
     driver = coarse.controller().driver
     _, (loop,) = loops([slots], PositionSensor(noise=noise, seed=seed), by, rate)
@@ -92,7 +92,7 @@ def test_a_perfect_sensor_tells_first_touches() -> None:
     ("current", "travel"), [(0.0, 8e-6), (0.0, -8e-6), (-0.03, 0.0), (0.03, 0.0), (-0.02, 8e-6)]
 )
 def test_front_and_supply_are_learned(current: float, travel: float) -> None:
-    """Whatever is printed: learning does not need good dots, only touches."""
+    """Independent of the printed dots: learning needs touches, not good dots."""
     patterns = list(itertools.combinations(range(7), 4))[:12]
     _, runs = loops(patterns, PositionSensor(), Perturbation(current=current, travel=travel))
     for loop in runs:
@@ -106,7 +106,7 @@ def test_front_and_supply_are_learned(current: float, travel: float) -> None:
 
 
 def test_of_the_nominal_hammer_nothing_else_is_learned() -> None:
-    """Errors in the standard deviations that are said have a mean square of at most 1."""
+    """Errors in units of the reported standard deviations have a mean square of at most 1."""
     _, runs = loops(list(itertools.combinations(range(7), 4))[:24], PositionSensor())
     learned = [loop.learned for loop in runs]
     for off in (

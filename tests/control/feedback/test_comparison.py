@@ -1,4 +1,4 @@
-"""Feedback on a hammer: the drives of the closed loop, the comparison, pictures, and what is refused."""
+"""Feedback on a hammer: drives of the closed loop, comparison, pictures, rejected input."""
 
 import shlex
 from pathlib import Path
@@ -116,7 +116,7 @@ def test_a_hammer_far_from_the_nominal_one_spoils_dots_but_not_the_loop(controll
 def test_what_the_sensor_showed_is_what_the_whole_drive_does(
     controller: Controller, by: Perturbation
 ) -> None:
-    """No decision changes what has been by then, also where it comes late."""
+    """No decision changes the past of the drive, even if the decision is late."""
     driven = perturbed(controller.hammer, by) if by.name != "nominal" else controller.hammer
     patterns = [slots_of(pattern) for pattern in eight_slot_patterns()[128:255:9]]
     for loop in FeedbackStrategy(controller, PERFECT).loops(driven, patterns, RATE):
@@ -227,7 +227,7 @@ def test_the_example_in_the_help_runs(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Of the shipped hammer, whose controller takes most of the time; `test_the_comparison` makes another."""
+    """For the shipped hammer, whose controller takes most of the time; `test_the_comparison` uses another."""
     made: list[tuple[object, ...]] = []
 
     def controller(*arguments: object, **_options: object) -> Controller:
@@ -280,7 +280,7 @@ def test_bad_gaps_are_refused(gaps: list[float]) -> None:
 
 @pytest.mark.slow
 def test_dots_that_follow_a_landing_are_within_limits(shipped: Controller) -> None:
-    """The backstop of the shipped hammer is soft: pressed against it, the armature is thrown when let go."""
+    """The backstop of the shipped hammer is soft: an armature pressed against it is thrown when released."""
     hammer, single, way = shipped.hammer, shipped.single, FeedbackStrategy(shipped)
     for gap in (0.88e-3, 1.05e-3, 1.3e-3):
         dots = ph.simulate(hammer, way(hammer, [(0, 1, 2, 3)], 1.0 / gap)[0]).dots

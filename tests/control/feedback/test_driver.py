@@ -23,7 +23,7 @@ def test_the_driver_is_as_fast_as_the_hammers_own_decay() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 def test_a_stated_bound_is_that_of_its_own_drive_in_any_company(order: tuple[int, int]) -> None:
-    """The bound sets the scale of the errors; a drive of the same pulses without one has another."""
+    """The bound sets the scale of the errors; the same pulses without the bound have another scale."""
     pulse = Switched(at=(0.0, 2e-4), levels=(1.0, 0.0), edge=3e-5)
     drives = [ph.PulseSequence([pulse], at=[0.0]), BoundedSequence([pulse], [0.0], 40.0)]
 

@@ -1,4 +1,4 @@
-"""The impact map against single runs, and interpolation in it against functions that it reproduces."""
+"""The impact map against single runs, and its interpolation against functions that it reproduces exactly."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ COUNT = 12
 
 
 def coil(kind: int, release: float, back: float, fire: float) -> Switched:
-    """Current of the coil from just before a touch up to the next push, written out."""
+    """Coil current from just before a touch to the next push, evaluated directly."""
     largest, edge = coarse.plant().driver.current, coarse.plant().driver.edge
     before = largest if kind == PUSHED else 0.0
     if release == 0.0:
@@ -96,7 +96,7 @@ def test_ways_lead_where_single_runs_do() -> None:
 
 
 def test_the_coil_has_settled_at_the_next_touch() -> None:
-    """Two and a half time constants after it was switched, so that a touch is either pushed or free."""
+    """Two and a half time constants after the switching, so that a touch is either pushed or free."""
     _, _, table = coarse.tables()
     pushed = table.width == ALWAYS
     since = table.next_touch - table.fire - np.where(pushed, 0.0, table.width)

@@ -1,4 +1,4 @@
-"""What one run of the closed loop keeps, and the currents that follow from it."""
+"""Data of one run of the closed loop, and the resulting currents."""
 
 import numpy as np
 import pytest
@@ -48,7 +48,7 @@ def test_switchings_ascend_whatever_is_asked_for(switchings: list[tuple[float, f
 def test_the_current_that_is_reckoned_with_is_that_of_the_drive(
     pulses: list[list[tuple[float, float]]],
 ) -> None:
-    """Of each pulse the current goes to its levels exponentially; those of several pulses add up."""
+    """The current of each pulse approaches its levels exponentially; currents of several pulses add up."""
     made, fired = [], 1e-3
     for switchings in pulses:
         # A pulse ends without a current before the next one.

@@ -1,4 +1,4 @@
-"""What makes a way to go on unsafe: a next touch that depends much on the speed of this one."""
+"""Unsafe actions of the policy: the next touch depends strongly on the speed of the present touch."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -15,7 +15,7 @@ ROUNDING = 1e-20
 
 
 def doubts(*touches: Any) -> np.ndarray:
-    """The cost of some ways, by their next touches, s, at all speeds; shape (speeds, ways)."""
+    """Costs of actions, by their next touches, s, at all speeds; shape (speeds, actions)."""
     policy = Policy.__new__(Policy)
     made: Any = policy
     made.table = SimpleNamespace(speed=SPEEDS, next_touch=np.column_stack(touches))

@@ -1,4 +1,4 @@
-"""The plan of the policy against brute force: every way to go on, for every dot up to the next rest."""
+"""The plan of the policy against brute force: all actions for every dot up to the next rest."""
 
 import itertools
 from types import SimpleNamespace
@@ -29,7 +29,7 @@ LATE = np.linspace(-0.9, 0.9, 13) * LIMITS.arrival
 
 
 def table_of(seed: int, shift: float = 0.0, holes: float = 0.0) -> ImpactMap:
-    """Ways that lead from a speed of the table to another, later by whole steps of the lateness."""
+    """Actions from one speed of the table to another, later by whole steps of the lateness grid."""
     rng = np.random.default_rng(seed)
     back, _, throw = (axis.ravel() for axis in np.meshgrid(BACKS, FORCES, (0.0, 1.0), indexing="ij"))
     kind = rng.integers(0, 2, COUNT)
@@ -72,13 +72,13 @@ def policy_of(seed: int, holes: float = 0.0) -> Policy:
 
 
 def dot(force: float, late: float) -> float:
-    """Cost of a dot, as the head of the module has it: squares, which rise steeply near the limits."""
+    """Cost of a dot, as the module defines it: squares, which rise steeply near the limits."""
     a, b = (force - 1.0) / LIMITS.force, late / LIMITS.arrival
     return a * a + b * b + 8.0 * (a**6 + b**6)
 
 
 def rest(policy: Policy, row: int, late: float) -> float:
-    """Cost of a landing: its dot, and the speed that is left in parts of 0.3 m/s."""
+    """Cost of a landing: its dot, and the residual speed in units of 0.3 m/s."""
     left, force = (float(getattr(policy.landing, name)[row]) for name in ("left", "force"))
     if np.isnan(left):
         left, force = 0.3, 0.0
@@ -86,7 +86,7 @@ def rest(policy: Policy, row: int, late: float) -> float:
 
 
 def brute(policy: Policy, row: int, late: float, ways: tuple[int, ...]) -> float:
-    """Cost of a sequence of ways to go on, and of the landing after it."""
+    """Cost of a sequence of actions and of the landing after it."""
     total, weight = 0.0, 1.0
     table = policy.table
     for way in ways:
@@ -175,7 +175,7 @@ def test_a_throw_that_is_decided_anew_keeps_what_was_done() -> None:
 
 
 def test_a_throw_that_is_decided_anew_leads_somewhere_or_is_none() -> None:
-    """Also where every way is far too late, so that a way that leads nowhere costs as much."""
+    """Also if every action is far too late, so that an infeasible action costs as much."""
     policy = policy_of(7)
     committed = Committed(np.full(6, -2.0), np.linspace(0.9, 1.1, 6), np.full(6, 3.5e-4))
     for wait in (0.2 * PERIOD, 5.0 * PERIOD):

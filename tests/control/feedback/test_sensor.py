@@ -1,4 +1,4 @@
-"""The position sensor: noise that depends on seed, run and sample only, quantisation, delay."""
+"""The position sensor: noise that depends only on seed, run and sample; quantisation; delay."""
 
 import dataclasses
 

@@ -15,7 +15,7 @@ from printhammer.printing.dots.nominal import nominal
 
 @pytest.fixture(scope="module")
 def landing() -> Landing:
-    """With brake pulses as fine as usual, for few touches."""
+    """With the usual resolution of brake pulses, for few touches."""
     return soft_landing(coarse.plant(), coarse.tables()[0])
 
 
@@ -25,7 +25,7 @@ def touch_down(motion: ph.Motion) -> float:
 
 
 def motion_of(row: int, release: float, brake: float, width: float) -> ph.Motion:
-    """Touch, push, release, brake and let go, as a single run from just before a touch."""
+    """Touch, push, release, brake and final release, as a single run from just before a touch."""
     forces, _, _ = coarse.tables()
     plant = coarse.plant()
     largest = plant.driver.current
@@ -45,7 +45,7 @@ def motion_of(row: int, release: float, brake: float, width: float) -> ph.Motion
 
 
 def remains(motion: ph.Motion) -> float:
-    """Largest speed late in a run, or distance from rest by a third of a flight time, m/s."""
+    """Largest speed late in a run, or distance from rest divided by a third of a flight time, m/s."""
     scale = coarse.plant().single.flight_time
     x, v = motion.at(AHEAD + np.linspace(2.2, 3.4, 16) * scale)[:2]
     rest = rest_state(coarse.plant().hammer)

@@ -1,4 +1,4 @@
-"""Laws that several tests learn by."""
+"""Learning laws that several tests use."""
 
 import pytest
 
@@ -12,11 +12,11 @@ RATE = 1275.0
 
 @pytest.fixture(scope="session")
 def law() -> LearningLaw:
-    """Return a law for times and forces."""
+    """Return a learning law for times and forces."""
     return law_for(ph.load("hendriks-1983-1"), RATE, sensor=ImpactSensor(force=0.03), members=150)[0]
 
 
 @pytest.fixture(scope="session")
 def by_time() -> LearningLaw:
-    """Return a law for times alone."""
+    """Return a learning law for times alone."""
     return law_for(ph.load("hendriks-1983-1"), RATE, members=150)[0]

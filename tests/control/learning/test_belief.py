@@ -1,4 +1,4 @@
-"""What is believed from readings, against functions of which the answer is known."""
+"""Estimates from readings, against functions with a known answer."""
 
 from collections.abc import Callable
 
@@ -23,13 +23,13 @@ def linear(rows: np.ndarray) -> np.ndarray:
 
 
 def bent(rows: np.ndarray) -> np.ndarray:
-    """Readings that turn round and round: from far away a search gets caught."""
+    """Oscillating readings: a search that starts far away is trapped in a local minimum."""
     flat = rows @ SLOPES.T
     return np.asarray(flat + 0.8 * np.sin(4.0 * flat) * (np.arange(12) >= 6))
 
 
 def believed(readings: Readings, evidence: Evidence, *places: list[np.ndarray]) -> Belief:
-    """Return what is believed where readings are a function of constants."""
+    """Return the estimate for readings that are a function of constants."""
     return answered(believe(evidence, *places), lambda asked: [readings(rows) for rows in asked])
 
 
@@ -45,14 +45,14 @@ def test_constants_are_found_where_readings_are_exact(truth: list[float]) -> Non
 
 
 def test_little_is_known_from_readings_that_are_mostly_noise() -> None:
-    """The prior is what is left: standard deviations of 1."""
+    """Only the prior remains: standard deviations of 1."""
     belief = believed(linear, evidence(np.zeros(12), 1e3), [np.zeros(SIZE)]).modes[0]
     assert belief.mean == pytest.approx(np.zeros(SIZE), abs=1e-3)
     assert belief.covariance == pytest.approx(np.eye(SIZE), abs=1e-3)
 
 
 def test_the_covariance_is_that_of_linear_regression() -> None:
-    """Where errors are small, Student's t with 4 degrees is a normal one of 4/5 the variance."""
+    """For small errors, Student's t with 4 degrees of freedom is normal with 4/5 of the variance."""
     noise = 0.1
     belief = believed(linear, evidence(np.zeros(12), noise), [np.zeros(SIZE)]).modes[0]
     expected = np.linalg.inv(np.eye(SIZE) + SLOPES.T @ SLOPES * 1.25 / noise**2)
@@ -68,7 +68,7 @@ def test_one_reading_that_is_wrong_counts_for_little() -> None:
 
 
 def test_what_is_left_of_readings_is_their_misfit() -> None:
-    """About 1 where the law holds and the noise is as stated; outliers count five times their deviation."""
+    """The misfit is about 1 if law and noise are correct; outliers count as five standard deviations."""
     truth = np.array([0.5, -1.0, 0.2, 0.8])
     noise = 0.01 * np.random.default_rng(2).standard_normal(12)
     holds = believed(linear, evidence(linear(truth[None])[0] + noise, 0.01), [np.zeros(SIZE)]).modes[0]
@@ -96,7 +96,7 @@ def test_a_dot_that_nobody_saw_counts_for_nothing() -> None:
 
 
 def test_two_ways_to_explain_readings_are_both_believed_in() -> None:
-    """The square of a constant tells its size and not its sign."""
+    """The square of a constant determines its magnitude, but not its sign."""
 
     def squared(rows: np.ndarray) -> np.ndarray:
         return np.asarray(rows**2)

@@ -1,4 +1,4 @@
-"""Learning: it converges, keeps to its bounds, sees its sensor only, and gains on units it does not know."""
+"""Learning: convergence, limits, dependence on the sensor alone, and gains on unknown units."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -39,7 +39,7 @@ def nominal() -> ph.Hammer:
 
 
 def readings(law: LearningLaw, late: float = 0.0) -> tuple[Readings, Readings]:
-    """Return what a sensor shows of a hammer that is nominal, but all impacts are late by a time, s."""
+    """Return readings of a nominal hammer whose impacts are all late by a time, s."""
     press, single = law.production.press([law.production.nominal]), law.entries.task.single.nominal
     (time,), (force,) = press.ladder(law.rungs)
     line = press.line([law.entries.open_loop])[0]
@@ -64,14 +64,14 @@ def test_the_rate_is_optional(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def believed(law: LearningLaw, spread: float) -> Belief:
-    """Return a belief in the nominal hammer, all constants of which are known to some standard deviation."""
+    """Return a posterior for the nominal hammer; all constants have the same standard deviation."""
     size = law.production.size
     mode = Mode(np.zeros(size), spread**2 * np.eye(size), np.zeros(law.seen.shape[1]), 0.0, 1.0)
     return Belief.of([mode])
 
 
 def show(learner: Learner, ladder: Readings, line: Readings) -> None:
-    """Show a learner the same in all runs of a stage, and have it learn."""
+    """Show a learner the same readings in all runs of a stage, and update it."""
     for _ in range(RUNS[learner.stage]):
         learner.see(ladder, line)
     printed(learner.learn(), learner.law.entries.task)
@@ -85,7 +85,7 @@ def test_it_begins_in_an_open_loop(law: LearningLaw) -> None:
 
 
 def test_the_open_loop_of_the_own_pulse_is_handed_out_as_a_table(law: LearningLaw) -> None:
-    """It fires what the open loop of the hammer fires, when that does."""
+    """The learner fires the open loop of the hammer if that is better."""
     hammer, slots = nominal(), (0, 1, 3)
     base = ph.tune(hammer, rate=RATE, history=2, reach=2, driver="switch")
     learner, own = Learner(law), law.entries.own
@@ -101,7 +101,7 @@ def test_the_open_loop_of_the_own_pulse_is_handed_out_as_a_table(law: LearningLa
 def test_the_open_loop_is_left_for_a_gain_without_harm_only(
     law: LearningLaw, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A belief that knows the unit leaves it; one that knows next to nothing does not, but for doubt."""
+    """A learner that knows the unit leaves the open loop; an uncertain learner does so only with doubt."""
     off = np.zeros(law.entries.inputs.shape[1])
     unexplained = np.zeros((2, len(LINE)))
 
@@ -120,7 +120,7 @@ def test_the_open_loop_is_left_for_a_gain_without_harm_only(
 
 
 def test_the_usual_open_loop_is_left_if_the_posterior_is_sure_only() -> None:
-    """Shares of good dots on ten hammers: the usual loop prints 0.7 of them, the other the values below."""
+    """Fractions of good dots on ten hammers: 0.7 in the usual loop, the values below in the other loop."""
     usual = np.full(10, 0.7)
     for other, expected in (
         (np.full(10, 0.8), (0, 1.0)),  # Better on all
@@ -135,7 +135,7 @@ def test_the_usual_open_loop_is_left_if_the_posterior_is_sure_only() -> None:
 
 @pytest.mark.parametrize("usual", [0, 1])
 def test_a_posterior_that_knows_the_unit_chooses_its_better_open_loop(law: LearningLaw, usual: int) -> None:
-    """The nominal hammer prints more dots in one of the open loops, whichever is usual."""
+    """The nominal hammer prints more dots in one of the open loops, whichever is the default."""
     (unit,) = law.production.hammers(np.zeros((1, law.production.size)))
     assert unit is not None
     loops, task = law.entries.loops, law.entries.task
@@ -154,13 +154,13 @@ def test_a_posterior_that_knows_the_unit_chooses_its_better_open_loop(law: Learn
     ("level", "misfit", "explained"), [(0.0, 1.05, True), (0.1, 1.05, False), (0.0, 1.3, False)]
 )
 def test_a_search_that_ended_on_the_way_decides_nothing(level: float, misfit: float, explained: bool) -> None:
-    """The misfit of 145 readings is 1 with a standard error of 6 %."""
+    """The misfit of 145 readings is 1, with a standard error of 6 %."""
     mode = Mode(np.zeros(3), np.eye(3), np.zeros(145), level, 1.0, misfit)
     assert is_explained(Belief.of([mode])) is explained
 
 
 def test_the_line_that_compares_open_loops_has_their_histories_and_rows() -> None:
-    """Three rows, with a dot in each slot, each second and each third, each from rest."""
+    """Three rows, with a dot in every slot, every second slot and every third slot, each from rest."""
     assert COMPARED[: len(LINE)] == LINE
     steps = np.diff(COMPARED[len(LINE) :])
     assert len(COMPARED) == 60
@@ -168,7 +168,7 @@ def test_the_line_that_compares_open_loops_has_their_histories_and_rows() -> Non
 
 
 def test_a_start_from_the_hammer_believed_in_prints_all_its_dots(law: LearningLaw) -> None:
-    """Single dots are as hard as the nominal ones and arrive when those do, though the hammer is another."""
+    """Single dots have nominal force and arrival time although the hammer differs from nominal."""
     row = np.array([0.0, 0.0, 0.0, 0.0, 1.0, -1.0, -1.0, 1.0])
     unit = replace(believed(law, 0.1).modes[0], mean=np.pad(row, (0, law.production.size - row.size)))
     started = law.started_anew(Belief.of([unit]))
@@ -214,7 +214,7 @@ def test_no_reading_leads_beyond_the_bounds(law: LearningLaw, late: float) -> No
 
 @pytest.fixture(scope="module")
 def whole(law: LearningLaw) -> Learner:
-    """Return a learner that was shown the nominal hammer for a stage."""
+    """Return a learner that was shown readings of the nominal hammer for one stage."""
     learner = Learner(law)
     show(learner, *readings(law))
     return learner
@@ -230,7 +230,7 @@ def test_a_missed_impact_changes_little(law: LearningLaw, whole: Learner) -> Non
 
 
 def test_of_three_readings_an_outlier_is_left_out_of_the_mean() -> None:
-    """Times of two dots, the second of which no run shows; of two readings either may be the outlier."""
+    """Times of two dots, the second without readings; either of two unlike readings may be wrong."""
     early, late, missed = 1e-6, 61e-6, float("nan")
     noise = np.full(2, 5e-6)
     three = mean([np.array([time, missed]) for time in (early, late, early)], noise)
@@ -251,7 +251,7 @@ def test_an_impact_that_was_none_changes_little(law: LearningLaw, whole: Learner
 
 
 def test_the_stiffness_of_the_paper_shows_in_second_impacts_only(by_time: LearningLaw) -> None:
-    """Why a ladder has pairs: what single pulses do not show, and it changes the force."""
+    """Pairs in a ladder determine a constant that single pulses do not, and that changes the force."""
     hammer = driven_by(nominal(), "switch", 2.0)
     stiff = hammer.replace("pack.stiffness", 1.1 * hammer.constants["pack.stiffness"].si)
     press = Press(by_time.entries.task, RATE, [hammer, stiff])
@@ -285,7 +285,7 @@ def test_no_rung_is_fired_while_the_armature_is_in_the_pack(by_time: LearningLaw
 
 @pytest.mark.slow
 def test_the_table_is_for_its_unit_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """After two stages; two units in `test_units.py` have all."""
+    """Two stages only; `test_units.py` runs all stages for two units."""
     monkeypatch.setattr("printhammer.control.learning.learn.RUNS", RUNS[:2])
     result = ph.learn(nominal(), rate=RATE, sensor=SENSOR, members=150, serial="A17")
     assert result.table.serial == "A17"

@@ -1,4 +1,4 @@
-"""The impact sensor: what is stated of its noise holds, and what is missed is not a number."""
+"""The impact sensor: its noise is as stated, and missed impacts are NaN."""
 
 from typing import cast
 

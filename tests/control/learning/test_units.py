@@ -1,4 +1,4 @@
-"""Units that learn: what they gain, by times of impact alone and with forces."""
+"""Learning of units: gains with impact times alone and with forces."""
 
 from typing import NamedTuple
 
@@ -29,7 +29,7 @@ def nominal() -> ph.Hammer:
 
 
 def apart(learner: Learner, row: np.ndarray) -> np.ndarray:
-    """Return how far constants are off from what is believed of them, in its standard deviations."""
+    """Return the errors of estimated constants, in their reported standard deviations."""
     assert learner.belief is not None
     mean, deviation = learner.belief.moments()
     return np.asarray(((mean - np.pad(row, (0, mean.size - row.size))) / deviation)[: row.size])
@@ -37,13 +37,13 @@ def apart(learner: Learner, row: np.ndarray) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def at_safe_rate() -> LearningLaw:
-    """Return a law for times alone near the safe rate."""
+    """Return a learning law for times alone, near the safe rate."""
     return law_for(nominal(), 850.0, members=100)[0]
 
 
 @pytest.fixture(scope="module")
 def learned(law: LearningLaw) -> tuple[list[Learner], list[Progress]]:
-    """Return what two units learn from times and forces."""
+    """Return the results of two units that learn from times and forces."""
     return calibrate(law, Variability().draw(nominal(), 2, 5), SENSOR)
 
 
@@ -58,7 +58,7 @@ def test_updates_do_not_lead_apart(learned: tuple[list[Learner], list[Progress]]
 def test_learning_depends_on_readings_and_on_nothing_else_of_the_unit(
     law: LearningLaw, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Two units that are not alike, behind a sensor that shows the same of both, after one stage."""
+    """Two different units with equal sensor readings, after one stage."""
     monkeypatch.setattr("printhammer.control.learning.learn.RUNS", RUNS[:1])
     press, single = law.production.press([law.production.nominal]), law.entries.task.single.nominal
     (time,), (force,) = press.ladder(law.rungs)
@@ -97,7 +97,7 @@ def test_expectations_come_from_readings(learned: tuple[list[Learner], list[Prog
 
 
 def worse(law: LearningLaw, unit: ph.Hammer, stages: list[Progress], number: int = 0) -> np.ndarray:
-    """Return how many fewer dots a unit prints than in the better open loop, as fractions, (stages - 1,)."""
+    """Return the loss of dots relative to the better open loop, as fractions, (stages - 1,)."""
     press = law.production.press([with_pulse(unit, law.entries.task.pulse)])
     loops = [press.line([loop.settings], PRINTED, [loop.pulse])[1] for loop in law.entries.loops]
     better = max(loop.good[0, JUDGED].mean() for loop in loops)
@@ -108,7 +108,7 @@ def worse(law: LearningLaw, unit: ph.Hammer, stages: list[Progress], number: int
 def test_a_hidden_offset_of_the_sensor_costs_nothing(
     by_time: LearningLaw, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The offset is an unknown: it is estimated, and no stage prints fewer dots than the better open loop."""
+    """The offset is estimated, and no stage prints fewer dots than the better open loop."""
     monkeypatch.setattr("printhammer.control.learning.learn.RUNS", FEWER[:2])
     (unit,), delay = Variability().draw(nominal(), 1, 5), -50e-6
     (learner,), stages = calibrate(by_time, [unit], ImpactSensor(delay=delay))
@@ -119,7 +119,7 @@ def test_a_hidden_offset_of_the_sensor_costs_nothing(
 
 
 class Hidden(ImpactSensor):
-    """A sensor with another constant offset for each unit, up to 50 us, which nobody states."""
+    """A sensor with a different, unstated offset for each unit, up to 50 us."""
 
     def read(self, flight: np.ndarray, force: np.ndarray, unit: int, run: int) -> Readings:
         delay = np.random.default_rng(unit).uniform(-50e-6, 50e-6)
@@ -130,7 +130,7 @@ class Hidden(ImpactSensor):
 def test_no_unit_is_below_the_better_open_loop_where_the_readings_decide(
     at_safe_rate: LearningLaw, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """After one run of two units at the safe rate; otherwise the result says that they do not decide.
+    """After one run of two units at the safe rate; otherwise the result states that the runs do not decide.
 
     Of six random units, these are one that prints no dot in the other open loop, and the only one whose
     readings do not decide: a wrong choice of the loop fails on the first, a false certainty on the second.
@@ -156,7 +156,7 @@ class Odd(ImpactSensor):
 def test_no_table_is_handed_out_if_the_readings_are_not_explained(
     by_time: LearningLaw, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """After one stage; what is handed out is the better open loop of the production."""
+    """After one stage, the result is the better open loop of the production."""
     monkeypatch.setattr("printhammer.control.learning.learn.RUNS", RUNS[:1])
     learners, stages = calibrate(by_time, Variability().draw(nominal(), 1, 5), Odd())
     assert learners[0].misfit > MISFIT
@@ -188,7 +188,7 @@ def test_it_gains_where_the_force_is_measured(learned: tuple[list[Learner], list
 def test_it_gains_with_another_sensor_than_it_was_designed_for(
     law: LearningLaw, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The sensor misses impacts, reports false ones, and has coloured noise and a gain."""
+    """The sensor misses impacts, reports false impacts, and has coloured noise and a gain error."""
     monkeypatch.setattr("printhammer.control.learning.learn.RUNS", FEWER)
     units = Variability().draw(nominal(), 1, 5)
     sensor = ImpactSensor(force=0.03, missed=0.1, false=0.01, colour=0.8, gain=0.02, seed=7)
@@ -213,7 +213,7 @@ class Timed(NamedTuple):
 
 @pytest.fixture(scope="module")
 def timed() -> Timed:
-    """Return what the units learn with a sensor that is known to have no offset."""
+    """Return the results of units whose sensor is known to have no offset."""
     sensor = ImpactSensor(offset=0.0)
     law = law_for(nominal(), RATE, sensor=sensor, members=150)[0]
     rows, units = zip(*Variability().draw_rows(nominal(), 2, 5), strict=True)
@@ -224,7 +224,7 @@ def timed() -> Timed:
 
 @pytest.mark.slow
 def test_times_tell_the_force_that_they_do_not_show(timed: Timed) -> None:
-    """After 1,000 dots, better than single pulses could (3.2 %)."""
+    """After 1,000 dots, the error is smaller than single pulses allow (3.2 %)."""
     production = timed.law.production
     known = [
         production.hammers(each.belief.modes[0].mean[None])[0]

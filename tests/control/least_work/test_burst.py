@@ -1,4 +1,4 @@
-"""Bursts of least work without the search, which is slow: parts, files, pictures, and what is refused."""
+"""Bursts of least work without the slow search: components, files, pictures, rejected input."""
 
 import math
 from pathlib import Path
@@ -29,7 +29,7 @@ from printhammer.run.ensemble_group import Group
 
 
 def thrown(task: Any, begin: SlotState, duration: float, arrival: float, nodes: int, *_: Any) -> np.ndarray:
-    """A current that throws the armature in time, near enough for a dot; nothing is searched for."""
+    """A current that throws the armature in time for an adequate dot, without a search."""
     times = node_times(duration, nodes)[1:]
     return np.where((times > arrival - 3.5e-4) & (times < arrival + 1e-4), 0.9 * task.largest, 0.0)
 

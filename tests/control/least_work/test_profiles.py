@@ -1,4 +1,4 @@
-"""Profiles of currents from which searches begin: in closed form, and moved to where they are best."""
+"""Current profiles from which searches start: closed forms, and local optimisation."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The time of impact from samples of the coil: exact without noise, and what noise and units do to it."""
+"""Impact time from coil samples: exact without noise; effects of noise and of unit differences."""
 
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ def wire() -> ph.Hammer:
 
 @pytest.fixture(scope="module")
 def permanent() -> ph.Hammer:
-    """The paper's hammer behind a rail, whose current is over soon after the impact."""
+    """The paper's hammer with a rail driver; the current ends soon after the impact."""
     coil = {"resistance": 28.6, "inductance": "6.547 mH"}
     rail = {"shape": "rail", "voltage": 100.0, "width": "177.24 us", "decay_resistance": "159.1 ohm"}
     return ph.load("hendriks-1983-1").replace({"coil": coil, "waveform": rail})
@@ -156,7 +156,7 @@ def test_what_the_study_flags_is_not_used(wire: ph.Hammer) -> None:
 def test_an_armature_that_reaches_its_pole_makes_no_impact_of_its_own() -> None:
     """The current of the relay begins far above that at the touch, and without a pack it meets its pole.
 
-    Both bent the signal like an impact: units erred by up to 1 ms, and nothing was flagged.
+    Both bent the signal like an impact: errors reached 1 ms, and no estimate was flagged.
     """
     study = ph.impact_time(ph.load("relay-5v"), noise=["0.2 mA"], dots=24, units=12)
     assert np.hypot(study.unit_bias, study.unit_deviation)[0, 0, 0] < 4e-6
@@ -203,7 +203,7 @@ def test_clipped_readings_are_not_searched() -> None:
 
 
 def test_an_estimate_no_better_than_the_nominal_time_is_vague(tmp_path: Path) -> None:
-    """The current of the embosser, whose contact is longer than half its flight, shows the impact poorly."""
+    """The current of the embosser, whose contact exceeds half its flight, shows the impact only weakly."""
     embosser = ph.load(SMOOTH)
     soft = embosser.replace("pack.stiffness", 0.2 * embosser.constants["pack.stiffness"].si)
     path = tmp_path / "shot.csv"

@@ -1,4 +1,4 @@
-"""Tables made by hand. Helpers only."""
+"""Tables with invented entries. Helpers only."""
 
 from typing import Any
 
@@ -22,7 +22,7 @@ from printhammer.control.table.task import Task
 def by_hand(
     hammer: ph.Hammer | None = None, gaps: int = 2, reach: int = 2, **changes: Any
 ) -> CompensationTable:
-    """A table of two rates with an entry of its own for each history: no good, but valid."""
+    """A table of two rates with a separate entry for each history: valid, but not tuned."""
     made_for = ph.load(CRUDE) if hammer is None else hammer
     width = made_for.waveform.width  # type: ignore[union-attr]
     shape = 2, entries_of(gaps, reach)
@@ -51,7 +51,7 @@ def by_hand(
 
 
 def task_of(hammer: ph.Hammer, rate: float) -> Task:
-    """What a table of one gap for a hammer is to be like: `tune` as far as the choice of ways."""
+    """Return the tuning task of a one-gap table for a hammer: `tune` up to the choice of candidates."""
     asked: list[Task] = []
 
     def stop(task: Task, *_: Any, **__: Any) -> Any:

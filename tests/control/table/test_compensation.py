@@ -1,4 +1,4 @@
-"""Compensation tables: what makes one, what it says between its rates, and the drives that follow from it."""
+"""Compensation tables: construction, interpolation between rates, and the resulting drives."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Tables as files: what is written is read back; what is no table is refused in one sentence."""
+"""Table files: written tables are read back; invalid files are rejected with one sentence."""
 
 import dataclasses
 import json

@@ -1,4 +1,4 @@
-"""C headers in ticks of a timer: they compile without a warning, and agree with Python to the tick."""
+"""C headers in timer ticks: they compile without warnings and agree with Python to the tick."""
 
 import math
 import re
@@ -31,7 +31,7 @@ PAGE = Path(__file__).parents[3] / "docs" / "howto" / "tables.md"
 
 
 def run_c(folder: Path, text: str) -> list[list[int]]:
-    """Compile a program without a warning, run it, and return the whole numbers of its lines."""
+    """Compile a program without warnings, run it, and return the integers that it prints."""
     (folder / "main.c").write_text(text)
     flags = ["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Wunused-const-variable=2", "-Werror"]
     subprocess.run(["cc", *flags, "-o", "main", "main.c"], cwd=folder, check=True)
@@ -96,7 +96,7 @@ def test_a_budget_and_a_tick_are_kept_to() -> None:
 
 
 def braked(**changes: Any) -> CompensationTable:
-    """A table by hand with brake pulses, one history fired in another way at the second rate.
+    """A table with invented entries and brake pulses; at the second rate, one history uses another candidate.
 
     Dots from rest, one slot and two slots after another have a brake pulse.
     """
@@ -111,7 +111,7 @@ def braked(**changes: Any) -> CompensationTable:
 
 @pytest.mark.parametrize("seed", range(20))
 def test_pulses_that_touch_do_not_overlap_in_whole_ticks(seed: int) -> None:
-    """The brake pulse begins where the pulse before it ends, and ends where the dot is fired."""
+    """The brake pulse begins at the end of the preceding pulse, and ends at the firing of the dot."""
     rng = np.random.default_rng(seed)
     table = by_hand()
     values = {name: getattr(table, name) + rng.uniform(0.0, 4e-6, table.advance.shape) for name in COLUMNS}
@@ -168,7 +168,7 @@ int main(void) {{
 
 
 def test_a_dot_is_known_when_its_first_pulse_is_fired(tmp_path: Path) -> None:
-    """Of every history and rate, against the drive that the table makes of a pattern."""
+    """For every history and rate, against the drive that the table generates for a pattern."""
     table = braked()
     ahead = look_ahead({name: getattr(table, name) for name in COLUMNS}, table.rates, 2, 2)
     for row, rate in enumerate(table.rates.tolist()):
@@ -215,7 +215,7 @@ def test_two_tables_go_into_one_program(tmp_path: Path) -> None:
 
 
 def test_two_different_tables_of_one_name_stop_the_compiler(tmp_path: Path) -> None:
-    """The guard of the first header must not skip a second, different table without a word."""
+    """The include guard of the first header must not silently skip a second, different table."""
     for number, table in enumerate([braked(), braked(), braked(largest_current=3.0)]):
         (tmp_path / f"{number}.h").write_text(table.to_header())
     for other, compiles in ((1, True), (2, False)):

@@ -1,4 +1,4 @@
-"""Histories of dots: numbers, patterns, and what a rest hides."""
+"""Histories of dots: numbers, patterns, and gaps hidden by a rest."""
 
 import pytest
 from hypothesis import given

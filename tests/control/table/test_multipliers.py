@@ -1,4 +1,4 @@
-"""Multipliers of histories: in the C header, against two simulated rows, of which one is disturbed."""
+"""Multipliers of histories in the C header, against two simulated rows, one of them perturbed."""
 
 import json
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""A step of Newton's method for a dot, against a search for the least mean square."""
+"""A step of Newton's method for a dot, against a least-squares search."""
 
 import numpy as np
 import pytest

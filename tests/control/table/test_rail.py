@@ -1,4 +1,4 @@
-"""A table for a hammer whose coil a rail drives: its widths are times on the rail."""
+"""A table for a hammer with a rail driver: its widths are switch-on times of the rail."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ SLOTS = (0, 1, 2, 4, 5, 8, 9, 10)
 
 @pytest.fixture(scope="module")
 def hammer() -> ph.Hammer:
-    """The paper's hammer behind a rail that makes about the current of its pulse."""
+    """The paper's hammer with a rail driver that gives about the current of its pulse."""
     coil = {"resistance": 28.6, "inductance": "6.547 mH"}
     rail = {"shape": "rail", "voltage": 100.0, "width": "177.24 us", "decay_resistance": "159.1 ohm"}
     return ph.load("hendriks-1983-1").replace({"coil": coil, "waveform": rail})

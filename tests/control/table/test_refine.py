@@ -1,4 +1,4 @@
-"""Rates between those of a table: more of them where the table is no good there."""
+"""Refinement of the rates of a table where the table exceeds the limits."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ MIDDLE = 1870.0
 
 
 def tuned(halvings: int) -> CompensationTable:
-    """Tune a table over these rates, halved so often wherever it is not perfect."""
+    """Tune a table on a rate grid, refined up to a number of times where the table is not perfect."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(tuning, "_all_rates", lambda _single, _scale: GRID)
         patch.setattr(tuning, "HALVINGS", halvings)

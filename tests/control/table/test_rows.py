@@ -1,6 +1,6 @@
-"""A way in which an error in a row grows is no way: the two ways of a hammer at 1,020 Hz.
+"""Candidates that amplify errors along a row are rejected: two candidates of a hammer at 1,020 Hz.
 
-Both make the second dot right; a long row of the one alternates more and more, of the other it does not.
+Both print the second dot correctly; in a long row, the dots of one candidate alternate increasingly.
 """
 
 from typing import Any
@@ -39,7 +39,7 @@ def test_both_make_the_second_dot_right_and_one_is_no_way(task: Task) -> None:
 
 
 def test_a_long_row_shows_it(task: Task) -> None:
-    """In one motion after the other; the error that Newton's method leaves is a thousandth of the limits."""
+    """Simulated one after another; the residual of Newton's method is a thousandth of the limits."""
     hammer, limits, single = task.hammers[0], Limits(), task.single.nominal
     ways = solved(task, ways_of([GROWS, SHRINKS]))
     worst = []
@@ -61,7 +61,7 @@ def test_the_table_prints_rows_of_200() -> None:
 
 
 def test_a_rate_at_which_most_ways_are_unstable_has_a_table() -> None:
-    """At 1 kHz the best ways of this hammer are unstable; stable ones are neighbours of these."""
+    """At 1 kHz the best candidates of this hammer are unstable; their neighbours are stable."""
     hammer = ph.load("hendriks-1983")
     table = ph.tune(hammer, rate=1000.0, history=1, reach=2)
     drive = table.strategy(hammer)(hammer, [tuple(range(128))], 1000.0)[0]

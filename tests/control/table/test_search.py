@@ -1,4 +1,4 @@
-"""Ways to fire a dot: those that are kept make the dot right, and no dot draws on the pack of another."""
+"""Pulse candidates of a dot: the dot is correct, and does not overlap the pack contact of another dot."""
 
 from typing import Any
 
@@ -22,7 +22,7 @@ PERIOD = 1.0 / RATE
 
 @pytest.fixture(scope="module")
 def task() -> Task:
-    """What a table for the hammer of these tests is to be like."""
+    """Return the tuning task for the hammer of these tests."""
     return task_of(quick(), RATE)
 
 
@@ -32,7 +32,7 @@ def found(task: Task) -> Ways:
 
 
 def row_of(ways: Ways, place: int, dots: int) -> ph.PulseSequence:
-    """A row of dots made in one way, without brake pulses, built by hand."""
+    """A row of dots with one candidate, without brake pulses, constructed directly."""
     pulse: Any = quick().waveform
     wide = pulse.model_copy(update={"width": float(ways.width[place])})
     late = float(ways.fired[place] - ways.period[place])
@@ -96,7 +96,7 @@ def test_pulses_that_do_not_fit_are_never_run(task: Task) -> None:
 
 
 def ways(rows: list[tuple[float, float, float]]) -> Ways:
-    """Ways by period, us, brake width, us, and cost."""
+    """Candidates by period, us, brake width, us, and cost."""
     period, brake, cost = np.array(rows).T
     nothing = np.zeros(period.size)
     return Ways(1e-6 * period, 300e-6 * (brake > 0.0), 1e-6 * brake, 1e-6 * period, nothing + 1e-4, cost)

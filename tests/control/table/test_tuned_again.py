@@ -1,4 +1,4 @@
-"""Rates at which a table is no good are tuned once more, with ways from times around theirs."""
+"""Repeated tuning of rates that exceed the limits, with candidates near the times of their neighbours."""
 
 from typing import Any
 
@@ -23,7 +23,7 @@ MARKS = {"first": 1e-6, "second": 2e-6}
 
 @pytest.fixture(scope="module")
 def asked() -> list[tuple[list[float], Any]]:
-    """Rates that were tuned, and how far around times were looked at."""
+    """Calls of the tuning: rates, and the times around which candidates are searched."""
     return []
 
 

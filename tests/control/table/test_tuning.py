@@ -1,4 +1,4 @@
-"""Tuning: dots are like those of the single pulse, the current keeps to its bound, threads do not matter."""
+"""Tuning: dots match the single pulse, the current stays below its limit, threads do not matter."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ SLOTS = (0, 1, 2, 4, 5, 8, 9, 10, 11, 13, 17, 18)
 
 
 def quick() -> ph.Hammer:
-    """The crude hammer with a pulse that is over before the touch."""
+    """The crude hammer with a pulse that ends before the touch."""
     return crude().replace({"waveform.amplitude": 1.3, "waveform.width": 200e-6})
 
 
@@ -149,7 +149,7 @@ def test_report(table: CompensationTable) -> None:
 
 
 def test_a_table_with_unstable_rows_does_not_pass(table: CompensationTable) -> None:
-    """Even if the rows that were simulated keep to the limits: an error grows 3.45 times a dot."""
+    """Rejected even if the simulated rows are within limits: an error grows 3.45 times per dot."""
     shape = len(STRATEGIES), 1, 1, len(SETS)
     good = {name: np.zeros(shape) for name in ("force", "arrival", "lost", "extra")}
     dots = dict.fromkeys(("force_deviation", "arrival_deviation"), np.zeros((2, 4)))
