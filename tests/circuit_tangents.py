@@ -58,7 +58,7 @@ def currents(problem: Problem, state: Any, path: float) -> tuple[float, float]:
 
 
 def arrive(problem: Problem, state: Any, branch: int, path: float, start: float, end: float) -> np.ndarray:
-    """State at `end` of a run with a current from `start` on: as `state`, six numbers."""
+    """Return the state at `end` of a run from `state` at `start`; both states have six components."""
     begin = fresh_carry(start, (float(state[0]), float(state[1])))
     if branch in (UNLOADING, RELOADING):
         begin[carry.STATE], begin[carry.MODE], begin[carry.PEAK] = carry.ON_BRANCH, branch, state[2]
@@ -140,7 +140,7 @@ def changed(
 def deviations(
     hammer: ph.Hammer, drive: ph.PulseTrain, end: float, names: list[str] | None = None
 ) -> dict[str, float]:
-    """Difference between the columns of constants and differences of runs from rest, by constant.
+    """Return the relative difference between tangent columns and finite differences, by constant.
 
     The differences are relative, in typical magnitudes; a constant at an end of its range is omitted.
     """

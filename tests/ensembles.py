@@ -18,7 +18,7 @@ TIMES = np.linspace(0.0, 7e-3, 600)
 
 
 class Members:
-    """What an ensemble is made of, member by member, so that parts of it can be run.
+    """Members of an ensemble, stored one by one, so that any subset can be run.
 
     The first `strange` members of ten are such as the lanes are not for: they start in the pack, on a
     surface, or fast. The range of the last hammer's magnet ends within reach.

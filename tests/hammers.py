@@ -1,4 +1,4 @@
-"""Hammers and drives that the shipped file is not, and how far a motion is from the reference.
+"""Hammers and drives for tests, and the deviation of a motion from the reference.
 
 Helpers only; the tests that use them say what must hold.
 """

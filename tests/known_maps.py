@@ -101,7 +101,7 @@ def start(kind: str, u: npt.ArrayLike, p: float, over: Plane) -> Start:
 
 
 def image_by(known: Map) -> Callable[..., Image]:
-    """Return what stands for `printhammer.chaos.strobe.map.image_of`."""
+    """Return a replacement for `printhammer.chaos.strobe.map.image_of`."""
 
     def image_of(
         at: Regime, state: Array, firings: int, _tolerance: float, *, contacts: bool = True
@@ -119,7 +119,7 @@ def image_by(known: Map) -> Callable[..., Image]:
 
 @contextmanager
 def standing_in(known: Map) -> Iterator[None]:
-    """Let a map stand in for the strobe map of every regime: no contact and no surface is near."""
+    """Replace the strobe map of every regime by a map, without contacts or surfaces."""
     curves = "printhammer.chaos.curves"
     with pytest.MonkeyPatch.context() as patch:
         for module in ("systems", "normal_forms"):

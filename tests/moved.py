@@ -1,4 +1,4 @@
-"""Derivatives by constants from differences of whole runs, to hold the tangent flow of constants against.
+"""Finite differences of whole runs with respect to constants, for comparison with the tangent flow.
 
 Helpers only; the tests that use them say what must hold.
 """
@@ -23,7 +23,7 @@ MINUTE = 1e-14
 
 
 def moved(hammer: ph.Hammer, drive: Any, name: str, value: float) -> tuple[ph.Hammer, Any]:
-    """Return hammer and drive with one constant of another value, SI."""
+    """Return hammer and drive with one constant changed to `value`, SI."""
     section, _, last = name.rpartition(".")
     waveform = drive.waveform
     if section == "waveform" and last in type(waveform).model_fields:
@@ -93,7 +93,7 @@ def _deviation(
 
 
 def quantities(hammer: ph.Hammer, drive: Any, duration: float, state: Any = None) -> np.ndarray:
-    """All quantities of the dots and of the run, SI, in one row."""
+    """Return all quantities of the dots and of the run, SI, in one row."""
     motion = ph.simulate(hammer, drive, duration=duration, state=state, tolerance=MINUTE, points=2)
     assert motion.ok
     energies = [name for name in RUN_QUANTITIES if name != "damping_loss" or hammer.damping is not None]

@@ -1,4 +1,4 @@
-"""Scripts of pages and of the gallery: run in this process, or in an interpreter of their own."""
+"""Scripts of pages and of the gallery: run in this process or in a separate interpreter."""
 
 import os
 import runpy

@@ -1,4 +1,4 @@
-"""Derivatives of the motion by finite differences, to hold the tangent flow against.
+"""Derivatives of the motion by finite differences, for comparison with the tangent flow.
 
 Helpers only; the tests that use them say what must hold.
 """
@@ -41,7 +41,7 @@ def arrive(problem: Problem, state: Any, branch: int, start: float, end: float) 
 
 
 def richardson(difference: Any, size: float, levels: int, scales: np.ndarray) -> np.ndarray:
-    """Extrapolate central differences of halved steps to zero; of all extrapolates the most settled one."""
+    """Extrapolate central differences of halved steps to step size 0; return the most converged value."""
     rows: list[list[np.ndarray]] = []
     best = np.inf, np.zeros(3)
     for k in range(levels):
@@ -100,7 +100,7 @@ def deviation(
     found: TangentMap | None = None,
     **how: Any,
 ) -> float:
-    """Difference between tangent map and finite differences over the norm of the latter, all scaled."""
+    """Return the relative difference between tangent map and finite differences, in scaled variables."""
     found = found or tangent_map(hammer, drive, start, end, state=state, tolerance=SHARP)
     assert found.ok
     assert found.smooth

@@ -1,4 +1,4 @@
-"""The package as somebody else gets it: public names, start-up, the built wheel installed elsewhere."""
+"""The package as a user installs it: public names, start-up, and the built wheel in a fresh environment."""
 
 import re
 import shlex

@@ -1,4 +1,4 @@
-"""Phrases that make a reader guess stay out of docstrings, comments, help texts and pages.
+"""Vague phrases are forbidden in docstrings, comments, help texts and pages.
 
 A phrase is forbidden where a standard term says the same: "in parts of" for "as a fraction of", "Return what"
 for the name of the object. Rooms and pages enter `ROOMS` and `PAGES` once they are free of them.

@@ -30,7 +30,7 @@ def leaves(value: Any) -> Iterator[Any]:
 
 
 def answer(results: list[int]) -> Any:
-    """What the caller of machine code gives back: None, an integer, or a tuple of them."""
+    """Return results in the form of the caller of machine code: None, an integer, or a tuple of integers."""
     return (None, *results[:1])[len(results)] if len(results) < 2 else tuple(results)
 
 

@@ -1,4 +1,4 @@
-"""The claim about the frequency-time map, and the claims about bursts that run as ensembles."""
+"""Tests of the claim about the frequency-time map, and of the claims about bursts, which use ensembles."""
 
 import numpy as np
 import pytest

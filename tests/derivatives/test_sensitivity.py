@@ -1,4 +1,4 @@
-"""The table of sensitivities: what it holds, how it hangs together, what it says of what it cannot."""
+"""The table of sensitivities: contents, consistency, and reasons for omitted constants."""
 
 import math
 
@@ -109,7 +109,7 @@ def test_a_constant_that_is_zero_has_an_absolute_derivative_only(hammer: "ph.Ham
 
 
 def test_a_sharp_edge_is_left_out_and_said() -> None:
-    """Nothing is differentiable with a rise time of zero: beside it the pulse has another shape."""
+    """The pulse is not differentiable at a rise time of zero, since its shape changes there."""
     hammer = made_of(spring=preload(-4.0), pack=power(), backstop=hertz(damping=4e8))
     drive = block(14.0, 0.35e-3)
     with interpreted():

@@ -1,4 +1,4 @@
-"""Tangent maps and exponents: how they hang together, what they do at the ends of their range."""
+"""Tangent maps and exponents: consistency, and limits of their range."""
 
 import math
 
@@ -110,7 +110,7 @@ def test_exponents_add_up_to_the_mean_growth_of_areas() -> None:
 
 
 def test_at_rest_in_the_backstop_changes_die_out_like_a_damped_oscillator() -> None:
-    """For longer than floating-point numbers reach."""
+    """Over times for which the decay underflows floating-point numbers."""
     hammer = crude()
     drive = train(1.0, 2)
     start, end = 0.2, 0.20013

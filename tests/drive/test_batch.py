@@ -1,4 +1,4 @@
-"""Trains side by side are the trains that they would be one by one, and refuse what these refuse."""
+"""A batch of trains equals its individual trains, and rejects the same input."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Drivers of a coil: their pieces, files, what they share and what they refuse."""
+"""Drivers of a coil: segments, files, common properties, and invalid input."""
 
 from __future__ import annotations
 

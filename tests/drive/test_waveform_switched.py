@@ -1,4 +1,4 @@
-"""A switched current: bounded by its levels, and the sum of what each switching does."""
+"""A switched current: bounded by its levels, and the sum of the responses to its switchings."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Figures: what their lines and axes say, against the motion and the equations."""
+"""Figures: lines and axes, compared with the motion and the equations."""
 
 import matplotlib
 import numpy as np

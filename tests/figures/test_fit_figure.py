@@ -1,4 +1,4 @@
-"""The picture of a fit: what is drawn where, against the fit."""
+"""The picture of a fit, compared with the fit."""
 
 from pathlib import Path
 

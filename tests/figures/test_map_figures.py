@@ -1,4 +1,4 @@
-"""Figures 8 and 9 and the comparison: what their lines and colours say, against the map."""
+"""Figures 8 and 9 and the comparison of maps: lines and colours, compared with the map."""
 
 from pathlib import Path
 

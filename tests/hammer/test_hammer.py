@@ -1,4 +1,4 @@
-"""The hammer: what it holds, replacing, fingerprint, writing back, checks."""
+"""The hammer: contents, replacement, fingerprint, saving, checks."""
 
 import pickle
 import re

@@ -56,7 +56,7 @@ def write(
 
 
 def sensed(values: np.ndarray, before: float, bandwidth: float | None) -> np.ndarray:
-    """What a first-order low-pass makes of straight lines between fine samples."""
+    """Apply a first-order low-pass to straight lines between fine samples."""
     if bandwidth is None:
         return values
     from scipy.signal import lfilter

@@ -1,4 +1,4 @@
-"""The circuit of the coil from its current: what made a record is found, within the errors stated."""
+"""The circuit of the coil fitted to its current: the true constants lie within the stated errors."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""The one entry to the fits: what it takes from the hammer, and what it refuses."""
+"""The entry point of the fits: constants taken from the hammer, and invalid input."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What a fit takes as known with an error widens its intervals, and stays correlated with them."""
+"""A known constant with an error widens the intervals of a fit, and remains correlated with them."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Tables of the synthetic laboratory: seeds, noise, steps, outliers, what is refused."""
+"""Tables of the synthetic laboratory: seeds, noise, quantisation, outliers, invalid input."""
 
 import math
 from pathlib import Path
@@ -18,7 +18,7 @@ from printhammer.support.tables.readings import read_table
 HAMMER = hammers.crude()
 MANY = np.linspace(60e-6, 300e-6, 4000)
 OWN = [kind for kind in KINDS if kind != "current"]
-"""What the hammer of the paper has: its waveform is no voltage."""
+"""Kinds of measurement of the paper's hammer, whose waveform is not a voltage."""
 RECORD = {"sampling_rate": "200 kHz"}
 
 

@@ -102,7 +102,7 @@ def test_the_result_belongs_to_the_records(tmp_path: Path) -> None:
 
 
 def test_outliers_are_left_out(tmp_path: Path) -> None:
-    """Readings that are wrong altogether are listed and do not matter; without robustness they do."""
+    """Gross errors are listed and have no effect on a robust fit; without robustness they have."""
     path = shots.write(tmp_path / "shot.csv", HAMMER, outliers=0.02, seed=5)
     fit = fit_motion([path], FAR)
     assert 15 < fit.outliers.sum() < 55
@@ -138,7 +138,7 @@ def test_shots_with_other_currents_fit_together(tmp_path: Path) -> None:
 
 
 def test_a_current_of_another_shape_is_taken_from_the_record(tmp_path: Path) -> None:
-    """And that is said."""
+    """A note of the result states this."""
     pulse = HalfSine(amplitude=1.5, width=450e-6)
     path = shots.write(tmp_path / "shot.csv", HAMMER, waveform=pulse, current_noise=2e-3, bandwidth=None)
     fit = fit_motion([path], FAR)
@@ -334,7 +334,7 @@ def test_a_current_that_is_none(tmp_path: Path) -> None:
 
 
 def test_without_a_rebound_only_the_mass_is_found(tmp_path: Path) -> None:
-    """And it is said why."""
+    """The result states the reason."""
     path = shots.write(tmp_path / "shot.csv", HAMMER, end=0.52e-3)
     fit = fit_motion([path], HAMMER.replace("mass", 1.3 * MASS))
     assert list(fit.constants) == ["mass"]

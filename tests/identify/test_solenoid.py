@@ -1,4 +1,4 @@
-"""The magnetic circuit from forces and inductances: what made them is found, and a published solenoid."""
+"""The magnetic circuit fitted to forces and inductances: known constants, and a published solenoid."""
 
 from pathlib import Path
 

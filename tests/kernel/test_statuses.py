@@ -1,4 +1,4 @@
-"""How runs end: where quantities vanish, where edges of the drive coincide, where a law ends."""
+"""Status of runs: vanishing quantities, coinciding edges of the drive, end of the range of a law."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Measured maps: what was recorded comes back, in whatever form, and odd files are told in one sentence."""
+"""Measured maps: the record is restored from every form; invalid files are rejected in one sentence."""
 
 import re
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Tables of forces and of flux linkages from CSV files: what is read, and what is refused."""
+"""Tables of forces and of flux linkages from CSV files: valid and invalid files."""
 
 from pathlib import Path
 

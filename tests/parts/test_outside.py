@@ -1,4 +1,4 @@
-"""Parts from elsewhere: a file named on the command line, an installed package, and laws that are none."""
+"""Additional parts: a file on the command line, an installed package, and invalid laws."""
 
 import json
 import sys

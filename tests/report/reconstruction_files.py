@@ -1,4 +1,4 @@
-"""Results of a reconstruction, made up: what the files of its data folder look like."""
+"""Made-up results of a reconstruction, in the format of its data files."""
 
 import json
 from copy import deepcopy

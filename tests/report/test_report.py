@@ -87,7 +87,7 @@ def results_of(hammer: "ph.Hammer", folder: Path, **changes: object) -> Results:
 
 @pytest.fixture
 def blank(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have every figure be an empty one, where what becomes of the files is the point."""
+    """Make every figure empty, for tests of the written files."""
     monkeypatch.setattr(PaperFigure, "draw", lambda *_arguments, **_options: Figure())
 
 

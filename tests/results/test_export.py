@@ -1,4 +1,4 @@
-"""Motions as tables and files: all digits, units, provenance; nothing lost where writing fails."""
+"""Motions as tables and files: all digits, units, provenance; existing files survive a failed write."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What a notebook shows: pictures, tables, and names to complete."""
+"""Display in notebooks: pictures, tables, and names for completion."""
 
 from __future__ import annotations
 

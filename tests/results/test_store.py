@@ -1,4 +1,4 @@
-"""Stores: what is there is never lost, what is half there is written again, and nothing else is touched."""
+"""Stores: complete blocks are never lost, incomplete blocks are rewritten, other files are unchanged."""
 
 import errno
 from dataclasses import replace

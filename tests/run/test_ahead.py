@@ -1,4 +1,4 @@
-"""Machine code made ahead by a second process."""
+"""Machine code compiled ahead by a second process."""
 
 import json
 import os
@@ -22,7 +22,7 @@ from printhammer.run.simulate import announce_compiling
 
 
 def entry(name: str) -> Any:
-    """An entry point whose machine code is nowhere yet."""
+    """Return an entry point without machine code."""
     code = SimpleNamespace(with_it=(), can_be_kept=True)
     return SimpleNamespace(name=name, code=code, is_ready=lambda: False, function=lambda: name)
 

@@ -1,4 +1,4 @@
-"""Ensembles, one member at a time: every member is the run that `simulate` makes of it."""
+"""Ensembles, one member at a time: every member equals a run of `simulate`."""
 
 import dataclasses
 from contextlib import nullcontext
@@ -64,7 +64,7 @@ def check_strobes(result: EnsembleResult, i: int, motion: ph.Motion, times: npt.
 def check(
     ensemble: Ensemble, *, points: int = 300, odd: bool = False, engine: Any = "plain"
 ) -> tuple[EnsembleResult, list[ph.Motion]]:
-    """Hold an ensemble against the motions of its members, in all that is kept of a run."""
+    """Compare all results of an ensemble with the motions of its members."""
     times = np.linspace(0.0, 1.05 * float(ensemble.ends.max()), points)
     # Besides the firings, also the start, the end and beyond.
     strobes: Any = "firings"

@@ -1,4 +1,4 @@
-"""What an ensemble refuses, in one sentence; progress, interruption and errors of its workers."""
+"""Ensembles: invalid input, progress, interruption, and errors in worker threads."""
 
 from collections.abc import Callable
 from typing import Any

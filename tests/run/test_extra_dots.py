@@ -1,4 +1,4 @@
-"""Extra contacts that an ensemble keeps are those of the motions of its members."""
+"""The extra contacts of an ensemble equal those of the motions of its members."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Motion: independent of the output grid, repeatable; its contacts and dots are what dense samples show."""
+"""Motion: independent of the output grid, repeatable; contacts and dots agree with dense samples."""
 
 import hashlib
 import os

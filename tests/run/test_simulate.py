@@ -1,4 +1,4 @@
-"""The one entry to the kernel: what it refuses, its defaults, its other integrators."""
+"""The entry point of simulations: invalid input, defaults, and the integrators of 1983."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""States that are handed from one run to the next: in the pack, and with the currents of the coil."""
+"""States passed from one run to the next: in the pack, and with coil currents."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The window of a run: the last dot of a slow device is struck, whatever verb runs it."""
+"""The window of a run: the last dot of a slow device is struck in every verb."""
 
 import json
 import math
@@ -194,7 +194,7 @@ def test_a_device_with_contacts_and_without_a_pack_is_waited_for(dry: bool) -> N
 
 
 def press(hammer: ph.Hammer, rate: float) -> Press:
-    """The prints of a learner."""
+    """Return a simulator of the test prints of a learner."""
     single = single_of(hammer, hammer.waveform, 1e-7)
     asked = {"gaps": 1, "reach": 1, "spread": [], "largest": 2.0, "widest": 1.0, "wait": 0.0, "brake": False}
     task = Task(

@@ -30,7 +30,7 @@ FLAGS = (
     "--remote-debugging-port=0",
 )
 HELPERS = (Path(__file__).parent / "helpers.js").read_text("utf-8")
-"""What the tests do inside a page."""
+"""Script that the tests run inside a page."""
 START = 60.0
 WAIT = 60.0
 

@@ -1,4 +1,4 @@
-"""Tests in a browser: where no Chromium or no Firefox is found, its tests are left out and that is said."""
+"""Fixtures for tests in a browser; tests are skipped with a reason if the browser is missing."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -61,7 +61,7 @@ def opened_firefox() -> Iterator[Tab]:
 
 @contextmanager
 def visited(address: str, opened_browser: Any) -> Iterator[Page]:
-    """Open a page; nothing but the file itself is asked for."""
+    """Open a page; check that the page requests only its own file."""
     opened = opened_browser()
     opened.size(1280, 720)
     opened.open(address)
@@ -119,7 +119,7 @@ def page(tabs: Callable[..., Page]) -> Page:
 
 @pytest.fixture
 def fresh(opened_browser: Any) -> Iterator[Callable[..., Page]]:
-    """Opens pages for one test, which complain of nothing until the test ends."""
+    """Open pages for one test; check at its end that no page reported an error."""
     pages: list[Page] = []
 
     def fresh(address: str, width: int = 1280, height: int = 720, still: bool = True) -> Page:

@@ -1,4 +1,4 @@
-"""Boxes and sliders of the controls: a box shows what is, and says what it did not take."""
+"""Input boxes and sliders of the controls: displayed values, and messages about rejected input."""
 
 import json
 import subprocess

@@ -1,4 +1,4 @@
-"""What captions and controls say, in Node: modules of the page without a page."""
+"""Texts of captions and controls, in Node: modules of the page without a page."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What the studio sets of a coil: its temperature, the winding of a hammer that states none, drivers."""
+"""Coil settings of the studio: temperature, the winding of a hammer without a coil, drivers."""
 
 import json
 

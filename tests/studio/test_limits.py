@@ -1,4 +1,4 @@
-"""Runs of a page that take too many steps: curves and maps end there and say so, sections are refused."""
+"""Runs of a page that exceed the step limit: curves and maps end with a message, sections are rejected."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""Marks of views that do not belong to what is set: after a quarter of a second, counted from the change."""
+"""Marks of outdated views, a quarter of a second after a change of the settings."""
 
 from pathlib import Path
 

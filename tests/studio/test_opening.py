@@ -1,4 +1,4 @@
-"""The opening: what moves above its curve above what it prints, stories one click away, a tour."""
+"""The opening page: actuator above its curve and its dots, stories, and the tour."""
 
 from collections.abc import Callable
 

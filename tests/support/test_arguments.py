@@ -1,4 +1,4 @@
-"""Arguments that are objects: what is no hammer, drive or waveform is refused by its name."""
+"""Arguments that are objects: an argument of another class is rejected by its name."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Work handed out to threads: all of it once, progress, interruption, errors."""
+"""Work distributed to threads: completeness, progress, interruption, errors."""
 
 import os
 import threading

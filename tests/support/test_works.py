@@ -1,4 +1,4 @@
-"""Works that ask: together, translated, answered."""
+"""`Work` coroutines: run together, translated, answered."""
 
 from printhammer.support.threads import Work, answered, together, translated
 

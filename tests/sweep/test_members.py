@@ -1,4 +1,4 @@
-"""Members share what they can: equal drives are one object, whatever the hammer."""
+"""Members share objects: equal drives are one object, for any hammer."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Specs: what is read, and every fault in one sentence that names key, value and what was expected."""
+"""Specs: parsing, and error messages that name key, value and expectation."""
 
 from collections.abc import Callable
 from copy import deepcopy

@@ -1,4 +1,4 @@
-"""Sweeps: each member is what `simulate` makes of it, whatever the engine; failures are rows."""
+"""Sweeps: each member equals a run of `simulate`, for every engine; failed members are rows."""
 
 import math
 import threading

@@ -27,7 +27,7 @@ def _time_factor(power: float) -> float:
 
 @dataclass(frozen=True)
 class PackRebound:
-    """What the pack alone, equation (5), does to a free mass: indentation, times, speed out."""
+    """Rebound of a free mass from the pack alone, equation (5): indentation, times, exit speed."""
 
     indentation: float
     loading_time: float

@@ -1,4 +1,4 @@
-"""Changes with constants through the circuit of the coil, against differences of neighbouring runs."""
+"""Derivatives with respect to constants of the coil circuit, against differences of neighbouring runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How motions change with constants, where that can be written down; and what dimensions alone demand."""
+"""Derivatives of motions with respect to constants: closed forms, and dimensional analysis."""
 
 import math
 from fractions import Fraction

@@ -1,4 +1,4 @@
-"""Fits give constants back: exactly from exact tables, and as often as they say from noisy ones."""
+"""Fits recover constants: exactly from exact tables, and with the stated coverage from noisy tables."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -83,7 +83,7 @@ class Hammer:
         return at
 
     def push(self, state: State) -> float:
-        """What spring and dashpot of the paper push with."""
+        """Return the force of spring and dashpot of the paper."""
         return self.pack_stiffness * (state[0] - self.front) + self.pack_damping * state[1]
 
     def take_off(self) -> float:
@@ -127,7 +127,7 @@ class Hammer:
     def ends(
         self, at: Callable[[float], State], start: float, limit: float, paper: bool, spent: bool
     ) -> tuple[float, str]:
-        """Where a piece ends, and why."""
+        """Return the end time of a piece, and the reason for the end."""
         tests: dict[str, Callable[[float], float]]
         if paper:
             tests = {"let go": lambda t: self.push(at(t))}

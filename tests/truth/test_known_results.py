@@ -1,4 +1,4 @@
-"""The oscillators of the literature: what is known of them, and what their closed forms say."""
+"""Oscillators of the literature: published values and closed forms."""
 
 import importlib
 import math
@@ -54,7 +54,7 @@ CLOSED_FORMS = {
 
 
 def known(hammer: str, *words: str) -> float:
-    """The value that the table has for it."""
+    """Return the value in the table for a hammer."""
     (case,) = [case for case in cases() if case.hammer == hammer and all(word in case.what for word in words)]
     return float(case.expected)
 

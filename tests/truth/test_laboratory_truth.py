@@ -1,4 +1,4 @@
-"""What the laboratory measures without errors, against formulas written down here."""
+"""Error-free measurements of the laboratory, against independent formulas."""
 
 import mpmath
 import numpy as np

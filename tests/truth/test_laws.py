@@ -1,4 +1,4 @@
-"""The laws against what can be derived on paper: equations (3) to (7) and their alternatives."""
+"""The laws against analytical results: equations (3) to (7) and their alternatives."""
 
 import math
 from importlib import import_module

@@ -156,7 +156,7 @@ def _exceeds(drive: Drive, limit: float) -> bool:
 
 
 def hang_up_range(context: Context) -> tuple[float | None, list[Motion], float]:
-    """Find the hang-up range: lowest rate [Hz]; motions from that rate on; highest rate simulated, Hz.
+    """Find the hang-up range; return its lowest rate [Hz], the motions from there on, the highest rate [Hz].
 
     The highest rate is the last rate of the claim, or the highest that the current limit permits. The lowest
     rate is None if the armature does not hang up at the highest rate.

@@ -71,7 +71,7 @@ def row_multipliers(
         Whether to find the fixed point by Newton's method; otherwise the derivative is evaluated at the state
         that the row from rest reaches, which is near the fixed point if the preceding dots are good.
     firing : int, optional
-        Index of the firing at which the map starts. If the first dots are compensated, they start in the
+        Index of the firing at which the map starts. If the first dots are compensated, the row starts at the
         fixed point, so that the state is closer to the fixed point at an early firing than at a late firing.
     repeats : sequence of int, optional
         Number of dots after which each row repeats, at most `firing`; by default 1, equal dots.

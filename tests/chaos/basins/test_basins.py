@@ -26,7 +26,7 @@ LN2 = math.log(2.0)
 
 @pytest.fixture(scope="module")
 def two(hammer: "ph.Hammer") -> Basins:
-    """A train with two orbits of period 1."""
+    """Return a train with two orbits of period 1."""
     return ph.basins(hammer, period=1.3e-3, **PLANE)
 
 
@@ -131,7 +131,7 @@ def test_progress_comes_to_its_end(hammer: "ph.Hammer") -> None:
 
 
 def columns_of(points: np.ndarray) -> Columns:
-    """Trains with given states at the firings."""
+    """Return trains with given states at the firings."""
     count, length = points.shape[:2]
     return Columns(
         x=points[..., 0],

@@ -36,7 +36,7 @@ def same(one: Bifurcation, other: Bifurcation) -> bool:
 def diagram(
     verdicts: dict[str, list[int]], values: list[float], states: np.ndarray | None = None
 ) -> Bifurcation:
-    """A diagram with given periods; -1 stands for a strange train."""
+    """Return a diagram with given periods; -1 denotes a strange train."""
     cycles = np.array(list(verdicts.values()))
     shape = cycles.shape
     strange = cycles < 0

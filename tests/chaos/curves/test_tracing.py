@@ -121,7 +121,7 @@ def test_an_event_lies_on_a_curve_or_not() -> None:
 
 
 def test_two_events_on_one_curve_are_followed_once() -> None:
-    """Both folds of the cubic map are one curve, which turns in the cusp."""
+    """Both folds of the cubic map lie on one curve, which turns at the cusp."""
     plane = known_maps.plane((-4.0, 4.0), (-1.0, 3.5))
     branch: Any = SimpleNamespace(
         regime=plane.regime.with_(NAMES[1], 3.0),

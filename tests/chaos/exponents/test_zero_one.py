@@ -1,4 +1,4 @@
-"""The 0-1 test on series whose character is known."""
+"""The 0-1 test on series known to be regular or chaotic."""
 
 import dataclasses
 import math

@@ -12,7 +12,7 @@ from printhammer.run.regime import Regime
 
 
 def spiral(multiplier: complex, count: int, begin: float = 1e-3) -> np.ndarray:
-    """States that approach a point at the origin by a complex multiplier."""
+    """Return states that converge to the origin with a complex multiplier."""
     turns = begin * multiplier ** np.arange(count)
     return np.column_stack([turns.real, turns.imag])
 

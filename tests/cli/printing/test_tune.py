@@ -13,7 +13,7 @@ import printhammer as ph
 
 @pytest.fixture
 def quick(tmp_path: Path) -> Path:
-    """A hammer file whose pulse is over before the touch."""
+    """Return a hammer file whose pulse ends before the touch."""
     path = tmp_path / "quick.toml"
     hammer = ph.load(CRUDE).replace({"waveform.amplitude": 1.3, "waveform.width": 200e-6})
     hammer.save(path)

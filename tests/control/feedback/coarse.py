@@ -49,7 +49,7 @@ def plant() -> Plant:
 
 @functools.cache
 def tables() -> tuple[ForceMap, Launch, ImpactMap]:
-    """Forces, launch and impact map of the nominal hammer."""
+    """Return force map, launch and impact map of the nominal hammer."""
     with grids():
         forces = impact_map.force_map(plant())
         start = soft_landing.launch(plant(), forces)
@@ -58,6 +58,6 @@ def tables() -> tuple[ForceMap, Launch, ImpactMap]:
 
 @functools.cache
 def controller() -> Controller:
-    """The controller of the nominal hammer."""
+    """Return the controller of the nominal hammer."""
     with grids():
         return Controller(plant().hammer, plant().driver, threads=1)

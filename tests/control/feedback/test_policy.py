@@ -11,7 +11,7 @@ from printhammer.printing.dots.judging import Limits
 SPEEDS = np.linspace(0.6, 1.3, 15)
 
 ROUNDING = 1e-20
-"""What rounding makes of a cost of nothing."""
+"""Bound of a cost that is zero up to rounding."""
 
 
 def doubts(*touches: Any) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""From data sheets to hammers: forces come back, and every constant says what it is."""
+"""From data sheets to hammers: fitted forces, and the status of every constant."""
 
 import math
 from importlib.resources import files

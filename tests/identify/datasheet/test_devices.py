@@ -1,4 +1,4 @@
-"""The devices that ship do what their sheets claim."""
+"""The shipped devices satisfy their data sheets."""
 
 from pathlib import Path
 from typing import Any
@@ -43,7 +43,7 @@ def test_a_relay_pulls_in_by_three_quarters_and_not_below_half(relay: ph.Hammer)
 
 def test_a_relay_drops_out_above_a_tenth_and_below_its_pull_in(relay: ph.Hammer) -> None:
     def after(volts: float) -> float:
-        """Close it at the rated voltage, then go on with less; return where it is in the end."""
+        """Close the relay at the rated voltage, then reduce the voltage; return the final displacement."""
         waves = [Rail(voltage=RATED, width=0.05), Rail(voltage=volts, width=0.2)]
         drive = ph.PulseSequence(waves, at=[0.0, 0.05])
         return float(ph.simulate(relay, drive, duration=0.25).x[-1])

@@ -1,4 +1,4 @@
-"""Digests of sources: those of the code, not of its words."""
+"""Digests of sources depend on the code, not on docstrings and comments."""
 
 from pathlib import Path
 

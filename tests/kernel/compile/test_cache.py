@@ -1,4 +1,4 @@
-"""Where machine code is kept and read, and what is said while it is made; trouble is no reason not to run."""
+"""The cache of machine code: folders, messages during compilation, and runs despite cache problems."""
 
 import errno
 import fcntl
@@ -52,7 +52,7 @@ def test_damaged_machine_code_of_a_wheel_is_made_anew(tmp_path: Path, folder: Pa
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The folder that a user has asked for."""
+    """Return the folder that the user selected."""
     place = tmp_path / "machine code"
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(place))
     return place
@@ -60,7 +60,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The folder for temporary files, where neither the installation nor the home can be written to."""
+    """Return the temporary folder, used if neither the installation nor the home folder is writable."""
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     monkeypatch.setattr(cache, "_folders", lambda: iter([cache._temporary_folder()]))
@@ -69,7 +69,7 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """What is announced."""
+    """Return the list of announced messages."""
     sentences: list[str] = []
     monkeypatch.setattr(cache, "_said", set())
     monkeypatch.setattr(cache, "listeners", {sentences.append})
@@ -81,7 +81,7 @@ def files(folder: Path) -> list[Path]:
 
 
 def make_read_only(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let nobody write to a folder; the administrator, whom permissions do not stop, neither."""
+    """Make a folder read-only, also for an administrator, whom permissions do not restrict."""
     folder.chmod(0o555)
     can_be_written = cache._can_be_written
     monkeypatch.setattr(cache, "_can_be_written", lambda place: place != folder and can_be_written(place))

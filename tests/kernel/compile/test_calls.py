@@ -1,4 +1,4 @@
-"""Calls with a block of arguments: what is passed, what is given back, what is refused."""
+"""Calls with a block of arguments: arguments, results, and invalid arguments."""
 
 from typing import Any, NamedTuple
 
@@ -12,7 +12,7 @@ ARRAY = "ptr %o{0}, ptr %p{0}, i64 %n{0}, i64 %size{0}, ptr %data{0}, i64 %l{0},
 
 
 def compiled(arguments: str, body: str, signature: Any, results: int) -> Any:
-    """A function of Python that calls one written in LLVM's language."""
+    """Return a Python function that calls a function written in LLVM assembly."""
     entry = f"define i32 @entry(ptr %result, ptr %raised, {arguments}) {{\n{body}\n}}"
     template = llvm.parse_assembly(entry).as_bitcode()
     module = link.link(template, [], {}, calls.calling_code("entry", signature, link.CALL))

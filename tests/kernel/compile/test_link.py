@@ -1,4 +1,4 @@
-"""Linking: what is open must be defined; what cannot be read is said in a sentence."""
+"""Linking: undefined symbols and unreadable modules are reported in one sentence."""
 
 import llvmlite.binding as llvm
 import pytest

@@ -1,4 +1,4 @@
-"""Kernels in WebAssembly: what a module holds, and that it computes what machine code computes."""
+"""Kernels in WebAssembly: contents of a module, and agreement with machine code."""
 
 import importlib.util
 from collections.abc import Callable, Iterator
@@ -103,7 +103,7 @@ def test_arguments_and_results_of_a_small_module(tmp_path: Path) -> None:
 
 @contextmanager
 def computed_by(kernel: Kernel, call: Callable[..., Any]) -> Iterator[None]:
-    """Have a host compute all that a kernel is asked for."""
+    """Compute all requested results of a kernel in a WebAssembly host."""
     own = {name: kernel.__dict__.pop(name) for name in ENTRIES if name in kernel.__dict__}
     for name in ENTRIES:
         kernel.__dict__[name] = lambda *arguments, name=name: call(name, *arguments)

@@ -1,4 +1,4 @@
-"""Lanes: what a member does depends on nothing but the member, to the bit."""
+"""Lanes: the results of a member depend on the member only, to the last bit."""
 
 from typing import Any
 
@@ -21,7 +21,7 @@ def members() -> Members:
 
 @pytest.fixture(scope="module")
 def whole(members: Members) -> EnsembleResult:
-    """All of them, in one thread."""
+    """Return the results of all members, in one thread."""
     return members.run(threads=1, engine="lanes")
 
 
@@ -61,7 +61,7 @@ def test_every_member_alone(members: Members, whole: EnsembleResult) -> None:
 
 
 def test_the_same_member_many_times(members: Members, whole: EnsembleResult) -> None:
-    """In step from beginning to end, and one of a hundred among others."""
+    """A hundred equal members in step, and one of them among different members."""
     for i in (1, 14, 203):
         which = np.full(2 * lane_layout.LANES + 3, i)
         assert differing(whole, members.run(which, engine="lanes"), which) == []
@@ -112,7 +112,7 @@ def test_other_strobes_and_times_change_nothing(members: Members, whole: Ensembl
 def test_nothing_is_read_that_was_not_written(
     members: Members, whole: EnsembleResult, monkeypatch: pytest.MonkeyPatch, waste: Any
 ) -> None:
-    """Working space full of anything: stale numbers of other members would be no worse."""
+    """Arbitrary contents of the working space, such as stale numbers of other members, have no effect."""
     rng = np.random.default_rng(5)
 
     class Full:
@@ -143,7 +143,7 @@ def test_nothing_is_read_that_was_not_written(
 
 
 def test_one_hammer_and_waveform_for_all_is_one_of_many(members: Members, whole: EnsembleResult) -> None:
-    """The quicker way for uniform ensembles gives the bits of the general one."""
+    """The faster code for uniform ensembles gives bit-identical results."""
     for hammer in {id(h): h for h in members.hammers}.values():
         which = np.array([i for i, h in enumerate(members.hammers) if h is hammer])
         # Same scales as well, which the speed at the start is part of.
@@ -154,7 +154,7 @@ def test_one_hammer_and_waveform_for_all_is_one_of_many(members: Members, whole:
 
 
 def assert_no_gaps(result: EnsembleResult) -> None:
-    """Whatever became of a member, there is a number up to where it came, and none beyond."""
+    """Check that results are finite up to the time that a member reached, and NaN beyond."""
     assert np.isfinite(result.reached).all()
     assert result.x is not None
     np.testing.assert_array_equal(np.isnan(result.x), result.reached[:, np.newaxis] < TIMES)
@@ -177,7 +177,7 @@ def test_there_are_no_gaps(members: Members, engine: Any, tolerance: float) -> N
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10, 18))
 def test_thousands_of_members(seed: int) -> None:
-    """Other members, more hammers, more that leave the lanes: halves in any order, in two threads."""
+    """Thousands of other members, many of which leave the lanes: halves in any order, in two threads."""
     some = Members(seed, 500, kinds=12, strange=seed % 4)
     for tolerance in (2e-11, DISPLAY_TOLERANCE):
         whole = some.run(engine="lanes", threads=1, tolerance=tolerance)
@@ -190,7 +190,7 @@ def test_thousands_of_members(seed: int) -> None:
 
 @pytest.mark.slow
 def test_the_company_of_other_waveforms_changes_nothing() -> None:
-    """Each kind of waveform has a kernel of its own, in whatever ensemble."""
+    """Each kind of waveform has a separate kernel, in every ensemble."""
     some = Members(2, 70)
     shapes = hammers.waveforms(1.2, "current")
     for i, name in enumerate(shapes):

@@ -84,7 +84,7 @@ def test_log() -> None:
 
 @pytest.mark.parametrize("y", [0.5, 1.5, 2.7, 3.7, 11.0, -8.3, -1.0])
 def test_pow(y: float) -> None:
-    """The rounding of y log(x) is all that the power adds to the errors of exp and log."""
+    """The error of the power is that of exp and log, plus the rounding of y log(x)."""
     x = np.concatenate([10.0 ** rng(3).uniform(-12.0, 2.0, 3001), near_one(1000, 4)])
     truth = exact(lambda base: mpmath.power(base, mpmath.mpf(y)), x)
     allowed = 3.0 * ULP * (1.0 + np.abs(y * np.log(x)))

@@ -1,4 +1,4 @@
-"""When a member leaves the lanes because its steps do not get on."""
+"""Tests of members that leave the lanes because their steps make no progress."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The search inside one step: no crossing of the quintic is overlooked, roots lie in their brackets."""
+"""Event search in one step: no crossing of the quintic is missed, and roots lie in their brackets."""
 
 import numpy as np
 from hypothesis import assume, given, settings

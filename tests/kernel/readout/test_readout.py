@@ -1,4 +1,4 @@
-"""What is read out of runs: curves, contacts and dots, codes of maps, printed lines, strobe sections."""
+"""Readout of runs: curves, contacts and dots, codes of maps, printed lines, strobe sections."""
 
 import dataclasses
 import math

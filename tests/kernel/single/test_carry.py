@@ -1,4 +1,4 @@
-"""Runs that pause and go on, and members run in stretches, are to the bit what they are in one go."""
+"""Paused and resumed runs, and members run in segments, are bit-identical to uninterrupted runs."""
 
 import math
 from collections.abc import Iterator
@@ -51,7 +51,7 @@ def stretches(problem: Problem, end: float, pause_after: float) -> Iterator[tupl
 
 
 def paused(problem: Problem, end: float, pause_after: float) -> tuple[Record, int, int]:
-    """The record of a run that pauses, and the numbers of pauses and of contacts open at one."""
+    """Return the record of a run that pauses, and the numbers of pauses and of contacts open at a pause."""
     nodes: list[Any] = []
     contacts: list[Any] = []
     pauses = opened = before = total = 0

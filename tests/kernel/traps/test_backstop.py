@@ -1,4 +1,4 @@
-"""What once hung or corrupted a kernel at the backstop: each trap by name."""
+"""Regression tests at the backstop: cases in which an earlier kernel hung or was wrong."""
 
 import math
 
@@ -18,7 +18,7 @@ PULL = 1e4
 
 
 def edges_at(*times: float) -> ph.PulseTrain:
-    """A drive that does nothing but have edges."""
+    """Return a drive without force that has edges at given times."""
     waveform = Rectangle(amplitude=0.0, width=2e-5, rise=0.0, decay=0.0, quantity="force")
     return ph.PulseTrain(waveform, at=list(times))
 
@@ -153,7 +153,7 @@ def test_edges_inside_a_regularised_step() -> None:
 
 @pytest.mark.parametrize("width", [1e-9, 1e-12, 1e-15])
 def test_very_short_pulses_inside_the_backstop(width: float) -> None:
-    """A kick far shorter than any step, a quarter of a metre a second strong."""
+    """A pulse much shorter than any step changes the velocity by a quarter of a metre per second."""
     impulse = 0.25 * MASS
     waveform = Rectangle(amplitude=impulse / width, width=width, rise=0.0, decay=0.0, quantity="force")
     drive = ph.PulseTrain(waveform, at=[1.5e-5])

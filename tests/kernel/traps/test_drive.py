@@ -1,4 +1,4 @@
-"""Edges of the drive, restarts, large currents, ends of a run: what once hung or corrupted a kernel."""
+"""Regression tests for edges of the drive, restarts, large currents and ends of a run."""
 
 import math
 
@@ -24,7 +24,7 @@ def run(drive: ph.PulseTrain, duration: float = 1.5e-3) -> ph.Motion:
 
 
 def check_record(motion: ph.Motion) -> None:
-    """What holds for the record of every run: nothing is located outside its step."""
+    """Check the record of a run: every event lies inside its step."""
     hammer, end = motion.hammer, motion.end
     times = motion.step_times
     assert (np.diff(times) >= 0.0).all()
@@ -65,7 +65,7 @@ def test_one_pulse_that_begins_where_another_ends(ulps: int) -> None:
 )
 @pytest.mark.parametrize("ulps", [-1, 0, 1])
 def test_an_edge_at_the_very_instant_of_a_switch(which: str, ulps: int) -> None:
-    """An edge that does nothing, on a switch or an ulp beside it, changes nothing."""
+    """An edge without a jump, at a switch or an ulp away from a switch, has no effect."""
     state = STOP, 2.0
     thrown = ph.simulate(hammers.shelf(), ph.PulseTrain(nothing()), duration=1e-3, state=state)
     surface, when = which.split()
@@ -192,7 +192,7 @@ def switches(motion: ph.Motion) -> list[tuple[str, float]]:
     "hammer", ["current", "force", "rigid", pytest.param("dashpot", marks=pytest.mark.slow)]
 )
 def test_a_run_restarted_exactly_on_a_switch_goes_on(hammer: str) -> None:
-    """Cut at each switch and at each edge, and started again from the state there, the motion is the same."""
+    """A run restarted from its state at each switch and each edge gives the same motion."""
     end = 1.9e-3
     if hammer == "current":
         subject = hammers.crude()

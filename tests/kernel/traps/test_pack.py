@@ -1,4 +1,4 @@
-"""What once hung or corrupted a kernel, in flight and in the pack: each trap by name.
+"""Regression tests in flight and in the pack: cases in which an earlier kernel hung or was wrong.
 
 The armature flies under a constant force, so that a free step is as long as the kernel dares and the flight
 is known in closed form; where contacts decide, the reference is the judge.
@@ -22,7 +22,7 @@ PULL = 1e4
 
 
 def edges_at(*times: float) -> ph.PulseTrain:
-    """A drive that does nothing but have edges."""
+    """Return a drive without force that has edges at given times."""
     waveform = Rectangle(amplitude=0.0, width=2e-5, rise=0.0, decay=0.0, quantity="force")
     return ph.PulseTrain(waveform, at=list(times))
 
@@ -65,7 +65,7 @@ def test_a_near_miss_is_no_contact(gap: float, edge: float) -> None:
 
 
 def test_a_tangential_touch_ends() -> None:
-    """The apex lies on the front as far as arithmetic can tell: either verdict is right, a hang is not."""
+    """The apex lies on the front to rounding: a touch and a miss are both right, but the run must end."""
     for ulps in range(-3, 4):
         x, v = thrown(0.0)
         motion = ph.simulate(

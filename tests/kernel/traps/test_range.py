@@ -1,4 +1,4 @@
-"""Where a force law ends, the run ends: exactly there, with a name, however short the visit beyond."""
+"""A run ends exactly where a force law ends, with a status, however short the excursion beyond."""
 
 import math
 from pathlib import Path
@@ -45,7 +45,7 @@ def test_a_short_visit_beyond_the_range_is_not_overlooked(over: float) -> None:
 
 
 def test_a_current_outside_a_table_is_a_status(tmp_path: Path) -> None:
-    """Beyond its currents a table is NaN: named, at once, and not tried for ever."""
+    """Outside its currents a table is NaN: the run ends at once with a status."""
     hammer = hammers.made_of(
         magnet=hammers.magnet_table(tmp_path),
         spring=hammers.SPRINGS["linear"],

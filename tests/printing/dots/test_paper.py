@@ -1,4 +1,4 @@
-"""Paper that varies along the line: as stated, without influence where it does not vary, felt dot by dot."""
+"""Paper that varies along the line: statistics as stated, no effect without variation, effect on each dot."""
 
 from pathlib import Path
 

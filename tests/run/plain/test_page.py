@@ -1,4 +1,4 @@
-"""What a page computes before a run: machine code of the entry points against the problem of Python."""
+"""Preparation of a run by a page: machine code of the entry points, compared with `Problem`."""
 
 import math
 
@@ -20,7 +20,7 @@ ROLES = ("body", "damping", "spring", "pack", "backstop", "coil", "magnet")
 
 
 def drive_of(hammer: Hammer) -> Drive:
-    """The drive of a device by its own pulse, of an oscillator by a force."""
+    """Return the drive of a device: its pulse, or for an oscillator a sinusoidal force."""
     return ph.PulseTrain(hammer.waveform, rate=20.0, pulses=3) if hammer.waveform else ph.SineForce(0.3, 0.2)
 
 

@@ -1,4 +1,4 @@
-"""What is said of columns beside a table: factors, offsets, delays, even samples."""
+"""Declarations of columns in a file beside a table: factors, offsets, delays, evenly spaced samples."""
 
 import re
 from pathlib import Path

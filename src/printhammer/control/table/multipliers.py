@@ -96,6 +96,6 @@ def repetition(history: Sequence[int], reach: int) -> tuple[int, ...]:
 
 
 def _row(gaps: Sequence[int]) -> tuple[int, ...]:
-    """Return the slots of a row that repeats a gap sequence, with the length for `row_multipliers`."""
+    """Return the slots of a row that repeats a gap sequence, as long as `row_multipliers` requires."""
     dots = FIRING + MORE * len(gaps)
     return tuple(accumulate(islice(cycle(gaps), dots - 1), initial=0))

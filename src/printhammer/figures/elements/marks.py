@@ -299,7 +299,7 @@ def drive_strip(
 ) -> None:
     """Draw the drive currents, or forces, of motions in the slim strip below a panel.
 
-    `times`, s, and `colours` have one entry per motion. A motion driven by a force is skipped if the first
+    `times` [s] and `colours` have one entry per motion. A motion driven by a force is skipped if the first
     motion is driven by a current, and vice versa.
     """
     quantity = motions[0].driven

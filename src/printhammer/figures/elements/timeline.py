@@ -93,10 +93,9 @@ def timeline(
 
 
 def between_surfaces(ax: Axes, hammer: Hammer, motion: Motion, above: float) -> float:
-    """Draw displacement, µm, against time, ms, between tinted pack and backstop; return the margin, µm.
+    """Draw displacement [µm] against time [ms], with pack and backstop tinted; return the lower margin, µm.
 
-    The margin below the motion is 8 % of its range; `above` is the margin above, as a multiple of the margin
-    below.
+    The lower margin is 8 % of the range of the motion; `above` is the ratio of upper to lower margin.
     """
     ms, um = scale("time").factor, scale("displacement").factor
     assert hammer.front is not None

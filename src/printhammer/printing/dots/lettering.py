@@ -40,7 +40,7 @@ _DOT: Final = "#"
 
 @cache
 def glyphs() -> Mapping[str, BoolArray]:
-    """Return the dots of each built-in character, shape (9, 6): wires from the top, columns."""
+    """Return the dots of each built-in character, shape (wires, columns) = (9, 6), top wire first."""
     text = (files("printhammer.printing.dots") / "fonts" / "nine-wire.txt").read_text("utf-8")
     drawn = {" ": np.zeros((WIRES, ADVANCE), np.bool_)}
     # Blank lines separate the groups; the first group describes the file.
