@@ -1,6 +1,6 @@
-"""Ensembles of many different members, and all of their results side by side.
+"""Ensembles of many different members, and results of two ensembles compared.
 
-Helpers only; the tests that use them say what must hold.
+Helpers only; assertions are in the tests that use them.
 """
 
 from typing import Any
@@ -20,7 +20,7 @@ TIMES = np.linspace(0.0, 7e-3, 600)
 class Members:
     """Members of an ensemble, stored one by one, so that any subset can be run.
 
-    The first `strange` members of ten are such as the lanes are not for: they start in the pack, on a
+    The first `strange` members of ten are unsuitable for lanes: they start in the pack, on a
     surface, or fast. The range of the last hammer's magnet ends within reach.
     """
 
@@ -49,7 +49,7 @@ class Members:
             self.strobes.append(np.sort(rng.uniform(0.0, 7e-3, int(rng.integers(0, 12)))))
 
     def ensemble(self, which: Any = None, **options: Any) -> Ensemble:
-        """The ensemble of these members, or of some."""
+        """Build the ensemble of all members, or of some members."""
         chosen = range(len(self.hammers)) if which is None else which
         return Ensemble(
             [self.hammers[i] for i in chosen],
@@ -83,9 +83,9 @@ def rows(result: EnsembleResult, i: int) -> dict[str, npt.NDArray[Any]]:
 def differing(
     one: EnsembleResult, other: EnsembleResult, which: Any = None, skip: tuple[str, ...] = ()
 ) -> list[Any]:
-    """Members, with the names of the results, that are not the same bit for bit.
+    """Return the members, with the names of the results, that are not bit-identical.
 
-    Member i of `other` is member which[i] of `one`; results that one of the two lacks do not count.
+    Member i of `other` is member which[i] of `one`; results that one of the two lacks are ignored.
     """
     found = []
     for i in range(len(other.status)):

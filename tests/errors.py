@@ -1,4 +1,4 @@
-"""The check of errors by their fields, so that no test depends on the wording of a message."""
+"""Check of errors by their fields, so that no test depends on the wording of a message."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,10 +17,10 @@ ANY: Final = object()
 def refused(
     key: str | None, value: object = ANY, *, file: str | Path | None = None
 ) -> Iterator[pytest.ExceptionInfo[InputError]]:
-    """Expect an `InputError` of one sentence with this key; value and file are checked where given.
+    """Expect an `InputError` of one sentence with this key, and with this value and file if given.
 
-    The key is None for a fault of a whole file, or of a value that has no key; `file` is the path or the
-    end of one, and may be followed by a line or a column.
+    The key is None for a fault of a whole file, or for a value without a key; `file` is the path or the
+    end of a path, and may be followed by a line or a column.
     """
     with pytest.raises(InputError) as caught:
         yield caught

@@ -1,6 +1,6 @@
 """Hammers and drives for tests, and the deviation of a motion from the reference.
 
-Helpers only; the tests that use them say what must hold.
+Helpers only; assertions are in the tests that use them.
 """
 
 import dataclasses
@@ -68,17 +68,17 @@ BACKSTOPS: dict[str, Part | None] = {
 
 
 def made_of(mass: float = MASS, **parts: Part | dict[str, str] | None) -> ph.Hammer:
-    """A hammer of these parts and no others."""
+    """A hammer with these parts only."""
     return ph.Hammer.build(mass, **{role: part for role, part in parts.items() if part is not None})
 
 
 def hertz(stiffness: float = 1.156e9, damping: float = 0.0, position: float = STOP) -> HertzBackstop:
-    """A backstop after equations (6) and (7)."""
+    """A backstop of equations (6) and (7)."""
     return HertzBackstop(position=position, stiffness=stiffness, damping=damping)
 
 
 def power(stiffness: float = 259.0, front: float = FRONT, thickness: float = THICKNESS) -> PowerPack:
-    """A pack after equation (5)."""
+    """A pack of equation (5)."""
     return PowerPack(stiffness=stiffness, front=front, thickness=thickness)
 
 
@@ -88,7 +88,7 @@ def rigid(restitution: float, position: float = STOP) -> RigidBackstop:
 
 
 def preload(force: float, stiffness: float = 0.0) -> PreloadSpring:
-    """A spring that pushes with `force` at the backstop."""
+    """A spring that exerts `force` at the backstop."""
     return PreloadSpring(preload=force, stiffness=stiffness)
 
 
@@ -98,7 +98,7 @@ def shelf(force: float = -4.0, mass: float = MASS) -> ph.Hammer:
 
 
 def idle(quantity: str = "force") -> ph.PulseTrain:
-    """A drive that fires once and does nothing."""
+    """A drive that fires once, with no effect."""
     return ph.PulseTrain(Rectangle(amplitude=0.0, width=1e-6, rise=0.0, decay=0.0, quantity=quantity))
 
 
@@ -125,7 +125,7 @@ def waveforms(amplitude: float, quantity: str) -> dict[str, Waveform]:
 
 
 def drives(quantity: str) -> dict[str, ph.PulseTrain | ph.SineForce]:
-    """One drive of every kind: currents that lift the armature off any backstop, or forces of that size."""
+    """One drive of every kind: currents that lift the armature off any backstop, or comparable forces."""
     amplitude = 1.2 if quantity == "current" else 14.0
     shapes = waveforms(amplitude, quantity)
     found: dict[str, ph.PulseTrain | ph.SineForce] = {
@@ -157,7 +157,7 @@ def _crude() -> ph.Hammer:
 
 @dataclasses.dataclass
 class Draw:
-    """Hammers drawn about the crude one; `redrawn` counts those that were refused or warned about."""
+    """Hammers drawn around the crude hammer; `redrawn` counts the rejected draws."""
 
     rng: np.random.Generator
     spread: float = 0.2
@@ -165,7 +165,7 @@ class Draw:
     redrawn: int = 0
 
     def __call__(self) -> ph.Hammer:
-        """Draw until a hammer passes its own check without a warning."""
+        """Draw until a hammer passes its own validation without a warning."""
         constants = crude().constants
         ends = math.log(1.0 - self.spread), math.log(1.0 + self.spread)
         while True:
@@ -184,7 +184,7 @@ class Draw:
 
 @dataclasses.dataclass(frozen=True)
 class Comparison:
-    """A motion beside the reference, up to the horizon.
+    """A motion and its reference, up to the horizon.
 
     Attributes
     ----------
@@ -193,7 +193,7 @@ class Comparison:
     error : float
         Largest difference of the displacements up to the horizon, in units of `scale`.
     horizon : float
-        Time up to which the comparison means something, s.
+        Time up to which the comparison is meaningful, s.
     """
 
     motion: ph.Motion
@@ -202,9 +202,9 @@ class Comparison:
     horizon: float
 
     def touches(self, surface: str) -> tuple[list[float], list[float]]:
-        """Return the times of all touches before the horizon, of the motion and of the reference, s.
+        """Return the times of all touches before the horizon, of motion and reference, s.
 
-        The last bounces on a rigid backstop, below 0.1 mm/s, are left out: both stop counting somewhere.
+        The last bounces on a rigid backstop, below 0.1 mm/s, are omitted, since both stop counting there.
         """
         mine = [
             c.t_in
@@ -233,11 +233,11 @@ def compare(
     points: int = 401,
     **options: Any,
 ) -> Comparison:
-    """Run kernel and reference side by side.
+    """Run kernel and reference on the same problem.
 
-    The horizon is where references of tolerances 1e-12 and 1e-13 part by 1e-10 of the scale. Where these are
-    all but exact, as between rigid walls, it tells nothing: `sensitive` moves the start by 1e-12 of the scale
-    instead, so that errors have grown a hundredfold at the horizon. `whole` compares to the end in any case.
+    At the horizon, references of tolerances 1e-12 and 1e-13 differ by 1e-10 of the scale. If the references
+    are nearly exact, as between rigid walls, `sensitive` perturbs the start by 1e-12 of the scale
+    instead, so that errors have grown a hundredfold at the horizon. `whole` always compares to the end.
     """
     times = np.linspace(0.0, duration, points)
     motion = ph.simulate(hammer, drive, duration=duration, times=times, state=state, **options)
@@ -265,9 +265,9 @@ def compare(
 
 @contextmanager
 def interpreted() -> Iterator[None]:
-    """Run the kernel as plain Python: slow steps, but nothing to compile for a combination of laws.
+    """Run the kernel as interpreted Python: slow steps, but no compilation for a combination of laws.
 
-    The functions are the same, source for source; only the machine code is not.
+    The source code of the functions is the same as for machine code.
     """
     # A module that is first imported in here would keep the plain kernels for good.
     for module in ("kernel.compile.lanes", "run.ahead"):

@@ -1,8 +1,8 @@
-"""Planar maps with two parameters in place of the strobe map. Helpers only.
+"""Planar maps with two parameters that replace the strobe map. Helpers only.
 
-The maps are those of textbooks, whose bifurcations are known in closed form. The force amplitude of a
-regime, less `SHIFT`, stands for the first parameter and the preload of its spring for the second, so that the
-curves are followed by the program as they would be for a hammer, but without a run.
+The maps are textbook maps whose bifurcations are known in closed form. The force amplitude of a
+regime, minus `SHIFT`, is the first parameter and the preload of its spring the second, so that the
+program follows the curves as for a hammer, but without a run.
 """
 
 from collections.abc import Callable, Iterator
@@ -74,7 +74,7 @@ BOTH = Map(
 
 
 def seen_through(known: Map, matrix: npt.ArrayLike, axes: npt.ArrayLike) -> Map:
-    """Return a map after a change of the coordinates of the state, and of those of the parameters."""
+    """Return a map after changes of the coordinates of state and parameters."""
     turn, mixed = np.asarray(matrix, np.float64), np.asarray(axes, np.float64)
     back = np.linalg.inv(turn)
     return Map(
@@ -84,13 +84,13 @@ def seen_through(known: Map, matrix: npt.ArrayLike, axes: npt.ArrayLike) -> Map:
 
 
 def regime() -> Regime:
-    """An oscillator whose force amplitude and preload stand for two parameters, both 0."""
+    """An oscillator whose force amplitude and preload represent two parameters, both 0."""
     hammer = ph.Hammer.build(1.0, spring={"law": "preload", "preload": 0.0, "stiffness": 1.0})
     return Regime.of(hammer, drive=ph.SineForce(SHIFT, 1.0))
 
 
 def plane(p: tuple[float, float], r: tuple[float, float], firings: int = 1) -> Plane:
-    """The plane of both parameters within bounds."""
+    """Bounds of the plane of both parameters."""
     return Plane(regime(), NAMES, ((p[0] + SHIFT, p[1] + SHIFT), r), firings, 1e-11)
 
 

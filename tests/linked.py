@@ -1,4 +1,4 @@
-"""The kernel linked from modules beside the kernel that is lowered together with its laws.
+"""The kernel linked from modules against the kernel that is lowered together with its laws.
 
 `python -m tests.linked 50` compares random combinations of shipped laws, and prints the largest differences.
 """

@@ -1,4 +1,4 @@
-"""Tables of measurements for tests, by formulas written down here once more."""
+"""Measurement tables for tests, from formulas that are independent of the package."""
 
 from collections.abc import Mapping
 from functools import cache

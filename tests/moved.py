@@ -1,6 +1,6 @@
 """Finite differences of whole runs with respect to constants, for comparison with the tangent flow.
 
-Helpers only; the tests that use them say what must hold.
+Helpers only; assertions are in the tests that use them.
 """
 
 from collections.abc import Iterable
@@ -50,7 +50,7 @@ def moved(hammer: ph.Hammer, drive: Any, name: str, value: float) -> tuple[ph.Ha
 def far_off(
     hammer: ph.Hammer, drive: Any, names: Iterable[str], end: float, state: tuple[float, float]
 ) -> list[str]:
-    """Constants whose flow no differences of runs, with steps of several sizes, come within `WANTED` of."""
+    """Return the constants whose flow deviates from all differences of runs by more than `WANTED`."""
     found = constant_map(hammer, drive, 0.0, end, list(names), state=state, tolerance=SHARP)
     assert found.ok
     assert found.smooth
@@ -74,7 +74,7 @@ def _deviation(
     size: float,
     levels: int,
 ) -> float:
-    """Difference between the flow of a constant and differences of runs, over the norm of the latter."""
+    """Relative difference between the flow of a constant and differences of runs."""
     (parameter,) = parameters(hammer, drive, [name])
     scales = Problem(hammer, drive, state, 0.0, SHARP).scales
     units = np.array([scales[0], scales[1], scales[0]])
@@ -111,7 +111,7 @@ def quantity_differences(
     levels: int = 3,
     typical: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Changes of all quantities with ``value / scale`` of a constant, extrapolated after Richardson."""
+    """Changes of all quantities with ``value / scale`` of a constant, by Richardson extrapolation."""
     (parameter,) = parameters(hammer, drive, [name])
     typical = np.abs(quantities(hammer, drive, duration, state) if typical is None else typical)
     units = np.where(np.isfinite(typical) & (typical > 0.0), typical, 1.0)

@@ -1,4 +1,4 @@
-"""One small result of every class, by the name of the class."""
+"""One small result of every class, by class name."""
 
 from collections.abc import Callable
 from functools import cache

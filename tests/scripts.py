@@ -19,9 +19,9 @@ EXAMPLES = ROOT / "examples"
 
 
 def run_here(script: Path, folder: Path, patch: pytest.MonkeyPatch) -> None:
-    """Run a script in a folder as the main program of this process, and undo what it leaves behind.
+    """Run a script in a folder as the main program of this process, and undo its side effects.
 
-    An interpreter of its own takes three seconds to import the package. The traceback of an error names the
+    A separate interpreter takes three seconds to import the package. The traceback of an error names the
     script and the line.
     """
     parts, loaded, style = dict(PARTS), set(sys.modules), mpl.rcParams.copy()
@@ -45,7 +45,7 @@ def run_here(script: Path, folder: Path, patch: pytest.MonkeyPatch) -> None:
 
 
 def run_apart(script: Path, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Run a script in a folder with an interpreter of its own, in which warnings are errors."""
+    """Run a script in a folder with a separate interpreter, in which warnings are errors."""
     path = f"{ROOT}{os.pathsep}{EXAMPLES}"
     done = subprocess.run(
         [sys.executable, "-W", "error", str(script)],

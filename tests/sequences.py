@@ -1,4 +1,4 @@
-"""Waveforms and firing times drawn at random, for sequences of pulses that differ; used by several tests."""
+"""Random waveforms and firing times for sequences of different pulses; used by several tests."""
 
 from typing import cast
 
@@ -15,7 +15,7 @@ offsets = st.floats(0.0, 1e-3)
 
 
 def chain(parts: list[Waveform], gaps: list[float]) -> Chain:
-    """Put waveforms one after the other, each so long after the end of the one before."""
+    """Arrange waveforms in succession, each a given time after the end of the preceding one."""
     placed: list[tuple[float, Waveform]] = []
     end = 0.0
     for part, gap in zip(parts, gaps, strict=False):

@@ -16,6 +16,6 @@ def strobe_map(
     tolerance: float = MAP_TOLERANCE,
     contacts: bool = True,
 ) -> Image:
-    """Return the image of a state under the strobe map, iterated, at the phase of the regime or another."""
+    """Return the image of a state under the iterated strobe map, at a phase (default: of the regime)."""
     start = np.asarray(state, dtype=np.float64)
     return image_of(Regime.of(regime, phase=phase), start, firings, tolerance, contacts=contacts)

@@ -1,6 +1,6 @@
 """Derivatives of the motion by finite differences, for comparison with the tangent flow.
 
-Helpers only; the tests that use them say what must hold.
+Helpers only; assertions are in the tests that use them.
 """
 
 from typing import Any

@@ -1,4 +1,4 @@
-"""The documentation: what it names exists, it builds without a warning, it fetches nothing from elsewhere."""
+"""The documentation: its names exist, it builds without warnings, it fetches nothing from elsewhere."""
 
 import os
 import re
@@ -139,7 +139,7 @@ def test_the_code_in_the_readme_passes_mypy(tmp_path: Path) -> None:
 
 
 class Requests(HTMLParser):
-    """Collects what a page makes a browser fetch: scripts, styles, images, fonts, frames."""
+    """Parser that collects the resources of a page: scripts, styles, images, fonts, frames."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""The commands on the pages: each can be read, and those of the tutorials run from an empty folder."""
+"""The commands on the pages: each command parses, and the tutorials run from an empty folder."""
 
 import os
 import re
@@ -50,7 +50,7 @@ def test_the_commands_on_a_page_can_be_read(page: Path) -> None:
 
 @pytest.mark.slow
 def test_the_commands_of_a_tutorial_run_in_a_shell(tmp_path: Path) -> None:
-    """Those of the other tutorials run in one process, in tests/cli/test_page_commands.py."""
+    """The commands of the other tutorials run in one process, in tests/cli/test_page_commands.py."""
     page = ROOT / "docs" / "tutorials" / "developer.md"
     done = subprocess.run(
         ["sh", "-ec", "".join(SHELL.findall(page.read_text("utf-8")))],

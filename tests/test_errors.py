@@ -1,4 +1,4 @@
-"""The fields of errors: composed, located, and kept from one process to another."""
+"""The fields of errors: composed, located, and preserved between processes."""
 
 import pickle
 

@@ -1,4 +1,4 @@
-"""Every script of the gallery runs on its own, without a warning, and only on the public names."""
+"""Every script of the gallery runs by itself, without warnings, with public names only."""
 
 import ast
 import runpy

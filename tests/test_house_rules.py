@@ -1,4 +1,4 @@
-"""Rules about the files of the repository that no linter knows."""
+"""Rules for the files of the repository that no linter checks."""
 
 import re
 import subprocess

@@ -1,4 +1,4 @@
-"""Measured tables of the pages: made by scripts, shown by pages, stale when code or hammer has changed."""
+"""Measured tables of the pages: written by scripts, shown by pages, stale if code or hammer has changed."""
 
 import ast
 import functools
@@ -56,7 +56,7 @@ def pages() -> dict[str, list[tuple[str, str]]]:
 
 @functools.cache
 def imported(path: Path) -> set[str]:
-    """Return what a file imports of the package, the oracle or a study when it runs, as paths of rooms."""
+    """Return the imports of a file from the package, the oracle or a study, as paths of rooms."""
     tree = ast.parse(path.read_text("utf-8"))
     for_types = {
         id(inner)

@@ -1,4 +1,4 @@
-"""The program with several versions of numba and llvmlite: those of the interpreters in PRINTHAMMER_PYTHONS.
+"""The program with several versions of numba and llvmlite, in the interpreters of PRINTHAMMER_PYTHONS.
 
 `make test-numba` names an environment with the oldest numba that is allowed and one with the newest, with one
 wheel installed in both; without the variable the tests use the interpreter that runs them.

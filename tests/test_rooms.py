@@ -1,4 +1,4 @@
-"""Rooms: how the modules of the package are laid out in folders, and that no imports run in a circle."""
+"""Rooms: the layout of the package's modules in folders, and the absence of import cycles."""
 
 import ast
 import re
@@ -28,7 +28,7 @@ MODULES = {dotted(path): path for path in PACKAGE.rglob("*.py")}
 
 
 def imported(tree: ast.AST) -> Iterator[str]:
-    """Yield what a module imports: at its top, in functions, for types only, by name in `import_module`."""
+    """Yield the imports of a module: at its top, in functions, for types only, by name in `import_module`."""
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and node.module and not node.level:
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
@@ -181,7 +181,7 @@ ORACLE = Path(__file__).parent / "oracle"
 
 @pytest.mark.parametrize("path", sorted(ORACLE.glob("*.py")), ids=lambda path: path.stem)
 def test_the_oracle_shares_no_code_with_the_package(path: Path) -> None:
-    """Types of arguments aside, the oracle knows arrays and numbers only."""
+    """Apart from types of arguments, the oracle uses arrays and numbers only."""
     names = {name.partition(".")[0] for name in imported(ast.parse(path.read_text(encoding="utf-8")))}
     allowed = sys.stdlib_module_names | {"numba", "numpy", "scipy", "tests"}
     assert names <= allowed

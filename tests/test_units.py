@@ -1,4 +1,4 @@
-"""Units: accepted notation, exact conversion, refusals of one sentence."""
+"""Units: accepted notation, exact conversion, errors of one sentence."""
 
 import math
 import string

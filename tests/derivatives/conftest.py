@@ -1,3 +1,3 @@
-"""A kernel that hangs must fail a test here too."""
+"""A kernel that hangs must fail a test in this folder too."""
 
 from tests.kernel.conftest import _few_steps  # noqa: F401

@@ -75,7 +75,7 @@ def test_random_oscillators_that_stick() -> None:
 
 
 def test_random_hammers_that_strike_a_pack_under_friction() -> None:
-    """A pack with memory; a rest on its unloading branch is not differentiated, and says so."""
+    """A pack with memory; a rest on its unloading branch has no derivative, and is reported."""
     rng = np.random.default_rng(7)
     pack = {"law": "power", "stiffness": 184.0, "front": 1e-3, "thickness": 178e-6}
     compared = sticks = 0
@@ -108,7 +108,7 @@ def test_random_hammers_that_strike_a_pack_under_friction() -> None:
 
 
 def test_exponents_of_a_periodic_motion_that_sticks() -> None:
-    """A motion that sticks once in a cycle forgets its velocity: one multiplier is 0."""
+    """A motion that sticks once per cycle forgets its velocity: one multiplier is 0."""
     wave = {"shape": "half-sine", "amplitude": "3 N", "width": 1.5}
     hammer = oscillator(0.3, 0.5).replace("waveform", wave)
     found = ph.lyapunov(hammer, rate=0.05, state=(0.0, 0.0), firings=40, transient=10)
@@ -122,7 +122,7 @@ STEPS = ((1, 8.0), (-1, -8.0), (2, -1.0), (-2, 1.0))
 
 
 def plunger(rng: np.random.Generator, kind: str) -> tuple[ph.Hammer, float]:
-    """Plunger in a tube, and the time between its pulses: between stops, or without a backstop."""
+    """A plunger in a tube, and the time between its pulses: between stops, or without a backstop."""
     kinetic = float(rng.uniform(0.05, 0.2))
     friction = {"law": "friction", "kinetic": kinetic, "static": kinetic * float(rng.uniform(1.2, 2.0))}
     parts: dict[str, object] = {
@@ -188,7 +188,7 @@ def test_sensitivities_follow_stops_and_releases(kind: str) -> None:
 
 
 def test_an_edge_that_ends_a_rest_on_a_stop_takes_the_motion_along() -> None:
-    """Without friction: the same dot from rest at any time, so that the time between pulses has no effect."""
+    """Without friction, a dot from rest is the same at any time; the time between pulses has no effect."""
     sharp = {"shape": "rectangle", "amplitude": "3 N", "width": 0.5e-3, "rise": 0.0, "decay": 0.0}
     hammer = ph.Hammer.build(1e-3).replace(
         {

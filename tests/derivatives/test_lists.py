@@ -1,4 +1,4 @@
-"""Derivatives through the kinks of further contacts against differences of runs."""
+"""Derivatives through the kinks of list contacts against differences of runs."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ STEPS = ((1, 8.0), (-1, -8.0), (2, -1.0), (-2, 1.0))
 
 
 def relay(law: str, stiffness: float, damping: float | None = None) -> ph.Hammer:
-    """Armature with a contact on its way to the pole, and one that ends behind the start."""
+    """Armature with a contact between rest position and pole, and another contact behind the start."""
     hammer = ph.Hammer.build(1e-3).replace(
         {
             "spring": {"law": "preload", "preload": -0.5, "stiffness": 100.0},
@@ -43,7 +43,7 @@ UNDAMPED = pytest.param(None, marks=pytest.mark.slow)
 def test_sensitivities_follow_the_contacts(
     law: str, stiffness: float, within: float, damping: float | None
 ) -> None:
-    """The columns of a run take its steps, which at the touch of a Hertz contact are less accurate."""
+    """The columns use the steps of the run, which are less accurate at the touch of a Hertz contact."""
     hammer = relay(law, stiffness, damping)
     result = ph.sensitivities(hammer, ph.PulseTrain(hammer.waveform, period=3e-3, pulses=2), tolerance=1e-13)
     assert result.ok
@@ -71,7 +71,7 @@ LOST = ("pack_loss", "damping_loss")
 
 
 def between_stops(damping: float | None = None) -> ph.Hammer:
-    """Armature with damping between two rigid stops, with a contact on its way to the front."""
+    """Armature with damping between two rigid stops, with a contact in front of the front stop."""
     hammer = relay("linear", 3e3, damping).replace("damping", {"law": "viscous", "coefficient": 0.05})
     return hammer.replace("pack", {"law": "rigid", "front": 0.5e-3, "restitution": 0.4})
 

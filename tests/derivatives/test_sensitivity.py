@@ -50,7 +50,7 @@ def test_the_constants_are_those_of_the_file_and_the_pulse(
 
 
 def test_a_column_does_not_depend_on_the_others(hammer: "ph.Hammer", single: Sensitivities) -> None:
-    """To the bit."""
+    """Bit-identical."""
     for name in ("pack.front", "waveform.rise"):
         alone = ph.sensitivities(hammer, single.drive, constants=[name])
         column = single.constants.index(name)
@@ -145,7 +145,7 @@ def test_spreads_add_up(single: Sensitivities) -> None:
 
 @pytest.mark.slow
 def test_a_spread_is_that_of_drawn_hammers(hammer: "ph.Hammer", single: Sensitivities) -> None:
-    """Of 400 hammers drawn within small tolerances, to the sampling error of a standard deviation, 3.5 %."""
+    """Compared with 400 hammers drawn within small tolerances; the sampling error is 3.5 %."""
     rng = np.random.default_rng(3)
     given = {"magnet.Am": 1e-4, "spring.Bs": 2e-4, "mass": 1e-3, "pack.thickness": 2e-3}
     values = dict(zip(single.constants, single.values, strict=True))

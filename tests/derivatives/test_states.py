@@ -31,7 +31,7 @@ def train(period: float, pulses: int) -> ph.PulseTrain:
     )
 )
 def test_maps_compose(times: list[float]) -> None:
-    """From a to c is from b to c after a to b, wherever b is."""
+    """The map from a to c is the product of the maps from a to b and from b to c, for any b."""
     a, b, c = sorted(times)
     drive = train(1.2e-3, 2)
     whole = tangent_map(crude(), drive, a, c, tolerance=1e-12)
@@ -62,7 +62,7 @@ def test_the_state_has_three_components_on_the_unloading_branch_only() -> None:
 
 
 def test_the_result_does_not_depend_on_stretches(monkeypatch: pytest.MonkeyPatch) -> None:
-    """To the bit: maps, growth, and a record that is too short for one contact."""
+    """Bit-identical maps and growth, even if the record is too short for one contact."""
     drive = train(1.05e-3, 12)
     whole = tangent_map(crude(), drive, 0.5e-3, 9e-3)
     growth = strobe_exponent(crude(), drive, first=2, last=12)
@@ -90,7 +90,7 @@ def test_on_a_periodic_orbit_the_exponents_are_those_of_its_multipliers(period: 
 
 
 def test_a_cycle_of_two_firings() -> None:
-    """Its multipliers are those of the map over two firings."""
+    """The multipliers are those of the map over two firings."""
     drive = train(1.35e-3, 300)
     orbit = tangent_map(crude(), drive, drive.times[297], drive.times[299])
     assert orbit.state_at_start == pytest.approx(orbit.state_at_end, rel=1e-6)
@@ -155,7 +155,7 @@ def test_a_run_that_does_not_get_there_says_so() -> None:
 
 
 def test_the_old_maximum_met_without_velocity_is_reported() -> None:
-    """Pushed by a constant force, the wire swings along the unloading curve up to its maximum for ever."""
+    """Under a constant force, the wire oscillates without end along the unloading curve up to its maximum."""
     hammer = made_of(pack=hammers.PACKS["curve"])
     push = hammers.block(14.0, 1.0)
     with hammers.interpreted():
@@ -167,7 +167,7 @@ def test_the_old_maximum_met_without_velocity_is_reported() -> None:
 
 
 def test_the_standard_error_of_an_autocorrelated_series() -> None:
-    """White noise, and an autoregressive one whose error is larger by sqrt((1 + r)/(1 - r))."""
+    """White noise, and autoregressive noise whose standard error is larger by sqrt((1 + r)/(1 - r))."""
     rng = np.random.default_rng(0)
     noise = rng.standard_normal(40_000)
     assert standard_error(noise) == pytest.approx(1.0 / math.sqrt(noise.size), rel=0.1)

@@ -112,7 +112,7 @@ def test_an_ensemble_of_trains_is_that_of_the_single_ones(count: int) -> None:
 
 
 def test_a_map_makes_no_drive_for_each_rate(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Not more with a hundred rates than with two: a few for the wait after the last firing, and for all."""
+    """A hundred rates need no more drives than two: some for the wait after the last firing, one for all."""
     hammer = ph.load("hendriks-1983")
     made: list[object] = []
     begin = ph.PulseTrain.__init__

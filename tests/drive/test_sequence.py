@@ -25,7 +25,7 @@ LONG = Trapezoid(amplitude=1.0, rise=0.0, width=2e-3, fall=0.0)
 
 
 def moments(drive: PulseSequence) -> np.ndarray:
-    """Times within, before and after a drive, all its edges among them."""
+    """Times within, before and after a drive, including all its edges."""
     rng = np.random.default_rng(1)
     every = [time + w.segments()[:, 0] for time, w in zip(drive.times.tolist(), drive.waveforms, strict=True)]
     inside = rng.uniform(-1e-4, drive.end + 1e-4, 20)

@@ -17,7 +17,7 @@ def gids(figure: object) -> list[str]:
 
 @pytest.fixture(scope="module")
 def both(hammer: "ph.Hammer") -> Bifurcation:
-    """Two directions that lead to different orbits in the middle."""
+    """A diagram with two directions that lead to different orbits in its middle."""
     periods = 1e-6 * np.array([860, 861, 865, 866, 867, 873])
     return ph.bifurcation(hammer, periods=periods, direction="both", refine=0)
 

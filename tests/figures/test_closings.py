@@ -1,4 +1,4 @@
-"""Further contacts in the picture of a motion: lines at their positions, bars wherever they are closed."""
+"""List contacts in the figure of a motion: lines at their positions, bars while they are closed."""
 
 import numpy as np
 from tests.derivatives.test_lists import relay

@@ -18,7 +18,7 @@ WEIGHT = 1e-3 * GRAVITY
 
 @pytest.fixture(scope="module")
 def branch() -> Branch:
-    """The orbit of the bouncing ball with one impact a period: a fold, and a period doubling."""
+    """The orbit of the bouncing ball with one impact per period: a fold and a period doubling."""
     ball = ph.Hammer.build(
         1e-3,
         spring={"law": "preload", "preload": -WEIGHT, "stiffness": 0.0},
@@ -62,7 +62,7 @@ def test_stable_parts_are_solid_and_end_at_the_branch_points(branch: Branch) -> 
 
 
 def test_a_grazing_stands_out_from_the_branch(branch: Branch) -> None:
-    """It is drawn over the lines, higher than they are wide, and in another colour; on request not at all."""
+    """The mark is drawn above the lines, taller than wide, and in another colour; it can be switched off."""
     event = dataclasses.replace(branch.events[0], kind="grazing")
     grazed = dataclasses.replace(branch, events=(event,))
     figure = grazed.plot()

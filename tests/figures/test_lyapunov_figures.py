@@ -1,4 +1,4 @@
-"""Pictures of exponents, the 0-1 test, recurrence, sections and impact trains show their numbers."""
+"""Figures of exponents, the 0-1 test, recurrence, sections and impact trains against their numbers."""
 
 import dataclasses
 

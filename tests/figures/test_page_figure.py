@@ -33,7 +33,7 @@ MM = 1e-3
 
 @pytest.fixture(scope="module")
 def page(hammer: ph.Hammer) -> Page:
-    """Two lines with lost dots and extra contacts."""
+    """A page of two lines with lost dots and extra contacts."""
     dots = np.random.default_rng(3).random((2, 9, 40)) < 0.45
     return print_page(hammer, Pattern("noise", dots), 1500.0)
 

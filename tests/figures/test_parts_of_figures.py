@@ -1,4 +1,4 @@
-"""Scales, room for labels, and the points of a curve."""
+"""Axis scales, space for labels, and the points of a curve."""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""Pictures of quality, safe rate, yield and damping show their numbers."""
+"""Figures of quality, safe rate, yield and damping against their numbers."""
 
 import dataclasses
 import math

@@ -1,4 +1,4 @@
-"""Figures as files, and what importing the package costs."""
+"""Figures as files, and the import time of the package."""
 
 import subprocess
 import sys

@@ -32,7 +32,7 @@ from printhammer.parts.spring.linear import LinearSpring, PreloadSpring
 
 @dataclass(frozen=True)
 class Bench:
-    """A hammer put together from parts."""
+    """A hammer composed of parts."""
 
     name: str = "bench"
     mass: float = 4e-4
@@ -55,7 +55,7 @@ HAMMER = Bench(magnet=MAGNET, spring=SPRING, pack=PACK, backstop=HERTZ, platen=3
 
 
 def net(hammer: Bench, x: float, current: float = 0.0) -> float:
-    """Force of magnet, linear spring and Hertz contact, written out."""
+    """Force of magnet, linear spring and Hertz contact, evaluated directly."""
     assert isinstance(hammer.magnet, InverseRootMagnet)
     assert isinstance(hammer.spring, LinearSpring)
     assert isinstance(hammer.backstop, HertzBackstop)

@@ -1,4 +1,4 @@
-"""Hammer files: every bad input is one sentence that names file, key, value and what was expected."""
+"""Hammer files: every bad input raises one sentence with file, key, value and expectation."""
 
 import copy
 import json
@@ -22,14 +22,14 @@ GOOD = ph.load(CRUDE).to_toml()
 
 
 def changed(old: str, new: str) -> str:
-    """Return the shipped file with one change, made in the first place where it applies."""
+    """Return the shipped file with one text replaced at its first occurrence."""
     text = re.sub(old, new, GOOD, count=1, flags=re.MULTILINE)
     assert text != GOOD
     return text
 
 
 def constant(key: str, text: str) -> str:
-    """Return the shipped file with another value and unit of a constant."""
+    """Return the shipped file with a changed value and unit of a constant."""
     number, unit = text.split(" ", 1)
     return changed(
         rf'^{key} = {{ value = [^,]*, unit = "[^"]*"', f'{key} = {{ value = {number}, unit = "{unit}"'

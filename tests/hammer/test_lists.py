@@ -22,7 +22,7 @@ def quoted(text: str) -> str:
 
 
 def table(name: str, /, **entries: str) -> str:
-    """Return a table of a hammer file; values that are no constants are put in quotes."""
+    """Format a table of a hammer file; values that are not constants are quoted."""
     lines = (f"{key} = {value if value[0] == '{' else quoted(value)}" for key, value in entries.items())
     return "\n".join([name, *lines, ""])
 
@@ -180,7 +180,7 @@ def test_the_schema_describes_lists() -> None:
 
 
 def test_a_contact_moves_the_armature_as_a_pack_without_losses() -> None:
-    """A pack of a linear law without damping is the same contact; the kernel treats it by other code."""
+    """A linear pack without damping is the same contact, but is handled by other code of the kernel."""
     rng = np.random.default_rng(5)
     for _ in range(5):
         stiffness, front = 10.0 ** rng.uniform(3.0, 6.0), rng.uniform(0.2e-3, 0.6e-3)

@@ -1,4 +1,4 @@
-"""The hammers that come with the program: their files, and the textbook cases against what they stand for."""
+"""The shipped hammers: their files, and the textbook cases against their references."""
 
 import pytest
 from tests.truth.impact_orbits import BouncingBall, LinearImpacts

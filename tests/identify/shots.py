@@ -1,4 +1,4 @@
-"""Records of single shots with the faults of a sensor, and fits of static measurements, for tests."""
+"""Records of single shots with sensor errors, and fits of static measurements, for tests."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -29,7 +29,7 @@ def write(
     seed: int = 0,
     said: bool = True,
 ) -> Path:
-    """Write the record of a shot: low-pass by a fine recursion, noise, outliers, resolution."""
+    """Write the record of a shot: low-pass filter on a fine grid, noise, outliers, resolution."""
     rng = np.random.default_rng(seed)
     waveform = waveform or hammer.waveform
     assert waveform is not None
@@ -68,7 +68,7 @@ def sensed(values: np.ndarray, before: float, bandwidth: float | None) -> np.nda
 
 
 def static_fit(hammer: ph.Hammer, errors: Mapping[str, float], seed: int) -> Fit:
-    """A fit of constants with independent relative errors, and values drawn accordingly."""
+    """A fit of constants with independent relative errors, and values drawn from its distribution."""
     rng = np.random.default_rng(seed)
     keys = tuple(errors)
     truth = np.array([hammer.constants[key].si for key in keys])

@@ -17,7 +17,7 @@ PLACE = 1e-4
 
 
 def driven(**coil: str) -> ph.Hammer:
-    """A mass on a spring, with a coil on a rail and no magnet."""
+    """A mass on a spring, with a coil on a rail but no magnet."""
     spring = {"law": "preload", "preload": "0 N", "stiffness": "100 N/m"}
     coil = coil or {"resistance": "10 ohm", "inductance": "8 mH"}
     return ph.Hammer.build("1 kg", spring=spring, coil=coil, waveform=RAIL)
@@ -56,7 +56,7 @@ def test_a_shorted_turn_is_found(tmp_path: Path) -> None:
 
 
 def test_the_voltage_of_the_table_drives_the_coil(tmp_path: Path) -> None:
-    """A ramp of the voltage, which no driver makes; the current has the closed form of a coil on a ramp."""
+    """A voltage ramp, which no driver produces; the current of a coil on a ramp has a closed form."""
     t = np.linspace(0.0, 3e-3, 31)
     tau, slope = 8e-4, 5e3
     current = slope / 10.0 * (t + tau * np.expm1(-t / tau))
@@ -92,7 +92,7 @@ def test_a_constant_on_one_row_has_the_noise_of_the_others(tmp_path: Path) -> No
 
 
 def test_a_current_that_dips_rejects_the_law(tmp_path: Path) -> None:
-    """A plunger that lets go: a coil of R and L never loses current on a rail."""
+    """A plunger that is released: on a rail, a coil of R and L never loses its current."""
     current = """-0.6 97 91 80.1 68.7 65.2 72.7 84.9 94.1 98.4 99.7 100 100 100 100 100 100 100 100"""
     rows = " ".join(f"{0.25 * k},{value}" for k, value in enumerate(current.split()))
     path = case(tmp_path / "dip.csv", "time [ms],current [mA]", rows)
@@ -170,7 +170,7 @@ def test_errors_of_a_probe_that_are_stated_or_fitted(
 
 @pytest.mark.slow
 def test_intervals_contain_the_truth_as_often_as_they_say(tmp_path: Path) -> None:
-    """Of 100 records by a probe with stated errors, 95 +- 3; each is drawn by its number."""
+    """For 100 records by a probe with stated errors, 95 +- 3 intervals hold; each record has its own seed."""
     stated = {"offset": "0 mA +- 5 mA", "delay": "0 us +- 10 us", "gain": "1 +- 0.01"}
     counts, rejected = {"coil.resistance": 0, "coil.inductance": 0}, 0
     for seed in range(100):
@@ -197,7 +197,7 @@ def smoothed(path: Path, seed: int, bandwidth: float) -> Path:
 
 @pytest.mark.slow
 def test_a_bandwidth_is_declared_or_rejects_the_law(tmp_path: Path) -> None:
-    """From 10 to 300 kHz; an interval of 95 % misses 6 of 30 truths once in 300 tries."""
+    """From 10 to 300 kHz; 95 % intervals miss 6 of 30 true values once in 300 repetitions."""
     keys, covered, moved, rejected = ("coil.resistance", "coil.inductance"), 0, 0, 0
     for seed in range(15):
         bandwidth = 1e4 * 30.0 ** np.random.default_rng(seed).uniform()
@@ -218,7 +218,7 @@ def test_a_bandwidth_is_declared_or_rejects_the_law(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_records_of_eight_bits_are_not_rejected(tmp_path: Path) -> None:
-    """Fewer than 20 of 24 intervals of 95 % that contain the truth would come once in 170 tries."""
+    """Fewer than 20 of 24 intervals of 95 % would contain the true value once in 170 repetitions."""
     coarse = {**RECORD, "noise": {"current": "1 mA"}, "resolution": {"current": "10 mA"}}
     covered = rejected = 0
     for seed in range(12):
@@ -237,7 +237,7 @@ def test_records_of_eight_bits_are_not_rejected(tmp_path: Path) -> None:
 def test_undeclared_errors_that_move_a_constant_reject_the_law(
     name: str, size: float, tmp_path: Path
 ) -> None:
-    """Of the records that an error moves by more than two standard errors over 90 in 100 are rejected."""
+    """More than 90 % of the records that an error shifts by over two standard errors are rejected."""
     guess, keys, moved, rejected = driven(), ("coil.resistance", "coil.inductance"), 0, 0
     for seed in range(40):
         error = size * np.exp(np.random.default_rng(seed).uniform(-1.0, 2.0))
@@ -252,7 +252,7 @@ def test_undeclared_errors_that_move_a_constant_reject_the_law(
 
 
 def test_readings_in_coarse_steps(tmp_path: Path) -> None:
-    """Eight bits: the rounding errors of rows on one step are one error."""
+    """Eight bits: the rounding errors of rows on the same level are equal."""
     coarse = {**RECORD, "noise": {"current": "1 mA"}, "resolution": {"current": "10 mA"}}
     path = record(driven(), tmp_path / "bits.csv", sensor=coarse)
     fit = ph.fit("coil", path, hammer=driven(resistance="9 ohm", inductance="9 mH"))
@@ -341,7 +341,7 @@ def test_saturation_and_resistance_from_two_places_of_a_locked_armature(tmp_path
 def test_a_shipped_magnet_gives_its_resistance(
     tmp_path: Path, name: str, ohms: float, options: dict[str, str]
 ) -> None:
-    """From a guess 10 % off; the magnet has an inductance of its own, beside which none is fitted."""
+    """From an initial guess 10 % off; the magnet has its own inductance, so no other is fitted."""
     hammer = ph.load(name)
     path = record(hammer, tmp_path / "locked.csv", sensor={"sampling_rate": "100 kHz"}, **options)
     fit = ph.fit("coil", path, hammer=hammer.replace("coil.resistance", 1.1 * ohms))
@@ -353,7 +353,7 @@ def test_a_shipped_magnet_gives_its_resistance(
 
 
 def test_a_record_that_determines_no_constant_is_refused(tmp_path: Path) -> None:
-    """Samples a second apart show neither the rise of the current nor, after the pulse, the current."""
+    """Samples one second apart show neither the rise of the current nor the current after the pulse."""
     rows = " ".join(f"{k},{value}" for k, value in enumerate((0, 9.99, 10.02, 9.97, 10.01, 9.98, 10, 10.01)))
     path = case(tmp_path / "slow.csv", "time [s],current [mA]", rows)
     with refused("record"):

@@ -59,7 +59,7 @@ def test_of_one_constant(kind: str, taken: str, found: str, power: float, tmp_pa
 
 
 def test_of_the_position_of_the_backstop(tmp_path: Path) -> None:
-    """Bs is the force of the spring at the backstop: it moves with it by Bs / As."""
+    """Bs is the force of the spring at the backstop, so it changes with the position by Bs / As."""
     table = tmp_path / "spring.csv"
     ph.measure("spring", HAMMER, seed=3).write(table)
     known = HAMMER.replace("uncertainty", {"constants": ["backstop.position"], "standard_errors": ["2 um"]})
@@ -71,7 +71,7 @@ def test_of_the_position_of_the_backstop(tmp_path: Path) -> None:
 
 
 def test_of_a_coil_on_a_rail(tmp_path: Path) -> None:
-    """The resistance that an earlier fit found, two standard errors off, moves the mass no less."""
+    """A resistance from an earlier fit, two standard errors off, shifts the mass equally."""
     relay = ph.load("relay-5v")
     error = 2e-4 * true_value(relay, "coil.resistance")
     known = relay.replace("coil.resistance", true_value(relay, "coil.resistance") + 2.0 * error)

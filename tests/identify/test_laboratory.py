@@ -37,7 +37,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_does_not(kind: str, tmp_
 
 
 def test_kinds_and_columns_do_not_disturb_each_other() -> None:
-    """Another noise of one quantity leaves the readings of all others as they are."""
+    """Changing the noise of one quantity does not change the readings of other quantities."""
     plain = ph.measure("magnet", HAMMER, seed=3)
     louder = ph.measure(
         "magnet", HAMMER, seed=3, sensor={"noise": {"displacement": "2 um"}, "outliers": "5 %"}

@@ -26,12 +26,12 @@ FAR = HAMMER.replace({"mass": 1.3 * MASS, "backstop.damping": 0.7 * DAMPING})
 
 
 def truth(key: str) -> float:
-    """The constant of the hammer from which records are made, SI."""
+    """Constant of the hammer from which the records are generated, SI."""
     return HAMMER.constants[key].si
 
 
 def test_starts_30_percent_off_lead_to_the_same_constants(tmp_path: Path) -> None:
-    """The fit does not depend on where it begins."""
+    """The fit does not depend on the initial guess."""
     path = shots.write(tmp_path / "shot.csv", HAMMER, seed=3)
     near = fit_motion([path], HAMMER)
     for mass, damping in itertools.product((0.7, 1.3), repeat=2):
@@ -78,7 +78,7 @@ def test_two_fits_agree_to_the_bit(tmp_path: Path) -> None:
 
 
 def test_the_result_belongs_to_the_records(tmp_path: Path) -> None:
-    """Series, lines and residuals are those of the samples; the fragment makes a hammer."""
+    """Series, lines and residuals equal those of the samples; the fragment defines a hammer."""
     paths = [
         shots.write(tmp_path / f"shot{i}.csv", HAMMER, seed=i, end=(1.6 - 0.2 * i) * 1e-3) for i in range(2)
     ]
@@ -123,7 +123,7 @@ def test_the_bandwidth_counts(tmp_path: Path) -> None:
 
 
 def test_shots_with_other_currents_fit_together(tmp_path: Path) -> None:
-    """Each record with its own pulse, of the shape of the hammer's waveform."""
+    """Each record is fitted with its own pulse, of the shape of the hammer's waveform."""
     width = truth("waveform.width")
     pulses = [Rectangle(**{**WAVEFORM.model_dump(), "width": factor * width}) for factor in (0.95, 1.0, 1.1)]
     paths = [
@@ -147,7 +147,7 @@ def test_a_current_of_another_shape_is_taken_from_the_record(tmp_path: Path) -> 
 
 
 def test_earlier_fits_are_improved(tmp_path: Path) -> None:
-    """Their constants come back with smaller errors, and count in those of the mass."""
+    """Their constants are recovered with smaller errors, which enter the error of the mass."""
     path = shots.write(tmp_path / "shot.csv", HAMMER, seed=11)
     static = shots.static_fit(
         HAMMER, {"magnet.Am": 1e-3, "pack.stiffness": 5e-3, "backstop.stiffness": 1e-2}, 4
@@ -184,7 +184,7 @@ def test_a_record_counts_once(tmp_path: Path) -> None:
 
 
 def test_waveform_constants_can_be_free(tmp_path: Path) -> None:
-    """With a recorded current as one more witness of them."""
+    """A recorded current provides additional information on the constants."""
     keys = ["mass", "waveform.amplitude", "waveform.width"]
     for noise in (None, 5e-3):
         path = shots.write(tmp_path / "shot.csv", HAMMER, current_noise=noise)
@@ -195,7 +195,7 @@ def test_waveform_constants_can_be_free(tmp_path: Path) -> None:
 
 
 def test_a_restitution_gives_way_to_the_damping(tmp_path: Path) -> None:
-    """A hammer that gives stiffness and damping otherwise is a start as good as another."""
+    """A hammer with a different parametrisation of stiffness and damping is an equally good initial guess."""
     path = shots.write(tmp_path / "shot.csv", HAMMER)
     start = HAMMER.replace(
         {"backstop.damping": None, "backstop.restitution": 0.7, "backstop.restitution_speed": 1.0}
@@ -207,7 +207,7 @@ def test_a_restitution_gives_way_to_the_damping(tmp_path: Path) -> None:
 
 
 def test_what_a_motion_cannot_tell_apart(tmp_path: Path) -> None:
-    """Mass and all forces scale together; stiffness and thickness of the pack are one number."""
+    """Mass and all forces scale together; stiffness and thickness of the pack appear only in combination."""
     path = shots.write(tmp_path / "shot.csv", HAMMER)
     forces = ["mass", "magnet.F0", "magnet.Am", "magnet.Bm", "spring.Bs"]
     for free, named in (
@@ -224,7 +224,7 @@ def test_what_a_motion_cannot_tell_apart(tmp_path: Path) -> None:
 
 
 def test_weak_constants_are_told_with_a_profile(tmp_path: Path) -> None:
-    """Constants that the noise covers: sentences, and how the cost rises about the best value."""
+    """Constants hidden by noise: messages, and the increase of the cost around the best value."""
     path = shots.write(tmp_path / "shot.csv", HAMMER, noise=4e-6, spacing=4e-6, end=0.8e-3, seed=2)
     free = ["mass", "magnet.F0", "magnet.Am", "waveform.decay"]
     fit = fit_motion([path], HAMMER, free=free)
@@ -240,7 +240,7 @@ def test_weak_constants_are_told_with_a_profile(tmp_path: Path) -> None:
 
 
 def test_an_offset_is_noticed(tmp_path: Path) -> None:
-    """A record that rests elsewhere than the hammer."""
+    """A record whose rest position differs from that of the hammer."""
     path = shots.write(tmp_path / "shot.csv", HAMMER, offset=3e-6)
     fit = fit_motion([path], HAMMER)
     assert any("rests" in note and "offset of the sensor" in note for note in fit.remarks)
@@ -273,7 +273,7 @@ BAD: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
 
 @pytest.mark.parametrize("which", BAD)
 def test_bad_input_is_told_in_one_sentence(tmp_path: Path, which: str) -> None:
-    """With the file, what is wrong with it, and what was expected."""
+    """The error states the file, the fault and the expectation."""
     record, options, key = BAD[which]
     path = tmp_path / "shot.csv"
     if which == "short":
@@ -301,7 +301,7 @@ def test_bad_input_is_told_in_one_sentence(tmp_path: Path, which: str) -> None:
     ],
 )
 def test_bad_headings_and_comments(tmp_path: Path, old: str, new: str, key: str) -> None:
-    """Also of what the file says of the sensor."""
+    """Also for sensor settings in the file."""
     path = shots.write(tmp_path / "shot.csv", HAMMER)
     path.write_text(path.read_text().replace(old, new))
     with refused(key):
@@ -309,7 +309,7 @@ def test_bad_headings_and_comments(tmp_path: Path, old: str, new: str, key: str)
 
 
 def test_times_must_ascend(tmp_path: Path) -> None:
-    """The sentence names the line."""
+    """The error names the line."""
     path = shots.write(tmp_path / "shot.csv", HAMMER)
     lines = path.read_text().splitlines()
     lines[10], lines[11] = lines[11], lines[10]
@@ -319,7 +319,7 @@ def test_times_must_ascend(tmp_path: Path) -> None:
 
 
 def test_a_current_that_is_none(tmp_path: Path) -> None:
-    """And a hammer without a waveform, where the record has no current either."""
+    """Also a hammer without a waveform, if the record has no current."""
     path = shots.write(tmp_path / "shot.csv", HAMMER, current_noise=1e-3)
     flat = [
         re.sub(r",[^,]*$", ",0.0", line) if line[0] in "-0123456789" else line

@@ -1,4 +1,4 @@
-"""Outliers, too little data, input that cannot be, and results as parts of hammer files."""
+"""Outliers, insufficient data, invalid input, and results as fragments of hammer files."""
 
 import tomllib
 from pathlib import Path
@@ -35,7 +35,7 @@ def magnet(folder: Path, columns: dict[str, Array] | None = None, **options: obj
 
 
 def fits_with_outliers(folder: Path) -> dict[str, tuple[Fit, Fit, list[int]]]:
-    """Fits robust and not, and the rows that were spoiled."""
+    """Robust and ordinary fits, and the corrupted rows."""
     found = {}
     rows = [3, 17, 40]
     columns = spoiled(noisy(lab.magnet(), "force", 0.05), "force", rows, 3.0)

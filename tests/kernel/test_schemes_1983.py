@@ -193,7 +193,7 @@ def test_the_drive_acts_as_it_says(overlap: str) -> None:
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_step_ends_at_each_of_many_close_firings(scheme: str) -> None:
-    """Three steps for each firing, though short ones alone would divide the run into fewer."""
+    """At least three steps per firing, even if the short steps alone would divide the run into fewer."""
     drive = PulseTrain(WAVEFORM.scaled(0.0), at=2.5 * CONTACT_STEP * np.arange(1, 401))
     start = (STOP.position - 5e-6, 0.0)
     ended = run(WHOLE, drive, start, 1e-3, scheme=scheme, reading="firings")

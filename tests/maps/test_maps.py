@@ -1,4 +1,4 @@
-"""Frequency-time maps: the same as single runs, for any number of threads, saved and read back."""
+"""Frequency-time maps: equal to single runs, for any number of threads, saved and read back."""
 
 from pathlib import Path
 

@@ -1,6 +1,6 @@
 """Current or force of a drive as Taylor series, from the formulas of its waveform; part of the oracle.
 
-Nothing here uses the segment tables of the compiled kernel, save the knots of a sampled waveform: between
+No segment tables of the compiled kernel are used, except the knots of a sampled waveform: between
 two of them a cubic is fitted to the values of the waveform.
 """
 
@@ -129,7 +129,7 @@ def _sampled_pieces(waveform: Any) -> list[Piece]:
 
 
 class ReferenceDrive:
-    """The current (or force) of a drive at any time, as a series, and the times where it is not analytic."""
+    """Current (or force) of a drive at any time, as a series, and the times at which it is not analytic."""
 
     def __init__(self, drive: Any) -> None:
         if drive.quantity == "voltage":

@@ -1,6 +1,6 @@
-"""Slow, independent oracle for one run: Taylor series mode by mode, every switch a polynomial root.
+"""Slow, independent oracle for one run: Taylor series mode by mode; every switch is a polynomial root.
 
-It shares no code with the compiled kernel and calls no law function of a part. Between switches the motion
+No code is shared with the compiled kernel; no law function of a part is called. Between switches the motion
 is analytic and is expanded to degree 30 (module `series`); the step ends where the last coefficients
 reach the tolerance, at a pulse edge, or at the first root of a switching function, which is isolated with a
 guarantee and polished to rounding. Only a first touch of a contact with a fractional power is not analytic:
@@ -131,7 +131,7 @@ class _Run:
         return y, v
 
     def _cell(self) -> tuple[int, int]:
-        """Cell of the force table that the motion is in, or enters if it stands on an edge."""
+        """Cell of the force table that contains the motion, or that it enters from an edge."""
         table = self.parts.table
         if table is None:
             return 0, 0
@@ -141,7 +141,7 @@ class _Run:
         return self.cell
 
     def _reach(self, c: Array, scale: float) -> float:
-        """Step, in units of the expansion's, at which the last coefficients are worth the tolerance."""
+        """Step, in units of the expansion's time, at which the last coefficients reach the tolerance."""
         reach = math.inf
         for k in range(ORDER - 2, ORDER + 1):
             last = abs(float(c[k]))
@@ -208,7 +208,7 @@ class _Run:
         return guards
 
     def _first(self, guards: list[tuple[str, Array]], theta: float) -> tuple[str, float]:
-        """Return the event that comes first and its place, or no event and ``theta``."""
+        """Return the earliest event and its position, or no event and ``theta``."""
         kind, s = "", theta
         for name, guard in guards:
             if name == self.zero:
@@ -244,7 +244,7 @@ class _Run:
             self._switch(kind)
 
     def _clock(self, t_end: float, limit: float) -> float:
-        """Time after a step of ``limit``: the edge itself, free of rounding, if that is what ended it."""
+        """Time after a step of ``limit``: the edge itself, without rounding, if the edge ended the step."""
         edge = min(t_end, self.drive.next_edge(self.t))
         # A sharp edge of the current may end in another cell of a force table.
         self.cell = None
@@ -350,7 +350,7 @@ class _Run:
             self.zero = "uncut" if kind == "cut" else "cut"
 
     def _resume(self) -> None:
-        """Go on from v = 0 inside the pack: in again, out as from a new local maximum, or stay in balance."""
+        """Continue from v = 0 inside the pack: inward again, outward from a new local maximum, or at rest."""
         self.v = 0.0
         self.mode = "load"
         if _first(self._expand(self._contact(), self.guess)[1]) > 0.0:
@@ -381,7 +381,7 @@ class _Run:
 
 
 def _first(c: Array) -> float:
-    """Return the first coefficient that is not zero, or zero."""
+    """Return the first nonzero coefficient, or zero."""
     return next((float(value) for value in c if value != 0.0), 0.0)
 
 

@@ -1,6 +1,6 @@
-"""Forces of a hammer for the oracle, derived anew from the constants of its parts.
+"""Forces of a hammer for the oracle, derived independently from the constants of its parts.
 
-No law function of ``printhammer.parts`` is called: a part gives its constants, the formulas here are the
+No law function of ``printhammer.parts`` is called: a part supplies its constants, the formulas are the
 oracle's own, equations (3) to (7) of the paper and those of the alternative parts.
 """
 
@@ -26,7 +26,7 @@ class Contact:
     scale: float = 1.0
 
     def packed(self) -> Array:
-        """Return the array that the series needs."""
+        """Return the coefficients of the contact as the array that the series requires."""
         values = [self.sigma, self.stiffness, self.power, self.viscous, self.viscous_power, self.scale]
         return np.array(values)
 
@@ -53,7 +53,7 @@ NO_CONTACT = Contact(0.0, 0.0, 1.0)
 
 
 class Table:
-    """Measured forces F(x, I) under SciPy's bicubic spline, one polynomial a cell of the grid."""
+    """Measured forces F(x, I), interpolated by SciPy's bicubic spline, one polynomial per grid cell."""
 
     def __init__(self, x: Array, current: Array, force: Array) -> None:
         from scipy.interpolate import RectBivariateSpline
@@ -64,7 +64,7 @@ class Table:
         self._cells: dict[tuple[int, int], Array] = {}
 
     def index(self, x: float, current: float) -> tuple[int, int]:
-        """Cell that holds a point; the outermost ones reach outwards without end."""
+        """Cell that contains a point; the outermost cells extend without end."""
         i, j = (
             min(max(int(np.searchsorted(edges, value, side="right")) - 1, 0), edges.size - 2)
             for edges, value in zip(self.edges, (x, current), strict=True)
@@ -72,7 +72,7 @@ class Table:
         return i, j
 
     def packed(self, cell: tuple[int, int]) -> Array:
-        """Return (x0, i0, coefficients) of a cell about its centre, where no knot is near."""
+        """Return (x0, i0, coefficients) of a cell about its centre, away from the knots."""
         if cell not in self._cells:
             spans = [edges[k : k + 2] for edges, k in zip(self.edges, cell, strict=True)]
             middles = [0.5 * (span[0] + span[1]) for span in spans]
@@ -105,7 +105,7 @@ class Table:
 
 
 class ReferenceHammer:
-    """Constants of a hammer as the oracle uses them."""
+    """Constants of a hammer in the form that the oracle uses."""
 
     def __init__(self, hammer: Any) -> None:
         self.mass = float(hammer.mass)

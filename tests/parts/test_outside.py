@@ -29,7 +29,7 @@ cubic = {{ value = 1, unit = "N/m^3", status = "assumed", source = "test" }}
 
 @pytest.fixture(autouse=True)
 def forgotten(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Forget the laws, modules and paths of a test."""
+    """Remove the laws, modules and paths that a test has added."""
     parts, modules = dict(PARTS), set(sys.modules)
     monkeypatch.setattr(sys, "path", [*sys.path])
     load_installed.cache_clear()
@@ -43,7 +43,7 @@ def forgotten(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def written(folder: Path, name: str, text: str = CUBIC) -> Path:
-    """Write a part whose law has the name of the file."""
+    """Write a part module whose law has the name of the file."""
     path = folder / f"{name}.py"
     path.write_text(text.replace('law = "hardening"', f'law = "{name}"'), encoding="utf-8")
     return path

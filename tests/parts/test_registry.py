@@ -1,4 +1,4 @@
-"""Every part: registered, complete, frozen, compilable by numba, the same in Python and in machine code."""
+"""Every part: registered, complete, frozen, compilable by numba, identical in Python and machine code."""
 
 import inspect
 import pickle

@@ -79,7 +79,7 @@ SAMPLE: dict[str, Any] = {
 
 
 def write(folder: Path, **changes: Any) -> Path:
-    """Write the files, some of them changed, or absent where a change is None."""
+    """Write the files, with some files changed, or omitted if their change is None."""
     for name, content in {**SAMPLE, **changes}.items():
         if content is not None:
             (folder / f"{name}.json").write_text(json.dumps(content))
@@ -87,7 +87,7 @@ def write(folder: Path, **changes: Any) -> Path:
 
 
 def changed(name: str, *steps: Any, to: Any) -> dict[str, Any]:
-    """Return a file with one value changed, by its name."""
+    """Return a file with one value changed, addressed by its name."""
     document = deepcopy(SAMPLE[name])
     place = document
     for step in steps[:-1]:

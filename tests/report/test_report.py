@@ -40,7 +40,7 @@ VOID = {"meta", "img", "br"}
 
 
 class Page(HTMLParser):
-    """Checks that tags are balanced, and collects links, identifiers and text."""
+    """Parser that checks that tags are balanced, and collects links, identifiers and text."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -77,7 +77,7 @@ class Page(HTMLParser):
 
 
 def results_of(hammer: "ph.Hammer", folder: Path, **changes: object) -> Results:
-    """Return made-up results of a reconstruction of a hammer."""
+    """Return invented results of a reconstruction of a hammer."""
     place = folder / "results"
     place.mkdir(parents=True)
     search = {**reconstruction_files.SAMPLE["search"], "shipped": hammer.fingerprint}

@@ -27,7 +27,7 @@ def motion() -> ph.Motion:
 
 
 def shown(value: object) -> dict[str, Any]:
-    """Return what IPython shows of a value, by MIME type."""
+    """Return the representations of a value in IPython, by MIME type."""
     return dict(DisplayFormatter().format(value)[0])
 
 
@@ -36,7 +36,7 @@ def test_the_last_line_of_a_cell_shows_the_picture(motion: ph.Motion) -> None:
 
 
 def test_every_picture_tells_a_notebook_what_it_shows(motion: ph.Motion) -> None:
-    """All figures come from one place, the page that is laid out by hand among them."""
+    """All figures are created in one place, including the figure with a manual layout."""
     from printhammer.figures import FIGURES
     from printhammer.figures.elements.style import new_figure
 

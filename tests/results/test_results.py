@@ -1,4 +1,4 @@
-"""Every class of results: declared once, and the same in every file."""
+"""Every result class: declared once, identical in every file format."""
 
 import json
 import pkgutil
@@ -61,7 +61,7 @@ def result(request: pytest.FixtureRequest, hammer: Hammer, samples: dict[str, Re
 
 
 def same(left: Any, right: Any) -> bool:
-    """Whether attributes are equal, nan to nan."""
+    """Whether attributes are equal; NaN equals NaN."""
     if isinstance(left, dict):
         return left.keys() == right.keys() and all(same(left[key], right[key]) for key in left)
     if isinstance(left, list):

@@ -1,4 +1,4 @@
-"""Summaries: the same facts in print, in a notebook and in either unit system."""
+"""Summaries: the same facts on the terminal, in a notebook and in both unit systems."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Effort: declared once, shown in signatures and docstrings, checked before anything runs."""
+"""Effort: declared once, shown in signatures and docstrings, checked before the computation starts."""
 
 import inspect
 from collections.abc import Callable
@@ -20,7 +20,7 @@ def verbs() -> list[Callable[..., Any]]:
 
 
 def innermost(verb: Callable[..., Any]) -> list[str]:
-    """Return the parameters of a function below its decorators."""
+    """Return the parameters of the function inside its decorators."""
     return list(inspect.signature(inspect.unwrap(verb), follow_wrapped=False).parameters)
 
 

@@ -45,7 +45,7 @@ def check_dots(result: EnsembleResult, i: int, motion: ph.Motion) -> None:
 
 
 def check_strobes(result: EnsembleResult, i: int, motion: ph.Motion, times: npt.NDArray[Any]) -> None:
-    """States as `Motion.at` has them; branch and memory as the nodes of the run tell them."""
+    """States as returned by `Motion.at`; branch and memory from the nodes of the run."""
     table = result.strobes
     assert table is not None
     inside = times[times <= motion.end]
@@ -109,7 +109,7 @@ def test_lost_and_extra_and_open_contacts(hammer: ph.Hammer) -> None:
 
 
 def test_further_contacts_after_one_firing(hammer: ph.Hammer) -> None:
-    """Thrown at the paper, the wire comes back to it while a long weak pulse is on."""
+    """Thrown at the paper, the wire returns to the paper while a long weak pulse is active."""
     drives = [ph.PulseTrain(w["long"]) for w in (hammers.waveforms(a, "current") for a in (0.2, 0.34, 0.6))]
     result, _ = check(Ensemble(hammer, drives, 3e-3, states=(150e-6, 3.0)), odd=True)
     assert result.dots is not None
@@ -190,7 +190,7 @@ def test_runs_that_fail_are_rows(hammer: ph.Hammer) -> None:
 
 @pytest.mark.parametrize("branch", [LOADING, UNLOADING, RELOADING])
 def test_a_start_on_a_branch_goes_on_with_the_run(hammer: ph.Hammer, branch: int) -> None:
-    """A run cut inside the pack and begun there anew: the same force law, the same way out of the paper."""
+    """A run cut inside the pack and restarted there has the same force law and leaves the paper equally."""
     # These laws no other test compiles.
     with hammers.interpreted() if branch == RELOADING else nullcontext():
         if branch == RELOADING:

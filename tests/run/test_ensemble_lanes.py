@@ -1,4 +1,4 @@
-"""Lanes against one member at a time: other machine code, other steps, the same motion."""
+"""Lanes against one member at a time: different machine code and steps, the same motion."""
 
 from typing import Any
 
@@ -20,7 +20,7 @@ SINGLE = np.finfo(np.float32).eps
 
 
 def moments_of(ensemble: Ensemble, count: int = 150) -> list[npt.NDArray[np.float64]]:
-    """Odd times, the firings, the end and beyond, for every member."""
+    """Irregular times, the firings, the end and later times, for every member."""
     return [
         np.unique([*np.linspace(0.0, end, count), *drive.times, end * 1.2])
         for end, drive in zip(ensemble.ends, ensemble.drives, strict=True)
@@ -55,7 +55,7 @@ def agree(mine: EnsembleResult, plain: EnsembleResult, apart: float = APART) -> 
 
 
 def single(count: int, seed: int) -> Ensemble:
-    """Members of many hammers under one pulse, of very different length."""
+    """Many hammers under one pulse, with very different run lengths."""
     draw = hammers.Draw(np.random.default_rng([1986, seed]))
     every = [draw() for _ in range(count)]
     drives = [ph.PulseTrain(hammer.waveform) for hammer in every]
@@ -82,7 +82,7 @@ def test_branch_and_memory_at_strobes() -> None:
 
 @pytest.mark.parametrize("engine", ["plain", "lanes"])
 def test_a_grid_denser_than_the_steps(hammer: ph.Hammer, engine: Any) -> None:
-    """Pictures show what strobes at the same times say, but for the precision of their numbers."""
+    """Pictures equal strobes at the same times, up to the precision of their numbers."""
     times = np.linspace(0.0, 3e-3, 20_001)
     drives = [ph.PulseTrain(hammer.waveform, at=[0.0, second]) for second in (0.6e-3, 0.66e-3, 0.7e-3)]
     found = Ensemble(hammer, drives, [3e-3, 2.5e-3, 1e-4]).run(
@@ -121,7 +121,7 @@ def test_ends_inside_contacts_and_at_firings(hammer: ph.Hammer) -> None:
 
 
 def test_an_end_exactly_at_a_switch_leaves_no_gap(hammer: ph.Hammer) -> None:
-    """Runs that end in the instant at which the lanes themselves find a switch, and just before and after."""
+    """Runs that end at the instant at which the lanes find a switch, and just before and after it."""
     drive = ph.PulseTrain(hammer.waveform, period=1.05e-3, pulses=3)
     dots = Ensemble(hammer, drive, 6e-3).run(dots=True, engine="lanes").dots
     assert dots is not None
@@ -140,7 +140,7 @@ def test_an_end_exactly_at_a_switch_leaves_no_gap(hammer: ph.Hammer) -> None:
 
 
 def test_a_range_left(hammer: ph.Hammer) -> None:
-    """Just before the highest point, at it, and beyond it."""
+    """Ends just before the highest point, at the highest point, and beyond."""
     drive = ph.PulseTrain(hammer.waveform)
     highest = float(ph.simulate(hammer, drive).maxima[1].max())
     parts = np.array([0.75, 0.9, 1.0 - 1e-3, 1.0 - 1e-6, 1.0 - 1e-9, 1.0 + 1e-9, 1.0 + 1e-6, 1.1])
@@ -157,7 +157,7 @@ def test_a_range_left(hammer: ph.Hammer) -> None:
 
 
 def test_a_member_that_settles_in_the_pack_leaves_the_lanes(hammer: ph.Hammer) -> None:
-    """A spring so strong that it holds the armature in the pack: its last swings never end in the lanes."""
+    """A spring strong enough to hold the armature in the pack: its last oscillations never end in lanes."""
     strong = hammer.replace(
         {
             "mass": 4e-4,
@@ -238,7 +238,7 @@ def test_forces_as_drives() -> None:
     ids=["magnet", "magnet and pack", "current"],
 )
 def test_where_a_law_runs_away_the_plain_kernel_tells(hammer: ph.Hammer, change: dict[str, Any]) -> None:
-    """Its steps become short without end: such a member leaves the lanes instead of taking fifty million."""
+    """Its steps shrink without end: such a member leaves the lanes instead of taking fifty million steps."""
     mad = hammer.replace(change)
     trains = [ph.PulseTrain(one.waveform, rate=500.0, pulses=9) for one in (hammer, mad)]
     mine, plain = both(Ensemble([hammer, mad], trains, 20e-3, tolerance=1e-6))
@@ -261,7 +261,7 @@ BORDER = [
 def test_near_the_border_of_rest_a_member_that_does_not_get_on_leaves(
     key: str, value: float, tolerance: float
 ) -> None:
-    """Its swings are far shorter than its steps, so that a step to the switch never ends on it."""
+    """Its oscillations are far shorter than its steps, so that a step to the switch never ends on it."""
     hammer = ph.load("hendriks-1983-1").replace({key: value})
     assert hammer.waveform is not None
     drives = ph.PulseTrains.at_rates(hammer.waveform, np.linspace(500.0, 1100.0, 8), 9)

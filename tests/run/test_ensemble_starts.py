@@ -1,4 +1,4 @@
-"""Ensembles whose members start later than at time 0."""
+"""Ensembles whose members start later than time 0."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ STARTS = np.array([120e-6, 200e-6, 490e-6, 640e-6])
 
 @pytest.mark.parametrize("engine", ["plain", "lanes"])
 def test_a_run_can_be_taken_up_where_another_one_passed(engine: str) -> None:
-    """Also while a pulse is under way, in free flight and at the backstop's edge."""
+    """Also during a pulse, in free flight and at the edge of the backstop."""
     hammer = ph.load(CRUDE)
     drive = ph.PulseTrain(hammer.waveform)
     whole = ph.simulate(hammer, drive, duration=1.2e-3)
@@ -27,7 +27,7 @@ def test_a_run_can_be_taken_up_where_another_one_passed(engine: str) -> None:
 
 
 def test_starts_are_checked() -> None:
-    """One sentence for what cannot be a start."""
+    """An invalid start raises an error of one sentence."""
     hammer = ph.load(CRUDE)
     drive = ph.PulseTrain(hammer.waveform)
     for starts in (-1e-6, 2e-3, np.nan):

@@ -15,7 +15,7 @@ from printhammer.run.ensemble import Ensemble, EnsembleResult
 
 @pytest.fixture(scope="module")
 def ensemble(hammer: ph.Hammer) -> Ensemble:
-    """Thrown at the paper, the wire comes back to it while a long weak pulse is on, twice."""
+    """Thrown at the paper, the wire returns to the paper twice while a long weak pulse is active."""
     pulses = [hammers.waveforms(current, "current")["long"] for current in (0.2, 0.34, 0.6)]
     drives = [ph.PulseTrain(pulse, at=[0.0, 2.5e-3]) for pulse in pulses]
     return Ensemble(hammer, drives, 6e-3, states=(150e-6, 3.0))

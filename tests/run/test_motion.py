@@ -25,7 +25,7 @@ def motion() -> ph.Motion:
 
 
 def test_nothing_depends_on_the_output_grid(motion: ph.Motion) -> None:
-    """To the bit: the same instants asked for in different company and order."""
+    """Bit-identical states at the same instants, requested in any company and order."""
     rng = np.random.default_rng(5)
     times = rng.uniform(0.0, motion.end, 400)
     x, v = motion.at(times)
@@ -183,7 +183,7 @@ def test_a_dot_is_the_first_contact_after_its_firing() -> None:
 
 
 def test_a_flight_longer_than_the_period() -> None:
-    """The contact belongs to the latest firing before it; the firing whose flight it was lost its dot."""
+    """The contact belongs to the latest firing before it; the firing that was in flight lost its dot."""
     alone = fired([0.0]).dots[0]
     assert alone.flight_time is not None
     second = 0.8 * alone.flight_time
@@ -207,7 +207,7 @@ def test_a_contact_open_at_a_firing_belongs_to_the_dot_before() -> None:
 
 
 def test_extra_contacts() -> None:
-    """Pressed on by a long pulse, the wire comes back to the pack before the next firing."""
+    """Pressed by a long pulse, the wire returns to the pack before the next firing."""
     motion = ph.simulate(hammers.shelf(0.5), ph.PulseTrain(PULSE), duration=4e-3, state=(FRONT - 1e-5, 2.0))
     packs = [c for c in motion.contacts if c.surface == "pack"]
     assert len(packs) >= 2

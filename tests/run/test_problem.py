@@ -1,4 +1,4 @@
-"""A hammer and a drive made ready for the kernel: scales, room for the record, invariance of units."""
+"""A hammer and a drive prepared for the kernel: scales, space for the record, invariance of units."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from printhammer.run.problem import Problem
 
 
 def scaled(length: float, time: float, mass: float) -> tuple[ph.Hammer, ph.PulseTrain]:
-    """`hammers.shelf` and a pulse, in units of length, time and mass so many times larger."""
+    """`hammers.shelf` and a pulse, in units of length, time and mass scaled by given factors."""
     force = mass * length / time**2
     hammer = hammers.made_of(
         MASS * mass,

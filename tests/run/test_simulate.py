@@ -74,7 +74,7 @@ def test_defaults() -> None:
 
 @pytest.mark.parametrize("tolerance", [1e-5, 1e-6, 1e-8])
 def test_coarse_tolerances_still_meet_the_first_contact(tolerance: float) -> None:
-    """The largest tolerance permitted, too: fewer steps, no nonsense."""
+    """Also at the largest permitted tolerance: fewer steps, a valid result."""
     hammer = hammers.crude()
     drive = ph.PulseTrain(hammer.waveform)
     fine = ph.simulate(hammer, drive)

@@ -45,7 +45,7 @@ def on_a_rail(*, turn: bool = False) -> ph.Hammer:
 def test_a_motion_goes_on_from_its_state_at_a_firing(
     period: float, driver: Rail | Chopper | Capacitor, turn: bool
 ) -> None:
-    """Also on the way out of the pack, while the current decays, and with a capacitor half empty."""
+    """Also while leaving the pack, while the current decays, and with a half-empty capacitor."""
     hammer = on_a_rail(turn=turn)
     stroke = hammer.front - hammer.position
     with interpreted():
@@ -78,7 +78,7 @@ def test_a_motion_goes_on_from_inside_the_pack_under_a_current() -> None:
 
 @pytest.mark.parametrize("turn", [False, True])
 def test_trains_hand_on_the_current(turn: bool) -> None:
-    """Columns of a diagram, as strobes: 2n firings are n and n again."""
+    """Columns of a diagram equal strobes: 2n firings equal n firings twice."""
     hammer = on_a_rail(turn=turn)
     regime = Regime.of(hammer, period=0.7e-3, waveform=DRIVERS[0])
     with interpreted():
@@ -103,7 +103,7 @@ def test_states_of_a_current_driven_train_have_no_current() -> None:
 
 
 def test_a_period_includes_the_current() -> None:
-    """Under a voltage states repeat with their current; where none does, the exponent is asked."""
+    """With a voltage drive, states repeat with their current; if no state repeats, the exponent decides."""
     with interpreted():
         regular, irregular = (
             strobes(

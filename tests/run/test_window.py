@@ -30,7 +30,7 @@ from printhammer.sweep.members import Base, Maker
 
 
 def device(flight: float, way: float = 1e-3, held: float = 1.0, pull: float = 0.5) -> ph.Hammer:
-    """A mass that a half sine of force throws onto a pack: about so long a flight, s, over a way, m.
+    """A mass that a half-sine force throws onto a pack: `flight` is about the flight time, s, `way` in m.
 
     The spring holds it with a force, N. While it flies the spring takes back half a `pull` of the way: the
     weaker, the later the return, the stronger, the slower the touch.
@@ -210,7 +210,7 @@ def press(hammer: ph.Hammer, rate: float) -> Press:
 
 
 def struck_everywhere(hammer: ph.Hammer) -> dict[str, list[int]]:
-    """The dots of three firings, far apart, as every verb has them."""
+    """The dots of three firings, far apart, as simulated by every verb."""
     rate = 1.0 / (3.0 * wait_of(hammer))
     train = ph.PulseTrain(hammer.waveform, rate=rate, pulses=3)
     trial = attempt([Case(hammer, nominal(hammer), rate)], [(0, 1, 2)], limits=ph.Limits(), threads=1)
@@ -251,7 +251,7 @@ def struck_everywhere(hammer: ph.Hammer) -> dict[str, list[int]]:
 
 
 def devices(count: int, seed: int = 33) -> Iterator[ph.Hammer]:
-    """Random devices with flights from 0.1 to 60 ms: thrown by a force, or shipped ones in other times."""
+    """Random devices with flights from 0.1 to 60 ms: driven by a force, or shipped and rescaled in time."""
     random = np.random.default_rng(seed)
 
     def between(low: float, high: float) -> float:
@@ -296,7 +296,7 @@ def test_random_devices_strike_the_same_dots_everywhere() -> None:
 
 
 def test_an_armature_latched_on_a_rigid_front_is_not_at_rest() -> None:
-    """Only an armature that dry friction holds is at rest away from its rest position."""
+    """Only an armature held by dry friction is at rest away from its rest position."""
     hammer = ph.Hammer.build(
         1e-3,
         spring={"law": "cubic", "stiffness": -1e3, "cubic": 0.0, "center": 0.5e-3},
@@ -314,7 +314,7 @@ def test_an_armature_latched_on_a_rigid_front_is_not_at_rest() -> None:
 
 @pytest.mark.parametrize("name", ["pot-magnet", "relay-5v", "pinball-flipper", "hendriks-1983"])
 def test_an_armature_that_stays_away_after_a_pulse_is_described(name: str) -> None:
-    """Only the pot magnet has no spring; ten windows later its armature is still at the pole."""
+    """Only the pot magnet has no spring; ten windows later its armature still rests at the pole."""
     hammer = ph.load(name)
     long = ph.simulate(hammer, ph.PulseTrain(hammer.waveform), duration=10.0 * wait_of(hammer))
     assert hammer.front is not None

@@ -1,4 +1,4 @@
-"""A headless Chromium, driven over its own protocol; helpers only."""
+"""Headless Chromium, driven by its own protocol; helpers only."""
 
 import base64
 import itertools
@@ -36,12 +36,12 @@ WAIT = 60.0
 
 
 def chromium() -> str | None:
-    """Return the program of a Chromium, or nothing."""
+    """Return the path of a Chromium program, or None."""
     return next(filter(None, map(shutil.which, NAMES)), None)
 
 
 class Wire:
-    """Connection to a tab of a browser: what the tab says on its console, what it asks the network for."""
+    """Connection to a tab of a browser; collects its console messages and network requests."""
 
     def __init__(self, socket: ClientConnection) -> None:
         self.socket = socket
@@ -61,15 +61,15 @@ class Wire:
             self._note(message)
 
     def _note(self, message: dict[str, Any]) -> None:
-        """Record a message of the browser that is no answer."""
+        """Record a message of the browser that is not a response."""
         raise NotImplementedError
 
     def run(self, script: str) -> Any:
-        """Run a script in the page, which may be a promise, and return its value."""
+        """Run a script in the page, which may return a promise, and return its value."""
         raise NotImplementedError
 
     def wait(self, condition: str, seconds: float = WAIT) -> Any:
-        """Wait until a script gives something true, and return that."""
+        """Wait until a script returns a true value, and return that value."""
         end = time.monotonic() + seconds
         while not (found := self.run(condition)):
             assert time.monotonic() < end, f"waited for {condition}; {self.complaints}"
@@ -100,7 +100,7 @@ class Page(Wire):
                 self.requests.append(told["url"])
 
     def run(self, script: str) -> Any:
-        """Run a script in the page, which may be a promise, and return its value."""
+        """Run a script in the page, which may return a promise, and return its value."""
         found = self.call("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)
         assert "exceptionDetails" not in found, found["exceptionDetails"]
         return found["result"].get("value")
@@ -113,7 +113,7 @@ class Page(Wire):
     def size(
         self, width: int, height: int, dark: bool = False, ratio: float = 1.0, still: bool = True
     ) -> None:
-        """Set the size of the window, its pixel ratio, and what its user prefers of colours and motion."""
+        """Set the size of the window, its pixel ratio, and the user's preferences for colours and motion."""
         self.call(
             "Emulation.setDeviceMetricsOverride",
             width=width,
@@ -129,12 +129,12 @@ class Page(Wire):
         )
 
     def prefer(self, preferences: dict[str, str]) -> None:
-        """Set media features, such as what the user prefers."""
+        """Set media features, such as the preferences of the user."""
         features = [{"name": name, "value": value} for name, value in preferences.items()]
         self.call("Emulation.setEmulatedMedia", features=features)
 
     def picture(self, path: Path, selector: str | None = None) -> None:
-        """Write what is seen, all of it or one element, as PNG."""
+        """Save a screenshot of the page or of one element as PNG."""
         clip: dict[str, Any] = {}
         if selector is not None:
             box = self.box(selector)
@@ -142,7 +142,7 @@ class Page(Wire):
         path.write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png", **clip)["data"]))
 
     def box(self, selector: str) -> dict[str, float]:
-        """Scroll to an element where it is not in sight, and return its place and size."""
+        """Scroll to an element if it is not visible, and return its position and size."""
         return self.run(
             f"(() => {{ const found = document.querySelector({json.dumps(selector)});"
             " found.scrollIntoViewIfNeeded(); const b = found.getBoundingClientRect();"
@@ -157,7 +157,7 @@ class Page(Wire):
         )
 
     def drag(self, *places: tuple[float, float]) -> None:
-        """Press at the first place, move through the others, release at the last."""
+        """Press at the first position, move through the others, release at the last."""
         self.mouse("mousePressed", *places[0])
         for place in places:
             self.mouse("mouseMoved", *place)
@@ -182,7 +182,7 @@ class Page(Wire):
 
 @contextmanager
 def browser() -> Iterator[Any]:
-    """Start a Chromium and give a function that opens a new tab."""
+    """Start a Chromium and yield a function that opens a new tab."""
     program = chromium()
     assert program is not None
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:

@@ -92,7 +92,7 @@ AGAIN = """(({ studio }) => {
 
 @pytest.fixture(scope="module")
 def tabs(address: str, opened_browser: Any) -> Iterator[Callable[..., Page]]:
-    """Pages by their links, opened once for all tests of a module; every test begins with the same state."""
+    """Pages by their links, opened once for all tests of a module; every test starts from the same state."""
     tabs: dict[str, tuple[Page, str]] = {}
     with ExitStack() as stack:
 

@@ -1,4 +1,4 @@
-"""A headless Firefox, driven over WebDriver BiDi; helpers only."""
+"""Headless Firefox, driven by WebDriver BiDi; helpers only."""
 
 import base64
 import json
@@ -20,7 +20,7 @@ EVENTS = ["log.entryAdded", "network.beforeRequestSent"]
 
 
 def firefox() -> str | None:
-    """Return the program of a Firefox, or nothing."""
+    """Return the path of a Firefox program, or None."""
     return next(filter(None, map(shutil.which, NAMES)), None)
 
 
@@ -53,17 +53,17 @@ class Tab(Wire):
         return json.loads(found["result"]["value"])
 
     def open(self, address: str, width: int, height: int) -> None:
-        """Go to an address, in a window of a size."""
+        """Open an address in a window of a given size."""
         size = {"width": width, "height": height}
         self.call("browsingContext.setViewport", context=self.context, viewport=size)
         self.call("browsingContext.navigate", context=self.context, url=address, wait="complete")
 
     def box(self, selector: str) -> dict[str, float]:
-        """Return the place and size of an element."""
+        """Return the position and size of an element."""
         return self.run(f"document.querySelector({json.dumps(selector)}).getBoundingClientRect()")
 
     def drag(self, *places: tuple[float, float]) -> None:
-        """Press at the first place, move through the others, release at the last."""
+        """Press at the first position, move through the others, release at the last."""
         moves = [{"type": "pointerMove", "x": round(x), "y": round(y), "duration": 50} for x, y in places[1:]]
         x, y = places[0]
         press = [{"type": "pointerMove", "x": round(x), "y": round(y)}, {"type": "pointerDown", "button": 0}]
@@ -78,14 +78,14 @@ class Tab(Wire):
         self.call("input.performActions", context=self.context, actions=[keys])
 
     def picture(self, path: Path) -> None:
-        """Write what is seen as PNG."""
+        """Save a screenshot as PNG."""
         taken = self.call("browsingContext.captureScreenshot", context=self.context)
         path.write_bytes(base64.b64decode(taken["data"]))
 
 
 @contextmanager
 def opened() -> Iterator[Tab]:
-    """Start a Firefox and give its tab."""
+    """Start a Firefox and yield its tab."""
     program = firefox()
     assert program is not None
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:

@@ -1,4 +1,4 @@
-"""The worker of the page in Node: states in, frames out, as a browser would compute them."""
+"""The worker of the page in Node: it maps states to frames, as in a browser."""
 
 import json
 import subprocess
@@ -38,7 +38,7 @@ createInterface({ input: process.stdin }).on("line", (line) => onmessage({ data:
 
 
 class Engine:
-    """The worker of a page with the hammers of a shelf."""
+    """The worker of a page with the shipped hammers."""
 
     def __init__(self, shelf: Shelf, folder: Path) -> None:
         content = folder / "content.json"
@@ -67,9 +67,9 @@ class Engine:
         assert self._process.wait(30) == 0
 
     def work(self, name: str, state: dict[str, Any], **more: Any) -> list[dict[str, Any]]:
-        """Return the frames of a work for a state, those on the way included; their `data` as arrays.
+        """Return the frames of a job for a state, including intermediate frames; their `data` as arrays.
 
-        A refusal is one frame with the key `refusal`.
+        A rejected state gives one frame with the key `refusal`.
         """
         assert self._process.stdin is not None
         assert self._process.stdout is not None

@@ -73,7 +73,7 @@ createInterface({ input: process.stdin }).on("line", (line) => {
 
 
 class NoModule:
-    """Stands for the WebAssembly module of a hammer where only its description matters."""
+    """Replacement for the WebAssembly module of a hammer, for tests that need only its description."""
 
     name = "none"
 
@@ -82,7 +82,7 @@ class NoModule:
 
 
 def without_modules(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Write pages without WebAssembly modules, which take long to link."""
+    """Write pages without WebAssembly modules, whose linking is slow."""
     monkeypatch.setattr(live, "page_module", lambda _laws: NoModule())
 
 
@@ -98,7 +98,7 @@ def evaluated(modules: Path, script: str) -> Any:
 
 @contextmanager
 def node(module: str, functions: str, shelf: Shelf) -> Iterator[Any]:
-    """Run a module of the page; give a function that calls one of `functions` by name with JSON."""
+    """Run a module of the page; yield a function that calls one of `functions` by name with JSON."""
     with pytest.MonkeyPatch.context() as patch:
         without_modules(patch)
         content = content_of(shelf)

@@ -1,4 +1,4 @@
-"""Hammer files dropped on a page: read as by Python where a hammer of the page has their laws, or refused."""
+"""Hammer files dropped on a page: read as in Python if a hammer of the page has their laws, else rejected."""
 
 import json
 import math
@@ -88,7 +88,7 @@ def test_a_file_lists_its_views(ask: Any) -> None:
 
 
 def test_a_table_of_another_hammer_is_not_taken(tmp_path: Path) -> None:
-    """A hammer of the page may name a table of the same name, with other numbers."""
+    """A hammer of the page may refer to a table of the same name with other numbers."""
     rows = [(x, i, 0.8 - 0.3 * i + 0.01 * x) for x in (0.0, 200.0, 400.0) for i in (0.0, 1.0, 2.0)]
     table = "displacement [um],current [A],force [N]\n" + "".join(f"{x},{i},{f}\n" for x, i, f in rows)
     (tmp_path / "forces.csv").write_text(table, "utf-8")

@@ -1,4 +1,4 @@
-"""Random states of the shipped hammers: the page computes what Python computes, as long as rounding allows.
+"""Random states of the shipped hammers: the page gives the results of Python, up to rounding.
 
 Two runs whose masses differ by rounding drift apart. Up to the time at which they differ by more than 5e-13
 of their range, the horizon of predictability, dots and energies have to agree to 1e-9, and curves to single
@@ -47,7 +47,7 @@ State = dict[str, Any]
 
 
 def random_state(name: str, rng: np.random.Generator) -> State:
-    """State of a shipped hammer with other constants, pulse and train, as sliders set them."""
+    """State of a shipped hammer with changed constants, pulse and train, as set by sliders."""
     described = describe(ph.load(name))
     opening: State = {**STATE, "hammer": name, "views": [], **described["start"]}
     controls = described["constants"]
@@ -77,7 +77,7 @@ def posed(state: State) -> tuple[Hammer, Drive]:
 
 
 def run_of(state: State, nudge: float = 0.0) -> Motion:
-    """Run of a state as the page makes it, with a mass that differs by a relative amount."""
+    """Run of a state as in the page, with a relative change of the mass."""
     hammer, drive = posed(state)
     sine = state["waveform"]["shape"] == "sine"
     end = state["pulses"] / state["rate"] if sine else end_of_run(hammer, drive, None)
@@ -91,7 +91,7 @@ def run_of(state: State, nudge: float = 0.0) -> Motion:
 
 
 def horizon_of(motion: Motion, other: Motion) -> float:
-    """Last of 2,000 times up to which two runs differ by less than `DRIFT` of their range."""
+    """Return the last of 2,000 times up to which two runs differ by less than `DRIFT` of their range."""
     times = np.linspace(0.0, min(motion.end, other.end), 2000)
     states = [np.stack(run.curves_at(times)[:2]) for run in (motion, other)]
     span = np.abs(states[0]).max(axis=1, keepdims=True)
@@ -100,7 +100,7 @@ def horizon_of(motion: Motion, other: Motion) -> float:
 
 
 def check_curves(motion: Motion, curve: State, horizon: float) -> None:
-    """Compare the curves of a run with those of a page, which have single precision, up to a time."""
+    """Compare the curves of a run with those of a page, which have single precision, up to a given time."""
     data = curve["data"]
     t = data["t"][data["t"] <= min(horizon, motion.end)]
     assert t.size > 1
@@ -154,7 +154,7 @@ def check_dots_before(motion: Motion, shown: State, horizon: float) -> int:
 
 
 def check_state(engine: Engine, state: State) -> str:
-    """Compare the curves and dots of a state; return what could be compared."""
+    """Compare the curves and dots of a state; return the compared quantities."""
     frames = engine.work("curves", state)
     if "refusal" in frames[0]:
         with pytest.raises(ph.InputError):
@@ -179,7 +179,7 @@ def check_state(engine: Engine, state: State) -> str:
 
 
 def check_dots(engine: Engine, wave: dict[str, Any]) -> None:
-    """Compare the dots that a pulse makes; the steps of the runs may differ."""
+    """Compare the dots of a pulse; the steps of the runs may differ."""
     state = {**STATE, "hammer": NAME, "waveform": wave, "rate": 900.0, "pulses": 3}
     own = engine.work("curves", state)[1]["dots"]
     for dot, other in zip(run_of(state).dots, own, strict=True):

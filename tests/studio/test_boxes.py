@@ -15,7 +15,7 @@ RATE = "[data-number=rate]"
 
 
 def typed(page: Page, selector: str, text: str, enter: bool = True) -> None:
-    """Type into a box as a user does, and press Enter."""
+    """Type into a box like a user, and press Enter."""
     page.run(f"document.querySelector({json.dumps(selector)}).focus()")
     page.run(f"document.querySelector({json.dumps(selector)}).select()")
     page.call("Input.insertText", text=text)
@@ -29,7 +29,7 @@ def box(page: Page, selector: str = RATE) -> str:
 
 
 def problem(page: Page, selector: str = RATE) -> str:
-    """Return the sentence below a box, if it is seen."""
+    """Return the sentence below a box, if visible."""
     return page.run(
         f"(() => {{ const said = document.querySelector({json.dumps(selector)}).closest('.row')"
         ".querySelector('.problem'); return said.checkVisibility() ? said.textContent : ''; })()"
@@ -114,7 +114,7 @@ def test_boxes_take_units_and_arithmetic(page: Page) -> None:
 
 
 def test_the_units_of_boxes_are_those_of_the_program() -> None:
-    """Whatever the unit table knows and a box knows too has the same size in both."""
+    """A unit that both the unit table and a box accept has the same size in both."""
     known = {
         "m": "m mm um in mil",
         "s": "s ms us",

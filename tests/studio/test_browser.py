@@ -25,7 +25,7 @@ FRAMES = {"line": "line", "strobe": "strobe", "map": "map"}
 
 @pytest.fixture
 def page(tabs: Callable[..., Page]) -> Page:
-    """The page with all views, for tests that leave only another state."""
+    """The page with all views, for tests that change only its state."""
     return tabs(WHOLE)
 
 
@@ -42,7 +42,7 @@ def settled(page: Page, condition: str) -> None:
 
 
 def inked(page: Page, view: str) -> int:
-    """Count the colours of a view's canvases, of which an empty one has one."""
+    """Count the colours of a view's canvases; an empty canvas has one colour."""
     return page.run(f"helpers.inked({view!r})")
 
 
@@ -51,13 +51,13 @@ def drop(page: Page, name: str, text: str) -> None:
 
 
 def saved(page: Page, selector: str, value: str) -> str:
-    """Choose an export and return the text that would be saved."""
+    """Choose an export and return the text of the saved file."""
     page.run(f"helpers.save({selector!r}, {value!r})")
     return page.wait("window.kept")
 
 
 def test_a_visit(whole_page: Page) -> None:
-    """Look, drag, click the map, pin, undo, reload, drop, export; no complaint."""
+    """View, drag, click the map, pin, undo, reload, drop, export; no error is logged."""
     page = whole_page
     page.run(HELPERS)
     for view in VIEWS:
@@ -305,7 +305,7 @@ def test_a_page_is_saved_with_what_is_set_and_a_state_comes_back_as_a_file(
 
 
 def test_a_rail_in_the_place_of_the_current_and_back(page: Page) -> None:
-    """Drivers, decay path and temperature are controls, both curves are there, and undo leads back."""
+    """Drivers, decay path and temperature are controls, both curves are drawn, undo restores the state."""
     page.run(HELPERS)
     motion = "window.studio.studio.frames.motion"
     page.run("window.studio.studio.store.set({ views: ['motion', 'energy'], pulses: 1 }); 1")

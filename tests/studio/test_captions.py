@@ -196,7 +196,7 @@ console.log(JSON.stringify(fromText(toText({ ...START, ...state }, start))));
 
 
 def test_a_link_states_every_entry_that_the_hammer_would_set(modules: Path) -> None:
-    """Entries equal to the start of a page, of a hammer that opens with others."""
+    """Entries equal to the initial entries of a page, for a hammer with other initial entries."""
     start = {"rate": 20.0, "pulses": 3, "low": 10.0, "line": ""}
     assert evaluated(modules, LINK % json.dumps([{"rate": 1200}, start])) == {
         "rate": 1200,
@@ -218,7 +218,7 @@ console.log(JSON.stringify([answer(text), answer(""), text.length, ...refused]))
 
 
 def test_a_trace_travels_in_a_link(modules: Path) -> None:
-    """With 9 digits of time and 6 of displacement; anything else is refused."""
+    """With 9 digits of time and 6 of displacement; other formats are rejected."""
     times = 0.1 + np.arange(2000) * 1e-7
     trace = {"name": "scope", "t": times.tolist(), "values": (1e-4 * np.sin(1e6 * times)).tolist()}
     trace |= {"dt": -0.1, "dx": 2e-6}

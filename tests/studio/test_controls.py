@@ -1,4 +1,4 @@
-"""Controls: one for each constant, with a range that holds its value."""
+"""Controls: one for each constant, with a range that contains its value."""
 
 from contextlib import nullcontext
 
@@ -57,7 +57,7 @@ def test_the_equations_are_of_laws_that_there_are() -> None:
 
 
 def test_the_paper_lies_on_the_platen_whatever_is_moved() -> None:
-    """Of platen, front and thickness each combined control keeps platen = front + thickness."""
+    """Each combined control of platen, front and thickness preserves platen = front + thickness."""
     hammer = load(CRUDE)
     (distance, thickness) = controls.describe(hammer)["combined"]
     assert distance["value"] == pytest.approx(hammer.platen - hammer.position)

@@ -1,4 +1,4 @@
-"""Order in which the page shows maps and sections, with orders to workers that the test answers itself."""
+"""Order in which the page shows maps and sections; the test itself answers the jobs of the workers."""
 
 from pathlib import Path
 from typing import Any
@@ -58,7 +58,7 @@ const draw = async (low) => {
 
 
 def shown(modules: Path, script: str) -> Any:
-    """Numbers of states with what is shown of them, in the order in which the page shows them."""
+    """Numbers of states and the views drawn for them, in the order of display."""
     return evaluated(modules, f"{ENGINE}{script}console.log(JSON.stringify(shown));")
 
 

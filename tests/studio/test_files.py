@@ -1,4 +1,4 @@
-"""Files dropped on a page: drive files and measured tables, read in Node as Python reads them, or refused."""
+"""Files dropped on a page: drive files and measured tables, read in Node as in Python, or rejected."""
 
 import math
 import re
@@ -254,7 +254,7 @@ def test_tables_of_very_many_columns_or_rows_are_answered(ask: Any) -> None:
 
 
 def test_a_state_file_may_be_longer_than_other_files(ask: Any) -> None:
-    """As long as one whose hammer has the largest size."""
+    """As long as a file whose hammer has the largest permitted size."""
     state = {"kind": KIND, "format": FORMAT, "state": {}}
     assert ask("state", state, 500_000)["found"] == "state"
     assert "expected at most 1000000" in ask("state", state, 1_000_000)["refused"]
@@ -321,7 +321,7 @@ def test_a_table_that_is_read_is_read_as_python_reads_it(
 
 
 def columns_said(export: exports.Export, headings: list[dict[str, Any]]) -> list[list[str]] | None:
-    """Return what is said of the columns of an export as answers of the page; None if nothing is."""
+    """Return the column settings of an export, as answers of the page; None if there are none."""
     if not export.columns:
         return None
     answers = [["", ""] for _ in headings]

@@ -1,4 +1,4 @@
-"""Values at the cursor, findings, pins: in a browser, with the hammer of the paper."""
+"""Values at the cursor, findings and pins, in a browser with the hammer of the paper."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -56,7 +56,7 @@ def test_the_pointer_in_any_plot_sets_the_time(opened: Page, view: str) -> None:
 
 
 def test_the_rate_where_a_dot_is_lost_is_found(opened: Page) -> None:
-    """One click for the second dot; the run at that rate has lost it, just below it has not."""
+    """One click selects the second dot; the run at that rate has lost the dot, just below it has not."""
     opened.run("document.querySelector('.find-lost').click()")
     opened.wait(f"{STATE}.rate !== 1200")
     rate = opened.run(f"{STATE}.rate")
@@ -142,7 +142,7 @@ def test_pins_of_hostile_links_harm_nothing(address: str, fresh: Callable[..., P
 
 
 def test_a_pin_of_a_link_is_opened_as_far_as_it_is_a_state(address: str, fresh: Callable[..., Page]) -> None:
-    """A pin without a hammer, of a hammer that the page lacks, and with entries that are none."""
+    """A pin without a hammer, with a hammer that the page lacks, and with invalid entries."""
     page = fresh(address)
     for state, reason in (
         ({}, ""),
@@ -202,6 +202,6 @@ def test_contacts_of_a_relay_open_and_close_at_their_positions(opened: Page) -> 
 
 
 def sketched(page: Page, time: float) -> list[str]:
-    """Return the texts of the drawing of the actuator at a time, s."""
+    """Return the texts of the drawing of the actuator at a given time, s."""
     page.run(f"{HELPERS}; window.studio.studio.cursor = {time}")
     return page.run("helpers.painted('sketch', 500, 200).texts")

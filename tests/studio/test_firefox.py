@@ -1,4 +1,4 @@
-"""The page in Firefox, where one is installed: curves, slider, map, views, files; the numbers of Chromium."""
+"""The page in Firefox, if installed: curves, slider, map, views, files; the same numbers as in Chromium."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -17,7 +17,7 @@ RIGHT = "\ue014"  # the right arrow in WebDriver
 
 @pytest.fixture(scope="module")
 def tab(address: str, opened_firefox: Tab) -> Iterator[Tab]:
-    """The page as it opens; nothing but the file itself is asked for, and nothing complains."""
+    """The page on opening; the file itself is the only request, and no error is logged."""
     tab = opened_firefox
     tab.open(address, 1440, 900)
     tab.wait("window.studio?.studio?.frames.map?.detail === 'full'")
@@ -76,5 +76,5 @@ def test_every_view_is_drawn_and_a_file_is_read(tab: Tab) -> None:
 
 
 def test_the_numbers_are_those_of_chromium(tab: Tab, page: Any) -> None:
-    """To the last bit: the mathematical functions are part of the modules."""
+    """Bit-identical, since the mathematical functions are part of the modules."""
     assert tab.run(NUMBERS) == page.run(NUMBERS)

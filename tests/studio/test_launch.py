@@ -1,4 +1,4 @@
-"""The page as a file: the state with which it opens, the folder that keeps it, its parts, the widget."""
+"""The page as a file: its initial state, the folder that stores it, its components, the widget."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""The page that computes by itself, opened from a file: what Python computes, four views, hostile links."""
+"""The page that computes by itself, opened from a file: agreement with Python, four views, hostile links."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -22,7 +22,7 @@ NAME = "hendriks-1983-1"
 def test_the_page_begins_from_a_file(
     opened_browser: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its scripts run and it describes its hammer, here one whose module is left out."""
+    """The scripts of the page run and describe its hammer, here a hammer whose module is left out."""
     without_modules(monkeypatch)
     path = tmp_path / "page.html"
     path.write_text(live_page(Shelf(ph.load(NAME), only=True), "rate=900&pulses=3"), "utf-8")

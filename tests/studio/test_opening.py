@@ -56,7 +56,7 @@ def test_it_moves_at_first_unless_motion_is_not_wanted(address: str, fresh: Call
 
 
 def test_the_stories_show_what_they_tell(address: str, fresh: Callable[..., Page]) -> None:
-    """With the hammer of the paper; each is one click away, and what its text says is so."""
+    """With the hammer of the paper; each story is one click away, and its text is correct."""
     page = fresh(address, 1440, 900)
     page.wait("window.studio.studio.frames.dots")
     struck = "window.studio.studio.frames.dots.dots.map((dot) => dot.struck)"

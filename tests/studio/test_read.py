@@ -1,4 +1,4 @@
-"""States from outside, and states as texts: what the page reads, refuses and writes, in Node."""
+"""External states, and states as texts: accepted, rejected and written states, in Node."""
 
 import json
 import shlex
@@ -143,7 +143,7 @@ CHANGES: list[dict[str, Any]] = [
 def test_texts_describe_the_state(
     ask: Any, changed: dict[str, Any], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The hammer file and the script build what Python builds, and the state file is read again."""
+    """Hammer file and script reproduce the hammer of Python, and the state file is read again."""
     state = {**STATE, "hammer": NAME, **changed}
     hammer = ph.load(CRUDE).replace("name", NAME)
     hammer = hammer.replace(state["constants"]) if state["constants"] else hammer

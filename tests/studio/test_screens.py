@@ -1,4 +1,4 @@
-"""The page on screens as people have them: pixel ratios, small windows, zoom."""
+"""The page on common screens: pixel ratios, small windows, zoom."""
 
 import io
 import itertools
@@ -32,7 +32,7 @@ def resized(page: Page, width: int, height: int, ratio: float) -> None:
 
 
 def pixels(page: Page, path: Path, selector: str) -> Any:
-    """Return what is seen of an element as grey levels on a grid that does not depend on the pixel ratio."""
+    """Return the image of an element as grey levels on a grid that is independent of the pixel ratio."""
     import numpy as np
     from PIL import Image
 
@@ -43,7 +43,7 @@ def pixels(page: Page, path: Path, selector: str) -> Any:
 
 @pytest.mark.parametrize("ratio", RATIOS)
 def test_nothing_is_cut_or_overlaps(page: Page, tmp_path: Path, ratio: float) -> None:
-    """At every size, with all controls and a story open; a window of 1440 px zoomed to 200 % has 720."""
+    """At every size, with all controls and a story open; a window of 1440 px at 200 % zoom has 720 px."""
     page.run(HELPERS)
     for width, height in (*SIZES, (720, 450)):
         resized(page, width, height, ratio)
@@ -119,7 +119,7 @@ def test_controls_are_a_sheet_on_a_phone(page: Page) -> None:
 
 
 def test_forced_colours_leave_everything_to_be_seen(page: Page, tmp_path: Path) -> None:
-    """With colours that a user forces, curves and pressed buttons are still apart from their ground."""
+    """With forced colours, curves and pressed buttons remain distinct from their background."""
     page.prefer(
         {"forced-colors": "active", "prefers-color-scheme": "dark", "prefers-reduced-motion": "reduce"}
     )

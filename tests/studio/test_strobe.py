@@ -1,4 +1,4 @@
-"""The endless train of a page: its points, exponent and class are those of the library."""
+"""The endless train of a page: points, exponent and classification equal those of the library."""
 
 import math
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""The page in a browser: its header, its stories, the map under the finger, views that suit the device."""
+"""The page in a browser: its header, its stories, the map under the pointer, views for each device."""
 
 from collections.abc import Callable, Iterator
 
@@ -25,7 +25,7 @@ def page(tabs: Callable[..., Page]) -> Iterator[Page]:
 
 @pytest.fixture
 def own_page(address: str, fresh: Callable[..., Page]) -> Page:
-    """The page opened for one test, which leaves it with another tab chosen, or with frames held back."""
+    """The page opened for one test, which changes its tab or holds frames back."""
     opened = fresh(f"{address}{LINK}", 1440, 900)
     opened.wait(SETTLED)
     return opened
@@ -182,7 +182,7 @@ def test_a_state_that_follows_another_is_marked_while_it_takes_long(own_page: Pa
 
 
 def test_files_dropped_together_are_asked_about_one_after_the_other(page: Page) -> None:
-    """Two tables without units: each has a dialog of its own."""
+    """Two tables without units: each table opens its own dialog."""
     title = "document.querySelector('dialog[open] h2')?.textContent ?? ''"
     page.run(
         "(() => { const files = new DataTransfer();"

@@ -1,4 +1,4 @@
-"""Workers of a page: few memories for many hammers, and orders that end whatever fails."""
+"""Workers of a page: few memories for many hammers, and jobs that end in any case of failure."""
 
 import json
 import subprocess

@@ -13,7 +13,7 @@ from printhammer.support.threads import in_threads, thread_count
 
 
 class Works:
-    """Works that note which of their numbers were done, and in which thread."""
+    """Work that records which items were done, and in which thread."""
 
     def __init__(self, sizes: list[int]) -> None:
         self.done = [[0] * size for size in sizes]
@@ -64,7 +64,7 @@ def test_one_thread_is_the_calling_one() -> None:
 
 
 def test_threads_work_at_the_same_time() -> None:
-    """Two pieces that wait for each other end only if both are under way."""
+    """Two items that wait for each other end only if both are in progress."""
     meet = threading.Barrier(2, timeout=30.0)
     in_threads([lambda first, last: meet.wait() and None], [2], 2, lengths=[1])
     assert not meet.broken
@@ -77,7 +77,7 @@ def test_progress_comes_from_the_calling_thread() -> None:
 
 
 class OddError(Exception):
-    """Raised by a piece of work."""
+    """Exception raised by an item of work."""
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])

@@ -11,7 +11,7 @@ def squares(numbers: list[int]) -> list[int]:
 
 
 def sum_of(first: int, last: int, size: int) -> Work[int, int, int]:
-    """Sum squares, so many at a time."""
+    """Sum squares, requested in batches of `size`."""
     total = 0
     for begin in range(first, last, size):
         answers = yield list(range(begin, min(begin + size, last)))

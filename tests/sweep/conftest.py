@@ -45,7 +45,7 @@ def spec_file(tmp_path: Path) -> Callable[..., Path]:
 
 
 def content(store: Path) -> dict[str, bytes]:
-    """Return all files of a store but its time stamps."""
+    """Return all files of a store except its time stamps."""
     files = {str(path.relative_to(store)): path.read_bytes() for path in store.rglob("*") if path.is_file()}
     root = json.loads(files["zarr.json"])
     assert root["attributes"].pop("created")

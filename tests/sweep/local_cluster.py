@@ -1,4 +1,4 @@
-"""A dask cluster on this machine, for tests that kill its workers: tells its address and ends with its input.
+"""A local dask cluster for tests that kill its workers: prints its address and ends with its input.
 
 Usage: python local_cluster.py WORKERS [PRELOAD]; the file PRELOAD is run by each worker when it starts.
 """

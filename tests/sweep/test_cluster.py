@@ -1,4 +1,4 @@
-"""Sweeps on real dask workers of this machine, killed for real."""
+"""Sweeps on dask workers of this machine, whose processes are killed."""
 
 import contextlib
 import json

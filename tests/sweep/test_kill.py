@@ -1,4 +1,4 @@
-"""Real kills of real processes: the same command goes on, and the store is that of an uninterrupted sweep."""
+"""Killed processes: the same command continues, and the store equals that of an uninterrupted sweep."""
 
 import random
 import resource
@@ -26,7 +26,7 @@ def blocks_done(out: Path) -> int:
 
 
 def killed(spec: Path, out: Path, blocks: int, later: float, kind: int = signal.SIGKILL) -> int | None:
-    """Start the sweep, and kill it once so many more blocks are done and some time has passed."""
+    """Start the sweep, and kill it after a number of further blocks and a delay."""
     before = blocks_done(out)
     pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
     with subprocess.Popen(command(spec, out), **pipes) as process:

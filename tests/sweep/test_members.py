@@ -43,7 +43,7 @@ def test_hammers_with_the_same_pulse_share_drives() -> None:
 
 @pytest.mark.parametrize("own", [{}, {"waveform": {"shape": "half-sine", "amplitude": "1 A"}}])
 def test_another_pulse_is_another_drive(own: dict[str, Any]) -> None:
-    """That of the hammer, or the drive's own."""
+    """The waveform of the hammer, or the waveform of the drive."""
     axis = {"key": "waveform.width", "values": ["300 us", "350 us"]}
     content = {**SPEC, "drive": {**SPEC["drive"], **own}, "axis": [axis, RATE]}
     base = read_spec(content).base

@@ -40,7 +40,7 @@ def run(tmp_path: Path, **spec: Any) -> xr.Dataset:
 
 
 def close(found: Any, wanted: Any, scale: float = 0.0) -> bool:
-    """Compare what two integrators make of the same member, where necessary on a scale of its own."""
+    """Compare the results of two integrators for a member, on a separate scale if necessary."""
     return np.allclose(found, wanted, rtol=1e-7, atol=1e-7 * scale, equal_nan=True)
 
 
@@ -322,7 +322,7 @@ def test_a_name_in_csv_gives_a_table_of_the_store_beside_it(
 def test_members_that_are_not_at_rest_are_marked(
     tmp_path: Path, name: str, axis: dict[str, Any], expected: list[bool]
 ) -> None:
-    """Against the motion of the same hammer for twice as long, which goes on away from rest or does not."""
+    """Against a run of the same hammer for twice as long, which is still away from rest or is not."""
     train = {"train": {"pulses": 2, "rate": "10 Hz"}}
     spec = {
         "format": 1,

@@ -1,6 +1,6 @@
-"""Orbits of the damped impact oscillator, closed by a Newton method of their own.
+"""Orbits of the damped impact oscillator, closed by an independent Newton method.
 
-It shares nothing with the program.
+No code is shared with the program.
 
 x'' + b x' + x = 1 + F cos(w t) for x > 0, restitution e at 0: the mirror image of -1 + F cos(w t) for x < 0.
 Between impacts x = P(t) + Q(t) with the forced oscillation P = 1 + Re(G exp(i w t)), where
@@ -69,11 +69,11 @@ class DampedImpacts:
         return math.sin(self.own * 2.0 * math.pi * n / omega)
 
     def product(self, omega: float, impacts: int, n: int) -> float:
-        """Product of the multipliers of an orbit with so many impacts in n periods."""
+        """Product of the multipliers of an orbit with a given number of impacts in n periods."""
         return float(self.restitution ** (2 * impacts) * math.exp(-self.damping * 2.0 * math.pi * n / omega))
 
     def misses(self, omega: float, force: float, impacts: Array, n: int) -> Array:
-        """By how much each flight misses the next impact; rows of phase, rad, and speed before it."""
+        """Distance by which each flight misses the next impact; rows of phase, rad, and speed before it."""
         out = []
         for i, (phase, speed) in enumerate(impacts):
             after, before = impacts[(i + 1) % len(impacts)]
@@ -85,7 +85,7 @@ class DampedImpacts:
         return np.array(out)
 
     def monodromy(self, omega: float, force: float, impacts: Array, n: int) -> Array:
-        """Derivative from behind the first impact to behind it n periods later."""
+        """Derivative of the state after the first impact n periods later with respect to itself."""
         matrix = np.eye(2)
         for i, (phase, _) in enumerate(impacts):
             after, speed = impacts[(i + 1) % len(impacts)]
@@ -117,7 +117,7 @@ class DampedImpacts:
         return newton(equations, np.array(guess, dtype=np.float64))
 
     def state(self, omega: float, force: float, impacts: Array, phase: float) -> Array:
-        """Displacement and velocity of an orbit at a phase, rad, behind its first impact."""
+        """Displacement and velocity of an orbit at a phase, rad, after its first impact."""
         begin, speed = impacts[0]
         start = np.array([0.0, self.restitution * speed]) - self.forced(omega, force, begin)
         return self.free((phase - begin) / omega) @ start + self.forced(omega, force, phase)

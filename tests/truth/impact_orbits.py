@@ -1,6 +1,6 @@
 """Periodic orbits of rigid impact oscillators in closed form: bouncing ball and linear oscillator.
 
-Plain formulas, derived here; they share nothing with the program.
+The formulas are derived here; no code is shared with the program.
 
 *Bouncing ball.* A table moves as A sin(w t); a ball under gravity g bounces on it with restitution e.
 Relative to the table it feels m (A w^2 sin(w t) - g). On an orbit with one impact in n periods T = 2 pi / w
@@ -60,7 +60,7 @@ class BouncingBall:
 
     @property
     def doubling(self) -> float:
-        """Gamma at which the stable one of them doubles its period."""
+        """Gamma at which the stable of the two orbits doubles its period."""
         e = self.restitution
         return math.hypot(self.fold, 2.0 * (1.0 + e * e) / (1.0 + e) ** 2)
 

@@ -1,4 +1,4 @@
-"""Closed forms that the motion must obey exactly; nothing here uses the package.
+"""Closed forms that the motion must obey exactly; the package is not used.
 
 Each is derived in its docstring. Logarithms that cancel are summed as series. SI throughout.
 """

@@ -1,6 +1,6 @@
-"""The two schemes of the paper written out once more, plainly, from its equations and its schedule.
+"""The two schemes of the paper, implemented independently from its equations and its schedule.
 
-Nothing here is shared with the package: floats, lists and the constants of a hammer file.
+No code is shared with the package: floats, lists and the constants of a hammer file.
 """
 
 import math
@@ -45,7 +45,7 @@ def acceleration(c: dict[str, float], period: float) -> Derivative:
 
 
 def runge_kutta(f: Derivative, t: float, x: float, v: float, h: float, peak: float) -> tuple[float, float]:
-    """One classical step of fourth order."""
+    """Take one classical step of fourth order."""
     k1 = v, f(t, x, v, peak)
     k2 = v + h / 2 * k1[1], f(t + h / 2, x + h / 2 * k1[0], v + h / 2 * k1[1], peak)
     k3 = v + h / 2 * k2[1], f(t + h / 2, x + h / 2 * k2[0], v + h / 2 * k2[1], peak)
@@ -55,7 +55,7 @@ def runge_kutta(f: Derivative, t: float, x: float, v: float, h: float, peak: flo
 
 
 def trapezoid(f: Derivative, t: float, x: float, v: float, h: float, peak: float) -> tuple[float, float]:
-    """One implicit step, the velocity at its end by a secant."""
+    """Take one implicit step; solve for the velocity at its end by the secant method."""
     begins = f(t, x, v, peak)
 
     def residual(new: float) -> float:
@@ -72,7 +72,7 @@ SCHEMES = {"runge-kutta-4": runge_kutta, "trapezoid": trapezoid}
 def strobed(
     c: dict[str, float], rest: float, period: float, firings: int, scheme: str, reading: str
 ) -> list[tuple[float, float]]:
-    """Displacement and velocity at so many firings, by the cubic over the step in which each lies.
+    """Return displacement and velocity at firings, by the cubic over the step that contains each firing.
 
     Steps of 10 us off the backstop, 1 us in it or where a free one would end there, 20 us after 200 us in it.
     """

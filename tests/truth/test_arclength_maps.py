@@ -50,7 +50,7 @@ def ring(u: Any, p: float) -> MapValue:
 
 
 def iterated(family: MapFamily, times: int) -> MapFamily:
-    """A map applied so many times, with its derivatives by the chain rule and the sequence of its labels."""
+    """A map iterated a number of times, with its derivatives by the chain rule and its sequence of labels."""
 
     def repeated(u: Any, p: float) -> MapValue:
         image, jacobian, slope = u, np.eye(len(u)), np.zeros(len(u))
@@ -212,7 +212,7 @@ def tilted(a: float, b: float) -> MapFamily:
 
 
 def crossed(family: MapFamily, curve: Curve, scales: Any) -> tuple[BranchPoint, Curve]:
-    """The one crossing of a curve, and the curve that crosses."""
+    """The crossing point of a curve, and the curve that crosses."""
     (point,) = [
         point for point in points_of(family, curve, scales, STEPS.precision) if point.kind in CROSSINGS
     ]

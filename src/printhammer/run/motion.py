@@ -453,7 +453,7 @@ class Motion(Result, fields=False):
         }
 
     def to_xarray(self) -> xr.Dataset:
-        """Return the output grid as a Dataset over time, with units and provenance in the attributes."""
+        """Return the output grid as a Dataset along `t`, with units and provenance in the attributes."""
         return self.to_dataset()
 
     def to_pandas(self) -> pd.DataFrame:

@@ -201,7 +201,7 @@ def test_what_is_no_sheet_is_refused(change: tuple[str, str | None], said: str, 
 
 
 def test_a_pole_that_the_device_cannot_hold_is_named(tmp_path: Path) -> None:
-    """5 N at 10 mm and 300 mA ask for a pole of some 80 cm2, and its armature for kilograms of iron."""
+    """5 N at 10 mm and 300 mA require a pole of about 80 cm2, whose armature would weigh kilograms."""
     wrong = PLAIN.replace(
         'force = [["0.25 mm", "85.9 N"], ["1 mm", "28.9 N"], ["2 mm", "11.1 N"], ["5 mm", "3.59 N"]]',
         'force = [["10 mm", "5 N"]]\ncurrent = "0.3 A"',

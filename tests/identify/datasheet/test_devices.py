@@ -63,7 +63,7 @@ def test_a_relay_drops_out_above_a_tenth_and_below_its_pull_in(relay: ph.Hammer)
 def test_the_contacts_of_a_relay_switch_within_the_limits_of_data_sheets(
     relay: ph.Hammer, driver: dict[str, Any], release: float | None
 ) -> None:
-    """Limits of relays of this class: operate 10 ms, bounce 4 ms, release 5 ms without a diode.
+    """Limits for relays of this class: operate 10 ms, bounce 4 ms, release 5 ms without a diode.
 
     The default driver has a diode, which delays the release; data sheets state no limit for it.
     """

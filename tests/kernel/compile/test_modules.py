@@ -1,4 +1,4 @@
-"""Modules of an entry point: loaded, rebuilt and distinguished; and the kernel linked from them."""
+"""Modules of an entry point: loading, rebuilding, distinguishing; and the kernel linked from them."""
 
 import lzma
 import subprocess
@@ -27,7 +27,7 @@ HERTZ = Laws(
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The folder of modules, an empty one, and no module that ships."""
+    """An empty module folder, without shipped modules."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(modules, "SHIPPED", tmp_path / "shipped")
     (tmp_path / "shipped").mkdir()
@@ -171,7 +171,7 @@ VERBS = (
 def test_nothing_of_numba_is_loaded_once_the_machine_code_is_on_disk(
     hammer: ph.Hammer, tmp_path: Path
 ) -> None:
-    """Neither by the library nor by a verb."""
+    """Neither the library nor a verb loads numba."""
     hammer.save(tmp_path / "hammer.toml")
     verbs = [verb.format(hammer=tmp_path / "hammer.toml").split() for verb in VERBS]
     code = f"""

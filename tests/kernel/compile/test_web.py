@@ -116,7 +116,7 @@ def computed_by(kernel: Kernel, call: Callable[..., Any]) -> Iterator[None]:
 
 
 def problem_of(name: str) -> tuple[Problem, float]:
-    """A shipped hammer under five pulses, a textbook oscillator under a sine, and the end of the run."""
+    """A shipped hammer under five pulses, a textbook oscillator under a sinusoidal force; the end time."""
     hammer = ph.load(name)
     at = hammer.position or 0.0
     if hammer.waveform is not None:

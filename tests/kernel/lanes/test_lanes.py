@@ -116,7 +116,7 @@ def test_nothing_is_read_that_was_not_written(
     rng = np.random.default_rng(5)
 
     class Full:
-        """NumPy, but that no new array is empty."""
+        """Replacement for NumPy whose new arrays are filled with `waste`."""
 
         def __getattr__(self, name: str) -> Any:
             return getattr(np, name)

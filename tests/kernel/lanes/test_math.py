@@ -23,7 +23,7 @@ Array = npt.NDArray[np.float64]
 
 @functools.cache
 def loop(name: str) -> Any:
-    """A function of `lane_math` in a loop over arrays, with the settings of the kernel."""
+    """Compile a function of `lane_math` in a loop over arrays, with the settings of the kernel."""
     function = getattr(compile_module(lane_math, inlined), name)
     if name == "pow":
 
@@ -106,7 +106,7 @@ def test_sin_near_its_zeros() -> None:
 
 @pytest.mark.parametrize("reach", [2.0, 50.0, 5000.0])
 def test_cos(reach: float) -> None:
-    """An argument a quarter turn further is rounded, which the slope of the sine passes on."""
+    """An argument shifted by a quarter turn is rounded; the slope of the sine transfers this error."""
     x = rng(7).uniform(-reach, reach, 3001)
     allowed = 4.0 * ULP + ULP * np.abs(x + 0.5 * math.pi) + 0.5 * np.spacing(0.5 * math.pi)
     assert (errors(values("cos", x), exact(mpmath.cos, x), relative=False) < allowed).all()
@@ -164,7 +164,7 @@ def test_isnan() -> None:
 
 @pytest.mark.parametrize("name", ["exp", "log", "sin", "cos"])
 def test_a_value_does_not_depend_on_its_neighbours(name: str) -> None:
-    """Bit for bit the same alone, in vectors, among NaN and infinities, and in the rest of a loop."""
+    """Bit-identical alone, in vectors, among NaN and infinities, and in the remainder of a loop."""
     x = rng(9).uniform(0.01, 700.0, 64)
     together = values(name, x)
     alone = np.array([values(name, [number])[0] for number in x])

@@ -11,7 +11,7 @@ MOST_STEPS = 5e7
 
 
 def stuck(steps: float, length: float, ratio: float = 0.5) -> bool:
-    """Whether a member leaves after a step of a length, s, at `TIME`; it is good where `ratio` is below 1."""
+    """Whether a member leaves after a step of given length, s, at `TIME`; `ratio` < 1 means accepted."""
     pool = np.zeros(layout.POOL_SIZE)
     for row, value in enumerate((1e-4, 1.0, 1e-9)):
         pool[(layout.CONTROL + row) * layout.BLOCK] = value

@@ -19,7 +19,7 @@ NUMBER = st.floats(-10.0, 10.0).map(lambda value: round(value, 6))
 
 
 def quintic(x0: float, v0: float, a0: float, x1: float, v1: float, a1: float, h: float) -> np.ndarray:
-    """Samples of the polynomial with these ends, from the Hermite basis, not from Bernstein's."""
+    """Samples of the polynomial with these end values, from the Hermite basis instead of Bernstein's."""
     s = SAMPLES
     rows, ends = [], [x0, v0 * h, a0 * h * h, x1, v1 * h, a1 * h * h]
     for place in (0.0, 1.0):
@@ -35,7 +35,7 @@ ENDS = st.tuples(NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, st.sampled_from
 @settings(max_examples=400)
 @given(ends=ENDS, gap=st.floats(0.0, 5.0))
 def test_no_crossing_is_overlooked(ends: tuple[float, ...], gap: float) -> None:
-    """From at or below the level: a verdict of "no switch" means that no sample lies above it."""
+    """From at or below the level: the result "no switch" means that no sample lies above the level."""
     assume(ends[1] != 0.0 or ends[2] != 0.0)
     level = ends[0] + gap
     code = rises_through(*ends, level)
@@ -116,6 +116,6 @@ def test_control_points_are_those_of_the_quintic(ends: tuple[float, ...]) -> Non
 
 
 def test_a_graze_within_the_margin_is_not_judged_by_the_quintic() -> None:
-    """A parabola whose apex misses the level by less than the margin is left to the integrator."""
+    """A parabola whose apex misses the level by less than the margin is delegated to the integrator."""
     for miss, code in ((0.5 * MARGIN, NEAR_TOUCH), (-0.5 * MARGIN, NEAR_TOUCH), (1.0, NO_SWITCH)):
         assert rises_through(-1.0, 2.0, -2.0, -1.0, -2.0, -2.0, 2.0, miss) == code

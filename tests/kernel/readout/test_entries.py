@@ -1,4 +1,4 @@
-"""The machine code that a page runs after a run computes the results of the library."""
+"""Machine code of the page for the results of a run gives the results of the library."""
 
 import dataclasses
 from collections.abc import Callable
@@ -22,18 +22,18 @@ FEWEST = 300
 
 
 def fields_of(rows: Any) -> np.ndarray:
-    """Fields of dots, without the index, or of an energy ledger, as numbers; NaN for None."""
+    """Fields of dots, without the index, or of an energy ledger, as numbers; None becomes NaN."""
     table = [dataclasses.astuple(row)[1 if hasattr(row, "index") else 0 :] for row in rows]
     return np.array(table, dtype=np.float64)
 
 
 def machine_code(motion: Motion) -> Callable[..., Any]:
-    """Call of an entry point by name, as machine code for the laws of a run."""
+    """Call an entry point by name, as machine code for the laws of a run."""
     return lambda name, *arguments: compiled(name, motion._problem.laws)(*arguments)
 
 
 def check_read_out(motion: Motion, call: Callable[..., Any]) -> None:
-    """Read a run out as a page does, with its entry points only, and compare."""
+    """Compute the results of a run as a page does, with entry points only, and compare."""
     problem, record = motion._problem, motion._record
     nodes, firings = record.nodes, problem.firings
     times = np.empty(FEWEST + 3 * len(nodes) + 1)
@@ -77,7 +77,7 @@ def check_read_out(motion: Motion, call: Callable[..., Any]) -> None:
 
 
 def motion_of(name: str, rng: np.random.Generator) -> Motion:
-    """Run of a shipped hammer with two constants changed, under its pulse or a sinusoidal force."""
+    """Run a shipped hammer with two changed constants, under its pulse or a sinusoidal force."""
     hammer = ph.load(name)
     keys = [key for key, constant in hammer.constants.items() if constant.si]
     changed: Any = {key: hammer.constants[key].si * rng.uniform(0.95, 1.05) for key in rng.choice(keys, 2)}

@@ -160,7 +160,7 @@ def test_the_distances_of_repeats_are_those_of_the_verdict(count: int, period: i
 def test_the_states_decide_the_period_as_in_the_library(
     period: int, size: float, multiplier: float, seed: int
 ) -> None:
-    """States about an orbit that they approach, or about which they alternate."""
+    """States near an orbit, which converge monotonically or alternately."""
     rng = np.random.default_rng(seed)
     decay = multiplier ** (np.arange(120) // period)
     orbit = rng.normal(size=(period, 3)) * rng.choice([1.0, 1e-4])
@@ -218,7 +218,7 @@ def test_the_limits_of_settled_states_are_those_of_the_library() -> None:
 
 @dataclasses.dataclass
 class Henon:
-    """Map of Hénon, unusable beyond `unusable`, without a derivative beyond `kink`."""
+    """Hénon map, unusable beyond `unusable`, without a derivative beyond `kink`."""
 
     a: float
     b: float
@@ -243,7 +243,7 @@ class Henon:
 
 
 def settled_of(henon: Henon, states: Any, scales: Any, period: int) -> tuple[int, float]:
-    """Period and multiplier, found as by the page."""
+    """Period and multiplier, computed as in the page."""
     if clear := section.settled_period(states, scales, period, True):
         return clear, math.nan
     for count in (count for count in range(1, period + 1) if period % count == 0):
@@ -273,7 +273,7 @@ def settled_of(henon: Henon, states: Any, scales: Any, period: int) -> tuple[int
 def test_newtons_method_decides_the_period_as_in_the_library(
     seed: int, near: float, limited: bool, kinked: bool
 ) -> None:
-    """States near a period doubling of the map of Hénon, which approach an orbit slowly."""
+    """States near a period doubling of the Hénon map, which converge slowly to an orbit."""
     rng = np.random.default_rng(seed)
     b = rng.uniform(-0.3, 0.3)
     doubling = 0.75 * (1.0 - b) ** 2

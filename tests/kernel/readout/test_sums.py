@@ -1,4 +1,4 @@
-"""Sums of columns are those of the standard library and of NumPy, to the last bit."""
+"""Column sums equal those of the standard library and of NumPy, bit for bit."""
 
 import math
 

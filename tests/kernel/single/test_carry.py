@@ -128,7 +128,7 @@ def test_pauses_with_every_law(pack: str, backstop: str) -> None:
 
 
 def test_a_rest_that_is_paused_goes_on(hammer: ph.Hammer) -> None:
-    """Held before the first pulse and after it died out; the record of the rest is whole."""
+    """Paused before the first pulse and after its decay; the record of the remainder is complete."""
     problem = problem_of(hammer, ph.PulseTrain(hammer.waveform, at=[2e-3, 20e-3]))
     whole = problem.run(25e-3)
     assert (whole.nodes[:, 3] == HELD).sum() >= 2

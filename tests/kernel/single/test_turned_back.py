@@ -1,4 +1,4 @@
-"""The regularised time of a backstop contact from which the armature nearly leaves and is turned back."""
+"""Regularised time of a backstop contact in which the armature nearly leaves and is turned back."""
 
 import numpy as np
 import pytest

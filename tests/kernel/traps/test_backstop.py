@@ -92,7 +92,7 @@ SLIGHT = [0.0, 1e-12, -1e-12, 1e-9, -1e-9, 1e-7, -1e-7, 2.0, -2.0]
 @pytest.mark.parametrize("v", SLIGHT)
 @pytest.mark.parametrize("force", [-2.0, 2.0])
 def test_a_start_on_the_backstop(force: float, v: float) -> None:
-    """A step that ends on the position to the last bit, going in, is a touch, not a standstill."""
+    """An inward step that ends exactly on the position is a touch, not a standstill."""
     found = hammers.compare(hammers.shelf(force), hammers.idle(), 1e-3, state=(STOP, v))
     assert found.motion.status == "ok"
     assert found.error < 1e-9
@@ -135,7 +135,7 @@ def test_starts_inside_the_backstop(v: float) -> None:
 
 
 def test_edges_inside_a_regularised_step() -> None:
-    """Thirty pulses whose edges fall into one contact, at its deepest point and at both its ends too."""
+    """Thirty pulses with edges inside one contact, including its deepest point and both its ends."""
     free = ph.simulate(hammers.shelf(), hammers.idle(), duration=1e-3, state=(STOP + 1e-5, -1.0))
     contact = touches(free)[0]
     assert contact.t_out is not None
@@ -179,7 +179,7 @@ def test_rest_in_the_backstop_for_a_second_takes_few_steps() -> None:
 
 
 def test_rest_under_a_current_that_does_not_lift_is_bounded() -> None:
-    """A constant current shifts the state of rest; the ringing dies, and no contact ends."""
+    """A constant current shifts the rest state; the oscillation decays, and no contact ends."""
     hammer = hammers.crude()
     drive = ph.PulseTrain(Trapezoid(amplitude=0.1, rise=1e-3, width=0.1, fall=1e-3))
     motion = ph.simulate(hammer, drive, duration=0.11)
@@ -224,7 +224,7 @@ RELEASES = {
 
 @pytest.mark.parametrize("how", RELEASES)
 def test_release_from_a_rigid_backstop(how: str) -> None:
-    """The armature leaves when the force changes its sign, also where the force jumps."""
+    """The armature leaves when the force changes sign, even if the force jumps."""
     force, waveform, start = RELEASES[how]
     hammer = hammers.made_of(
         spring=hammers.preload(force, 1e3), pack=hammers.power(front=1e-2), backstop=hammers.rigid(0.5)
@@ -240,7 +240,7 @@ def test_release_from_a_rigid_backstop(how: str) -> None:
 @pytest.mark.parametrize("stiffness", [1e5, 1e6, 1e9, 1e12, 1e15])
 @pytest.mark.parametrize("mass", [1e-6, 4e-4, 1.0])
 def test_backstops_of_all_hardnesses(stiffness: float, mass: float) -> None:
-    """Thrown against the backstop without other forces: v_out = v_in, and the time of Hertz contact."""
+    """Thrown against the backstop without other forces: v_out = v_in after the duration of Hertz contact."""
     hammer = hammers.made_of(
         mass, spring=hammers.preload(0.0), pack=hammers.power(), backstop=hammers.hertz(stiffness)
     )
@@ -259,7 +259,7 @@ def test_backstops_of_all_hardnesses(stiffness: float, mass: float) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("gentle", [1e-3, 1e-6, 1e-9])
 def test_a_backstop_that_may_not_pull_lets_go_once(gentle: float) -> None:
-    """Damped so that v > k/l at every speed: after letting go it must not chatter."""
+    """Damped so that v > k/l at every speed: after release there must be no chatter."""
     hammer = hammers.made_of(
         spring=hammers.preload(-2.0), pack=hammers.PACKS["dashpot"], backstop=hammers.BACKSTOPS["elastomer"]
     )
@@ -274,7 +274,7 @@ def test_a_backstop_that_may_not_pull_lets_go_once(gentle: float) -> None:
 
 
 def test_the_rest_state_is_at_rest() -> None:
-    """`rest_state` and the force sum of the kernel agree: nothing moves from there."""
+    """`rest_state` and the force sum of the kernel agree: a run from there stays at rest."""
     for hammer in (
         hammers.crude(),
         hammers.made_of(
@@ -292,7 +292,7 @@ def test_the_rest_state_is_at_rest() -> None:
 
 
 def test_no_stroke_at_all() -> None:
-    """A pack whose front lies a micrometre before the backstop leaves the armature hardly any room."""
+    """A pack front one micrometre in front of the backstop leaves the armature hardly any room."""
     hammer = hammers.made_of(
         spring=hammers.preload(-2.0),
         pack=hammers.power(front=STOP + 1e-6),

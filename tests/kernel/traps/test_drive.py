@@ -49,7 +49,7 @@ def check_record(motion: ph.Motion) -> None:
 
 @pytest.mark.parametrize("ulps", [0, 1, 2, 1000])
 def test_one_pulse_that_begins_where_another_ends(ulps: int) -> None:
-    """Two blocks side by side are one block twice as long, whether the edges coincide or are an ulp apart."""
+    """Two adjacent blocks equal one block of twice the length, even if the edges differ by an ulp."""
     start = 2e-4
     for _ in range(ulps):
         start = math.nextafter(start, 1.0)
@@ -101,7 +101,7 @@ def test_a_pulse_fired_at_the_very_instant_of_a_switch(which: str) -> None:
 
 
 def test_many_coinciding_edges() -> None:
-    """A period that is a whole fraction of the width: edges fall on one another all along the train."""
+    """The width is a multiple of the period, so that edges coincide all along the train."""
     drive = ph.PulseTrain(BLOCK.scaled(0.2), period=2.5e-5, pulses=40)
     found = hammers.compare(hammers.shelf(), drive, 2.5e-3, state=(STOP, 0.0))
     check_record(found.motion)
@@ -139,7 +139,7 @@ def test_a_pulse_at_zero_and_one_much_later() -> None:
 
 
 def test_no_drive_array_is_too_short() -> None:
-    """A thousand overlapping pulses, all under way at once."""
+    """A thousand overlapping pulses, all active at once."""
     waveform = Trapezoid(amplitude=0.014, rise=1e-5, width=3e-4, fall=1e-5, quantity="force")
     drive = ph.PulseTrain(waveform, period=2e-7, pulses=1000)
     motion = run(drive, 1e-3)
@@ -150,7 +150,7 @@ def test_no_drive_array_is_too_short() -> None:
 @pytest.mark.parametrize("shape", ["rectangle", "half-sine", "sharp", "trapezoid"])
 @pytest.mark.parametrize("amplitude", [9.0, -3.0])
 def test_currents_beyond_the_one_that_bucks_all_of_the_pull(shape: str, amplitude: float) -> None:
-    """Am - Bm I changes its sign at 4.7 A: the pull grows again beyond."""
+    """Am - Bm I changes sign at 4.7 A: the pull grows again beyond."""
     hammer = hammers.crude()
     magnet = hammer.magnet
     assert amplitude < 0.0 or magnet.Am - magnet.Bm * amplitude < 0.0
@@ -164,7 +164,7 @@ def test_currents_beyond_the_one_that_bucks_all_of_the_pull(shape: str, amplitud
 
 
 def test_replaced_pulses_leave_nothing_behind() -> None:
-    """With "replace", a firing cuts off the pulse before, tail and all."""
+    """With "replace", a firing cuts off the preceding pulse, including its tail."""
     waveform = Rectangle(amplitude=14.0, width=2e-4, rise=2e-5, decay=5e-5, quantity="force")
     drive = ph.PulseTrain(waveform, at=[0.0, 2.2e-4, 2.9e-4, 1e-3], overlap="replace")
     found = hammers.compare(hammers.shelf(), drive, 2e-3)
@@ -176,7 +176,7 @@ def test_replaced_pulses_leave_nothing_behind() -> None:
 
 
 def switches(motion: ph.Motion) -> list[tuple[str, float]]:
-    """All switches after which the motion depends on nothing but the state: no peak is remembered."""
+    """All switches after which the motion depends on the state alone, without a remembered peak."""
     found = []
     for contact in motion.contacts:
         if not contact.initial:
@@ -259,7 +259,7 @@ def test_a_run_that_takes_too_many_steps_is_a_status(monkeypatch: pytest.MonkeyP
 
 
 def test_a_high_frequency_force_misses_nothing() -> None:
-    """Fifty kilohertz over a slow flight: dozens of extrema, each step resolved."""
+    """A slow flight under 50 kHz: dozens of extrema, each step resolved."""
     hammer = hammers.shelf(-0.5)
     drive = ph.SineForce(20.0, 5e4, 0.3)
     found = hammers.compare(hammer, drive, 6e-4, state=(STOP + 6e-5, 0.3))

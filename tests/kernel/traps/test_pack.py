@@ -1,7 +1,7 @@
 """Regression tests in flight and in the pack: cases in which an earlier kernel hung or was wrong.
 
-The armature flies under a constant force, so that a free step is as long as the kernel dares and the flight
-is known in closed form; where contacts decide, the reference is the judge.
+The armature flies under a constant force, so that a free step has the maximum length and the flight
+is known in closed form; contacts are compared with the reference.
 """
 
 import math
@@ -39,7 +39,7 @@ def pack_contacts(motion: ph.Motion) -> list[Contact]:
 @pytest.mark.parametrize("depth", [1e-6, 1e-9, 1e-12, 1e-14, 1e-16])
 @pytest.mark.parametrize("edge", [0.0, -1e-6, 1e-7, 5e-6])
 def test_a_free_step_enters_and_leaves_the_pack(depth: float, edge: float) -> None:
-    """A graze of any depth is found, wherever the step ends: an edge `edge` after the apex cuts it there."""
+    """A graze of any depth is found for any end of the step: an edge `edge` after the apex ends it there."""
     apex = 1.0 / PULL
     motion = ph.simulate(hammers.shelf(), edges_at(apex + edge), duration=1.5e-4, state=thrown(depth))
     assert motion.ok
@@ -119,7 +119,7 @@ def test_a_step_without_a_finite_error_is_shortened(ratio: float) -> None:
 
 
 def test_a_nan_error_estimate_is_no_small_error() -> None:
-    """Beyond x = 0 the magnet's law is NaN: stages there must not be accepted, nor tried for ever."""
+    """Beyond x = 0 the magnet's law is NaN: stages there must not be accepted, nor repeated without end."""
     hammer = hammers.made_of(magnet=hammers.MAGNETS["inverse-root"], spring=hammers.SPRINGS["linear"])
     times = np.linspace(0.0, 2e-3, 301)
     with hammers.interpreted():
@@ -141,7 +141,7 @@ def test_a_nan_error_estimate_is_no_small_error() -> None:
     [(12.0, 1.5, False), (40.0, 1.5, False), (130.0, 1.5, False), (2.0, 1.25, True), (12.0, 4.3, True)],
 )
 def test_reversals_inside_the_pack_from_below(force: float, speed: float, goes_in: bool) -> None:
-    """The wire goes in again where the force exceeds the loading branch; else the trough is a new maximum."""
+    """The wire enters again if the force exceeds the loading branch; else the trough is a new maximum."""
     hammer = hammers.shelf(force)
     found = hammers.compare(hammer, hammers.idle(), 6e-4, state=(FRONT, speed))
     events = found.truth.events
@@ -158,7 +158,7 @@ def test_reversals_inside_the_pack_from_below(force: float, speed: float, goes_i
 @pytest.mark.slow
 @pytest.mark.parametrize("reloading", ["loading-branch", "unloading-curve"])
 def test_held_inside_the_pack_until_the_force_fades(reloading: str) -> None:
-    """Rest inside the pack ends when the force begins to change, not some time later."""
+    """Rest inside the pack ends when the force begins to change, not later."""
     hammer = hammers.shelf(-2.0).replace("pack.reloading", reloading)
     drive = ph.PulseTrain(Trapezoid(amplitude=20.0, rise=5e-5, width=2.4e-3, fall=4e-4, quantity="force"))
     found = hammers.compare(hammer, drive, 4e-3, points=1601)
@@ -171,7 +171,7 @@ def test_held_inside_the_pack_until_the_force_fades(reloading: str) -> None:
 
 
 def test_rest_in_the_pack_is_the_same_between_the_steps() -> None:
-    """The state of rest holds at all times, however long the step that spans them."""
+    """The rest state persists at all times, for any step length."""
     hammer = hammers.shelf(20.0)
     motion = ph.simulate(hammer, hammers.idle(), duration=5e-3, state=(FRONT, 0.5))
     late = np.linspace(3e-3, 5e-3, 1001)
@@ -195,7 +195,7 @@ def test_rest_in_the_pack_for_a_second_takes_few_steps() -> None:
 
 
 def test_fast_flights_into_the_pack() -> None:
-    """A thousand metres a second: the whole stroke within one time unit of the contact."""
+    """An impact at 1000 m/s: the whole stroke within one time unit of the contact."""
     for state in ((FRONT, 1e3), (STOP, 1e3), (FRONT - 1e-9, 50.0)):
         found = hammers.compare(hammers.shelf(), hammers.idle(), 2e-5, state=state, scale=STROKE)
         assert found.motion.status == "ok"
@@ -205,7 +205,7 @@ def test_fast_flights_into_the_pack() -> None:
 
 @pytest.mark.parametrize("speed", [0.0, 1.0, -1.0, 30.0, -30.0])
 def test_starts_inside_the_pack(speed: float) -> None:
-    """A state in the pack meets fresh paper at its own depth, like the reference."""
+    """A state in the pack meets fresh paper at its own depth, as in the reference."""
     found = hammers.compare(hammers.shelf(), hammers.idle(), 4e-4, state=(FRONT + 4e-5, speed))
     assert found.motion.contacts[0].initial
     assert found.motion.status == "ok"

@@ -13,7 +13,7 @@ from printhammer.drive.waveforms.shapes import Trapezoid
 
 
 def test_the_end_of_the_range_of_a_fit_is_met() -> None:
-    """A law that holds up to 250 um: the run ends there, inside the pack, and no output lies beyond."""
+    """A law valid up to 250 um: the run ends there, inside the pack, and no output lies beyond."""
     hammer = hammers.crude().replace({"magnet.range_min": 30e-6, "magnet.range_max": 250e-6})
     motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform), times=np.linspace(0.0, 4e-3, 4001))
     assert motion.status == "range left"
@@ -28,7 +28,7 @@ def test_the_end_of_the_range_of_a_fit_is_met() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("over", [1e-7, 1e-9, 1e-11])
 def test_a_short_visit_beyond_the_range_is_not_overlooked(over: float) -> None:
-    """The flight leaves the range and comes back inside it within one step."""
+    """The flight leaves the range and returns within one step."""
     pull, speed = 1e4, 1.0
     hammer = hammers.made_of(
         magnet=hammers.MAGNETS["inverse-root"].model_copy(

@@ -1,4 +1,4 @@
-"""The search for buzz printing, judged again from the contacts of the train that it returns."""
+"""The search for buzz printing, verified from the contacts of the train that it returns."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ def single_force(hammer: "ph.Hammer") -> float:
 
 
 def assert_it_prints(hammer: "ph.Hammer", train: BuzzTrain) -> None:
-    """The claim, from the contacts of a finer run and not through the functions of the search."""
+    """Evaluate the claim from the contacts of a finer run, without the functions of the search."""
     drive = ph.PulseTrain(hammer.waveform, at=train.times)
     motion = ph.simulate(hammer, drive, tolerance=1e-10, points=2)
     pack = [c for c in motion.contacts if c.surface == "pack"]

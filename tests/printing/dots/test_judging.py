@@ -12,7 +12,7 @@ US = 1e-6
 
 
 def dots(*rows: tuple[float, float | None, float | None, int]) -> DotTable:
-    """One member: (fired at, flight time or None for a lost dot, force, extra contacts) of each firing."""
+    """One member: (firing time, flight time or None for a lost dot, force, extra contacts) of each firing."""
     fired_at, flight, force, extra = (np.array([column], dtype=float) for column in zip(*rows, strict=True))
     struck = ~np.isnan(flight)
     blank = np.full(fired_at.shape, np.nan)

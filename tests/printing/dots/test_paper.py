@@ -69,7 +69,7 @@ def test_each_dot_meets_the_pack_of_its_slot() -> None:
 
 
 def test_a_nearer_pack_is_not_laid_around_the_armature() -> None:
-    """Where the next pack would already be indented the change waits until the armature is outside both."""
+    """If the next pack would already be indented, the change waits until the armature is outside both."""
     hammer = crude()
     assert hammer.front is not None
     near = hammer.replace({"pack.front": hammer.front - 30e-6}, source="test")

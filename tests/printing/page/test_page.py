@@ -44,7 +44,7 @@ def noise(seed: int = 5, wires: int = 9, slots: int = 14, share: float = 0.6) ->
 
 @pytest.fixture(scope="module")
 def page(hammer: ph.Hammer) -> Page:
-    """A page with lost dots and extra contacts, so short that its runs are not chaotic yet."""
+    """A page with lost dots and extra contacts, short enough that its runs are not yet chaotic."""
     return print_page(hammer, noise(), RATE, tolerance=TIGHT)
 
 
@@ -136,7 +136,7 @@ def test_a_dot_by_itself_is_that_of_the_single_pulse(hammer: ph.Hammer) -> None:
 
 @pytest.mark.slow
 def test_a_slow_device_prints_the_last_dot_of_every_wire() -> None:
-    """HAMMER has 107 dots in the font of nine wires; the window of a fast device lost seven of them."""
+    """HAMMER has 107 dots in the font of nine wires; the window of a fast device omitted seven of them."""
     embosser = ph.load("braille-embosser")
     pattern = Pattern.from_text("HAMMER")
     assert pattern.wanted == int(pattern.dots.sum()) == 107

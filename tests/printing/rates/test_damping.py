@@ -19,7 +19,7 @@ GRID = {"first": 400.0, "last": 1200.0, "step": 400.0, "limits": Limits(force=0.
 
 @pytest.fixture(scope="module")
 def found(hammer: "ph.Hammer") -> DampingStudy:
-    """Hard backstops only: no other laws are to be compiled."""
+    """Hard backstops only, so that no other laws are compiled."""
     tried = [
         Material("as it is", "as it is", {}),
         Material("hard", "less", {"backstop.damping": 0.5 * hammer.backstop.l}),

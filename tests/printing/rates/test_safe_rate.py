@@ -23,7 +23,7 @@ COARSE = {"first": 250.0, "step": 125.0, "last": 2000.0}
 
 
 def printed_well(hammer: "ph.Hammer", rate: float, limits: Limits) -> bool:
-    """Whether all patterns from rest print well, one motion after the other, without ensembles."""
+    """Whether all patterns from rest are within limits, simulated one by one without ensembles."""
     single = ph.simulate(hammer, ph.PulseTrain(hammer.waveform), duration=4e-3).dots[0]
     for row in itertools.product((False, True), repeat=8):
         slots = [slot for slot, wanted in enumerate(row) if wanted]
@@ -77,7 +77,7 @@ def test_what_fails_first_fails_alone_as_well(hammer: "ph.Hammer") -> None:
 
 
 def test_a_rate_that_eight_dots_bear_and_a_row_does_not_is_not_safe() -> None:
-    """At 840 Hz an error of a row changes its sign from dot to dot, and grows: seen in one long motion."""
+    """At 840 Hz an error of a row alternates in sign and grows from dot to dot, as one long motion shows."""
     hammer = ph.load("hendriks-1983-1")
     grid = {"first": 835.0, "last": 840.0}
     assert safe_rate(hammer, long=False, **grid).at_least
@@ -135,7 +135,7 @@ def test_rates_beyond_the_first_failure_are_run_on_request(hammer: "ph.Hammer") 
 
 
 def test_a_strategy_may_fire_ahead(hammer: "ph.Hammer") -> None:
-    """All dots as much too early are judged by their slots, not by their firings."""
+    """Dots that are all equally early are judged relative to their slots, not to their firings."""
 
     def ahead(driven: "ph.Hammer", patterns: Sequence[tuple[int, ...]], rate: float) -> list[Drive]:
         return [drive.with_times(drive.times - 40e-6) for drive in open_loop(driven, patterns, rate)]
@@ -233,7 +233,7 @@ def test_perturbations_that_make_no_sense_are_refused(by: Perturbation, key: str
 
 
 def test_drives_may_fire_waveforms_of_their_own(hammer: "ph.Hammer") -> None:
-    """The same pulses as a sequence, which runs through another kernel path, are judged alike."""
+    """The same pulses as a sequence, which uses another path of the kernel, give the same result."""
 
     def sequence(driven: "ph.Hammer", patterns: Sequence[tuple[int, ...]], rate: float) -> list[Drive]:
         drives = open_loop(driven, patterns, rate)
@@ -252,7 +252,7 @@ def test_drives_may_fire_waveforms_of_their_own(hammer: "ph.Hammer") -> None:
 
 @pytest.mark.slow
 def test_words_give_the_rate_and_the_deviations_of_all_patterns(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A relay comes to rest between dots two slots apart; the patterns themselves are run beside."""
+    """A relay comes to rest between dots two slots apart; the patterns themselves are simulated as well."""
     hammer = ph.load("relay-5v")
     brief = safe_rate(hammer, first=29.8)
     assert len(brief.rates) > 1
@@ -269,11 +269,11 @@ def test_words_give_the_rate_and_the_deviations_of_all_patterns(monkeypatch: pyt
 def test_rows_in_which_errors_grow_are_run_to_their_end(
     monkeypatch: pytest.MonkeyPatch, multiplier: float
 ) -> None:
-    """Dots of such a row may agree to 1e-6 at the 24th and be lost at the 100th."""
+    """The dots of such a row may agree to 1e-6 at the 24th dot and be lost at the 100th dot."""
     run_whole: list[float] = []
 
     class EnoughError(Exception):
-        """Ends the search at the first rate whose patterns are run themselves."""
+        """End the search at the first rate whose patterns are simulated themselves."""
 
     def whole(cases: Sequence[Case], *_: object, **__: object) -> None:
         run_whole.append(cases[0].rate)

@@ -1,4 +1,4 @@
-"""Hammers drawn from the variability of a production."""
+"""Hammers drawn from the variability of the production."""
 
 import numpy as np
 import pytest

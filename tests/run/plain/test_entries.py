@@ -1,4 +1,4 @@
-"""Plain functions as entry points: machine code computes what the functions compute, and laws are bound."""
+"""Plain functions as entry points: machine code gives the results of the functions, and laws are bound."""
 
 from typing import TYPE_CHECKING, Any
 

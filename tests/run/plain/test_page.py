@@ -31,7 +31,7 @@ def about_of(drive: Drive) -> FloatArray:
 
 
 def posed(hammer: Hammer, drive: Drive) -> tuple[FloatArray, FloatArray, float, FloatArray]:
-    """Constants, limits, rest position, and control with bounds, as a page computes them."""
+    """Constants, limits, rest position, and control with bounds, as computed by a page."""
     problem = Problem(hammer, drive, (hammer.rest, 0.0), 0.0, 2e-11)
     laws, numbers = problem.laws, numbers_of(hammer)
     constants, ends = np.zeros(problem.constants.size), np.empty(2)

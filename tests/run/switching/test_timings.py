@@ -188,7 +188,7 @@ def test_the_picture_shows_the_state_of_each_contact(tmp_path: Path) -> None:
 
 
 def test_a_sinusoidal_force_switches_nothing() -> None:
-    """The summary then counts closings; a bounce time over the whole run would be nonsense."""
+    """The summary then counts closings; a bounce time over the whole run would be meaningless."""
     hammer = ph.Hammer.build(1e-3, spring={"law": "preload", "preload": 0.0, "stiffness": 100.0}).replace(
         "contact.leaf", {"law": "linear", "side": "front", "position": 1e-4, "stiffness": 1e4}
     )

@@ -1,4 +1,4 @@
-"""Exports of one record, after the public descriptions of their formats; none is of an instrument.
+"""Exports of one record, written from the public descriptions of their formats, not by instruments.
 
 The record has 30 samples, 1 us apart, from 4 us before the trigger: the current of a coil and the
 displacement of its armature. Instruments show volts: the current over an inverted shunt of -0.1 V/A, the
@@ -20,7 +20,7 @@ CHANNELS: Final = {"current": "{}*-10 A/V", "displacement": "{}*50 um/V + 120 um
 
 
 class Export(NamedTuple):
-    """A file, and what is said of its columns; nothing where its heading says all."""
+    """A file and its column settings, if the heading is incomplete."""
 
     content: bytes
     columns: str = ""
@@ -39,7 +39,7 @@ def table(
 
 
 def said(time: str = "time=1", first: int = 2) -> str:
-    """Return what is said of two channels that begin at a column."""
+    """Return the settings of two channels from a given column onward."""
     parts = [f"{name}={entry.format(first + k)}" for k, (name, entry) in enumerate(CHANNELS.items())]
     return ", ".join([*([time] if time else []), *parts])
 

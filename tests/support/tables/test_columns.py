@@ -173,7 +173,7 @@ def test_a_fit_takes_columns(tmp_path: Path) -> None:
 
 
 def test_degrees_fahrenheit_are_converted_or_refused(tmp_path: Path) -> None:
-    """A factor has no place for their zero, and says so."""
+    """A factor cannot represent the offset of degrees Fahrenheit; the error says so."""
     path = tmp_path / "warm.csv"
     path.write_text("ambient [degF],sensor [V]\n32,1\n212,2\n")
     wanted = {"ambient": "degC"}

@@ -1,4 +1,4 @@
-"""Exports of one record through every reader: each cell is right, or the file is refused in one sentence."""
+"""Exports of one record through every reader: each cell is correct, or the file is rejected."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -57,7 +57,7 @@ def written(folder: Path, export: exports.Export, columns: str) -> Path:
 
 
 def right(found: Curves, name: str) -> None:
-    """Check that a reader shows the record, from the firing on if it is a drive."""
+    """Check that a reader returns the record, from the firing onward for a drive."""
     if name == "Saleae, edges":
         # A level holds until the next edge.
         late = np.searchsorted(found["time"], [0.0, 10e-6, 20e-6 - 1e-12, 30e-6], side="right") - 1

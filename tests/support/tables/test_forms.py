@@ -1,4 +1,4 @@
-"""Forms in which one small record is written: every cell is right, or refused with its line."""
+"""Formats of one small record: every cell is correct, or rejected with its line number."""
 
 import gc
 from pathlib import Path
@@ -191,7 +191,7 @@ def test_units_in_capital_letters_are_read_only_if_unambiguous(tmp_path: Path) -
 
 
 def test_a_channel_with_a_number_has_no_unit(tmp_path: Path) -> None:
-    """A1 is a channel, not an ampere."""
+    """A1 is a channel name, not an ampere."""
     for text in ("time [us],A1\n0,0\n1,1\n", "time [us],probe_A1\n0,0\n1,1\n", "A1\n0\n1\n"):
         with refused(text.splitlines()[0].split(",")[-1]):
             read(tmp_path, text)

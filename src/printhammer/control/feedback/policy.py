@@ -209,8 +209,8 @@ class Policy:
     ) -> tuple[IntArray, FloatArray, Choice]:
         """Select the action of least cost for each of M touches; return index, cost and all outcomes.
 
-        The touches have a `kind`, a lateness `late`, s, and a `speed`, m/s. The next dot is due after `wait`,
-        s, and `after` dots follow between the next dot and a rest. The pack is `front` farther away than
+        The touches have a `kind`, a lateness `late` [s] and a `speed` [m/s]. The next dot is due after `wait`
+        [s], and `after` dots follow between the next dot and a rest. The pack is `front` farther away than
         nominal, with standard deviation `front_error`, as fractions of the stroke. If only the throw remains
         to be decided, `done` states the actions already taken.
         """

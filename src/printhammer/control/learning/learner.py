@@ -95,7 +95,7 @@ class Learner:
 
     @property
     def pulse(self) -> Waveform:
-        """Waveform of the drive in use, learned table or open loop."""
+        """Waveform of the present drive, a learned table or open loop."""
         return self.law.entries.task.pulse if self.learned else self.verdict.loop.pulse
 
     @property
