@@ -1,6 +1,6 @@
-"""Hosts that call a kernel in WebAssembly as Python calls its machine code: wasmtime, and Node with call.mjs.
+"""Hosts that call a WebAssembly kernel as Python calls machine code: wasmtime, and Node with call.mjs.
 
-Helpers only; the tests that use them say what must hold.
+Helpers only; assertions are in the tests that use them.
 """
 
 import base64
@@ -35,7 +35,7 @@ def answer(results: list[int]) -> Any:
 
 
 class Wasmtime:
-    """A module in wasmtime, called with blocks of arguments as `calls.calling_code` says."""
+    """A module in wasmtime, called with blocks of arguments as in `calls.calling_code`."""
 
     def __init__(self, module: bytes) -> None:
         import wasmtime
@@ -141,7 +141,7 @@ class Node:
         return json.loads(self._process.stdout.readline())
 
     def call(self, name: str, *arguments: Any, results: int | None = None) -> Any:
-        """Call an entry point; the module itself says how many results it has."""
+        """Call an entry point; the module itself states the number of its results."""
         arrays: list[np.ndarray] = []
 
         def packed(value: Any) -> Any:

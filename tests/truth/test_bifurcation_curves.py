@@ -1,4 +1,4 @@
-"""Curves of bifurcations of the damped impact oscillator against a solver that shares nothing with them.
+"""Bifurcation curves of the damped impact oscillator against an independent solver.
 
 x'' + 0.04 x' + x = -1 + F cos(w t), rigid stop at 0 with the restitution 0.9, orbits with one impact in two
 periods of the force. The doublings at w = 0.81 and 0.95001 and the fold at 0.799 are published values.
@@ -42,7 +42,7 @@ def sine(omega: float, force: float) -> ph.SineForce:
 
 @functools.cache
 def branch_of(omega: float, force: float, guess: tuple[float, float], width: float, most: int) -> Branch:
-    """The branch through the orbit with one impact in two periods, its section half a period behind that."""
+    """The branch through the orbit with one impact in two periods; its section is half a period later."""
     (impact,) = orbit = CASE.orbit(omega, force, [guess], 2)
     phase = float(impact[0]) + math.pi
     return ph.continuation(
@@ -58,7 +58,7 @@ def branch_of(omega: float, force: float, guess: tuple[float, float], width: flo
 
 
 def at_rest(omega: float, force: float) -> Branch:
-    """The branch of the oscillation without impact, to its grazing."""
+    """The branch of the oscillation without impact, up to its grazing."""
     return ph.continuation(
         oscillator(),
         "drive.amplitude",
@@ -245,7 +245,7 @@ def test_bad_input_is_refused_in_one_sentence(tmp_path: Path) -> None:
 
 
 def test_what_a_point_of_a_curve_costs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """In evaluations of the map with its derivatives, which do not depend on the machine."""
+    """The cost is counted in evaluations of the map, which do not depend on the machine."""
     calls = 0
     evaluate = ImpactSystem.__call__
 
@@ -276,7 +276,7 @@ def test_twenty_branches_after_switching(doubling: BifurcationCurve) -> None:
 
 
 def compared(branch: Branch, number: int, omega: float) -> None:
-    """Two impacts in four periods, from where the program has them."""
+    """Two impacts in four periods, started from the orbit that the program finds."""
     orbit, force = branch.orbit(number), float(branch.values[number])
     guess = np.array([(omega * contact.t_in, -contact.v_in) for contact in orbit.contacts])
     exact = CASE.orbit(omega, force, guess, 4)

@@ -24,7 +24,7 @@ FAR = 0.1
 
 
 def locked(**coil: str) -> ph.Hammer:
-    """A coil on a mass that hardly moves."""
+    """A coil on a nearly immobile mass."""
     spring = {"law": "preload", "preload": "0 N", "stiffness": "100 N/m"}
     return ph.Hammer.build("1 kg", spring=spring, coil={"resistance": f"{R} ohm", **coil})
 
@@ -74,7 +74,7 @@ def test_a_chopper_of_two_thresholds_has_the_closed_form_s_instants() -> None:
 
 @pytest.mark.parametrize("ulps", [-50, -1, 0, 1, 50])
 def test_a_threshold_that_is_reached_at_the_end_of_the_pulse_switches_once(ulps: int) -> None:
-    """Pulse and threshold end the supply together: the current falls through the diode, switched once."""
+    """Pulse and threshold end the supply together: the current decays through the diode, switched once."""
     upper, voltage, diode, tau = 1.0, 24.0, 0.7, L / R
     width = -tau * math.log1p(-upper * R / voltage)
     width += ulps * math.ulp(width)
@@ -143,7 +143,7 @@ def test_a_bridge_drives_the_current_through_zero() -> None:
 
 
 def test_a_moving_coil_is_linear() -> None:
-    """Force k i and back-EMF k v: the matrix exponential, to 1e-12."""
+    """Force k i and back-EMF k v: agreement with the matrix exponential to 1e-12."""
     mass, stiffness, damping, factor, voltage = 0.01, 400.0, 0.3, 6.0, 12.0
     hammer = ph.Hammer.build(
         mass,
@@ -177,7 +177,7 @@ def test_a_moving_coil_is_linear() -> None:
 
 
 def paper(resistance: float, inductance: float, **more: Any) -> ph.Hammer:
-    """The hammer of the paper behind a rail, its pack out of reach; other tests share the machine code."""
+    """The hammer of the paper with a rail driver, its pack out of reach; tests share the machine code."""
     paper = {"pack.front": "1 mm", "platen": "1.1 mm", "pack.thickness": "0.1 mm"}
     return ph.load("hendriks-1983-1").replace(
         {"coil.resistance": resistance, "coil.inductance": inductance, **paper, **more}
@@ -185,7 +185,7 @@ def paper(resistance: float, inductance: float, **more: Any) -> ph.Hammer:
 
 
 def as_device(hammer: ph.Hammer, resistance: float, inductance: float) -> Device:
-    """The same, written out from its constants."""
+    """The same hammer, defined by its constants for the independent integration."""
     c = {key: constant.si for key, constant in hammer.constants.items()}
     f0, am, bm = c["magnet.F0"], c["magnet.Am"], c["magnet.Bm"]
     bs, stiffness, place = c["spring.Bs"], c["spring.Bs"] / c["spring.As"], c["backstop.position"]
@@ -205,7 +205,7 @@ def as_device(hammer: ph.Hammer, resistance: float, inductance: float) -> Device
 
 
 def random_driver(rng: np.random.Generator) -> tuple[Waveform, list[Phase]]:
-    """Return a driver of random kind, and the same written out for the other integration."""
+    """Return a driver of random kind, and its definition for the independent integration."""
     voltage, width = rng.uniform(10.0, 40.0), rng.uniform(60e-6, 250e-6)
     clamp, series = rng.uniform(0.5, 30.0), rng.uniform(0.0, 2.0)
     upper = rng.uniform(0.3, 1.5)
@@ -238,7 +238,7 @@ def random_driver(rng: np.random.Generator) -> tuple[Waveform, list[Phase]]:
 
 
 def compare(seed: int, tolerance: float) -> tuple[ph.Motion, Run]:
-    """Run one random coil and driver in both."""
+    """Run one random coil and driver with both integrators."""
     rng = np.random.default_rng(seed)
     resistance, inductance = rng.uniform(1.0, 8.0), rng.uniform(2.5e-3, 6e-3)
     hammer = paper(resistance, inductance)
@@ -261,7 +261,7 @@ def compare(seed: int, tolerance: float) -> tuple[ph.Motion, Run]:
 
 
 def agrees(motion: ph.Motion, run: Run, time: float) -> None:
-    """Compare the switchings of two runs; the first of the other one begins the run."""
+    """Compare the switchings of two runs; the first switching of the second run is its start."""
     times, paths = motion.switchings
     others = [entry for entry in run.switchings if entry[0] > 0.0]
     assert list(paths) == [path for _t, path in others]
@@ -284,7 +284,7 @@ def test_random_coils_against_an_independent_integration(seed: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("block", range(3))
 def test_no_switching_of_many_runs_is_lost(block: int) -> None:
-    """Ten blocks, a thousand runs, were tried; three are enough to tell when it breaks."""
+    """Ten blocks, a thousand runs, have passed; three blocks suffice to detect a regression."""
     for seed in range(100 * block, 100 * block + 100):
         motion, run = compare(1000 + seed, 1e-11)
         assert motion.ok
@@ -306,7 +306,7 @@ def test_both_ledgers_close(seed: int) -> None:
 
 
 def test_a_coil_without_back_emf_leaves_the_motion_of_the_current_as_it_was() -> None:
-    """The voltage R i + L di/dt of the old current makes that current, and the motion with it."""
+    """The voltage R i + L di/dt of a given current reproduces this current, and the motion with it."""
     shipped = ph.load("hendriks-1983-1")
     # The armature does not reach the pack; laws without a pack would be compiled for this test alone.
     hammer = shipped.replace({"pack.front": shipped.front + FAR, "platen": shipped.platen + FAR})
@@ -337,7 +337,7 @@ def test_a_coil_without_back_emf_leaves_the_motion_of_the_current_as_it_was() ->
 
 
 class Exponentials(Waveform):
-    """Voltages that are exponentials, one after the other."""
+    """Voltages that are exponentials, in succession."""
 
     shape = "exponentials"
     rows: tuple[tuple[float, float, float, float], ...] = ()

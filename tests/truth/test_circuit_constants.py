@@ -21,7 +21,7 @@ FIRINGS = {"period": 1.1e-3, "pulses": 2}
 
 @pytest.mark.parametrize("name", DRIVERS)
 def test_every_constant_of_a_device(name: str) -> None:
-    """Coil, magnet, spring, contacts, driver and period: in a decay, and after the second firing."""
+    """Coil, magnet, spring, contacts, driver and period: during a decay, and after the second firing."""
     drive = ph.PulseTrain(DRIVERS[name], **FIRINGS)
     for circuit, end in ((PLAIN, 2.7e-4), (TURN, 1.45e-3)):
         found = deviations(behind(circuit), drive, end)
@@ -48,7 +48,7 @@ def test_an_ideal_source(waveform: Any, overlap: Any) -> None:
 
 @pytest.mark.slow
 def test_a_held_armature_and_a_rigid_stop() -> None:
-    """A rest in the backstop under a small current, and one on a rigid stop until the current lifts it."""
+    """A rest in the backstop under a small current, and a rest on a rigid stop until the current lifts it."""
     names = [
         "coil.resistance",
         "coil.inductance",
@@ -69,7 +69,7 @@ def test_a_held_armature_and_a_rigid_stop() -> None:
 
 
 def test_a_map_of_constants_whose_ends_move() -> None:
-    """From firing to firing, the period as the constant: the ends of the map move with it."""
+    """From firing to firing, with the period as the constant: both ends of the map depend on it."""
     hammer, names = behind(PLAIN), ["period"]
     drive = ph.PulseTrain(DRIVERS["capacitor"], period=1.1e-3, pulses=4)
     start, end = drive.times[1:3].tolist()
@@ -85,7 +85,7 @@ def test_a_map_of_constants_whose_ends_move() -> None:
 
 
 def test_what_a_dot_is_sensitive_to() -> None:
-    """Flight time, speed, force and losses of two dots behind a chopper, against differences of tables."""
+    """Flight time, speed, force and losses of two dots with a chopper, against differences of tables."""
     hammer, drive = behind(PLAIN), ph.PulseTrain(DRIVERS["chopper"], **FIRINGS)
     names = ["coil.resistance", "waveform.voltage", "waveform.upper", "waveform.width", "pack.stiffness"]
     found = ph.sensitivities(hammer, drive, constants=names, duration=2.2e-3)

@@ -1,4 +1,4 @@
-"""The tangent flow through the circuit of the coil: a linear device, and differences of neighbouring runs."""
+"""The tangent flow through the coil circuit: a linear device, and differences of runs."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_a_moving_coil_is_a_matrix_exponential() -> None:
 
 
 def test_the_end_of_a_decay_leaves_the_linkage_to_the_place() -> None:
-    """A positive current runs out; after that the armature swings alone, and its place tells the linkage."""
+    """A positive current decays to zero; then the armature moves alone, and its position sets the linkage."""
     drive = ph.PulseTrain(
         Rail(voltage=12.0, width=2e-3, decay="zener", decay_voltage=60.0), rate="1 Hz", pulses=1
     )
@@ -92,7 +92,7 @@ def test_the_exponents_of_a_linear_device_are_its_decay_rates() -> None:
 
 
 def test_the_exponents_of_an_orbit_are_the_logarithms_of_its_multipliers() -> None:
-    """Period 1 behind a rail: after many firings the state repeats itself."""
+    """Period 1 with a rail driver: after many firings the state repeats."""
     hammer = behind(PLAIN)
     train = ph.PulseTrain(DRIVERS["rail"], period=1.1e-3, pulses=121)
     found = strobe_exponent(hammer, train, first=100, last=120, tolerance=TIGHT)
@@ -114,7 +114,7 @@ DRIVERS: dict[str, Waveform] = {
 
 
 def behind(circuit: dict[str, Any]) -> ph.Hammer:
-    """The paper's hammer, pack and backstop, behind a rail."""
+    """The paper's hammer, pack and backstop, with a rail driver."""
     hammer = ph.load("hendriks-1983-1").replace("coil", circuit["coil"])
     return hammer.replace({key: value for key, value in circuit.items() if key != "coil"})
 
@@ -131,14 +131,14 @@ def test_through_contacts_and_switches(name: str, circuit: dict[str, Any]) -> No
 
 @pytest.mark.parametrize(("start", "end"), [(2.2e-4, 4.5e-4), (6e-4, 1.3e-3), (1.1e-3, 1.5e-3)])
 def test_from_other_times(start: float, end: float) -> None:
-    """From a decay, from an armature without current, from a firing."""
+    """From a decay, from an armature without current, and from a firing."""
     drive = ph.PulseTrain(DRIVERS["rail"], period=1.1e-3, pulses=2)
     assert deviation(behind(PLAIN), drive, start, end) < WANTED
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 5])
 def test_random_coils_against_an_independent_integration(seed: int) -> None:
-    """Changes of the place and the speed with which a run begins without current."""
+    """Perturbations of the position and speed with which a run begins without current."""
     rng = np.random.default_rng(seed)
     resistance, inductance = rng.uniform(1.0, 8.0), rng.uniform(2.5e-3, 6e-3)
     hammer, device = (

@@ -1,4 +1,4 @@
-"""The work of the coil against integrals known in closed form and against a plain sum over a dense output."""
+"""The work of the coil against integrals in closed form and against a sum over a dense output."""
 
 import math
 

@@ -29,7 +29,7 @@ AREA = 259.0
 def changes(
     hammer: ph.Hammer, drive: object, end: float, state: tuple[float, float], names: list[str]
 ) -> np.ndarray:
-    """Derivatives of displacement and velocity at the end, a column for each constant; plain Python."""
+    """Derivatives of displacement and velocity at the end, one column per constant; interpreted Python."""
     with interpreted():
         found = constant_map(hammer, drive, 0.0, end, names, state=state, tolerance=SHARP)
     assert found.ok
@@ -87,7 +87,7 @@ def test_one_sharp_pulse_on_a_free_mass() -> None:
 
 
 def test_a_pulse_that_replaces_another() -> None:
-    """Of a pulse cut off at t1 only F t1 is left: later by dt1, it gives F dt1 more."""
+    """A pulse cut off at t1 leaves F t1; a cut later by dt1 adds F dt1."""
     push, second, t = 3.0, 0.15e-3, 0.5e-3
     hammer = made_of(pack=hammers.power(front=1.0))
     waveform = Rectangle(amplitude=push, width=0.2e-3, rise=0.0, decay=0.0, quantity="force")
@@ -234,7 +234,7 @@ def dimension(unit: str) -> np.ndarray:
 
 
 def check_dimensions(hammer: ph.Hammer, drive: ph.PulseTrain) -> None:
-    """Whoever measures in other units finds the same hammer (E. Buckingham, Phys. Rev. 4 (1914) 345).
+    """The hammer does not depend on the units of measurement (E. Buckingham, Phys. Rev. 4 (1914) 345).
 
     With every constant multiplied by what its dimension makes of a larger unit, every quantity is multiplied
     by what its own makes of it: the logarithmic derivatives, weighted by the dimensions of the constants, add
@@ -269,7 +269,7 @@ def test_dimensions_of_random_hammers(seed: int, period: float) -> None:
 
 
 def test_maps_compose() -> None:
-    """From a to c is from b to c after a to b, the state at b changing with the constants."""
+    """The derivative from a to c is composed of those from a to b and b to c, if the state at b varies."""
     hammer = crude()
     drive = ph.PulseTrain(hammer.waveform, period=1.2e-3, pulses=3)
     names = ["mass", "pack.front", "backstop.damping", "waveform.width", "period"]
@@ -293,7 +293,7 @@ def test_maps_compose() -> None:
 
 
 def test_the_period_of_a_strobe_map() -> None:
-    """Start and end move with the period: as if time had been counted from the first of the two firings."""
+    """Start and end depend on the period, as if time were measured from the first of the two firings."""
     hammer = crude()
     period, n = 1.3e-3, 6
     drive = ph.PulseTrain(hammer.waveform, period=period, pulses=n + 2)

@@ -1,4 +1,4 @@
-"""The tangent flow of constants against differences of whole runs, for all kinds of parts and drives.
+"""The tangent flow of constants against differences of runs, for all kinds of parts and drives.
 
 Central differences of runs of tolerance 1e-13, extrapolated after Richardson, touches faster than 1 mm/s.
 """
@@ -68,7 +68,7 @@ def test_parts_and_drives(case: tuple[str, str, str, str, str, float, float], tm
     ],
 )
 def test_some_parts_and_drives(case: int, constant: str, tmp_path: Path) -> None:
-    """What each part has of its own; the slow test takes every constant of every case."""
+    """Constants specific to each part; the slow test covers every constant of every case."""
     magnet, spring, pack, backstop, name, _start, end = CASES[case]
     with interpreted():
         hammer, drive = hammer_of(magnet, spring, pack, backstop, tmp_path), drive_of(magnet, name)
@@ -104,7 +104,7 @@ def test_quantities_of_two_dots() -> None:
 
 
 def test_quantities_with_firing_times_of_their_own() -> None:
-    """Two pulses, the second quenches: its time is a constant."""
+    """Two pulses, of which the second quenches; its time is a constant."""
     hammer = crude()
     drive = ph.PulseTrain(hammer.waveform, at=[0.1e-3, 1.2e-3])
     found = ph.sensitivities(hammer, drive, duration=2.5e-3)
@@ -125,7 +125,7 @@ COMPILED = PARTS[0]
 @pytest.mark.slow
 @pytest.mark.parametrize("case", PARTS, ids=lambda case: "-".join(word or "none" for word in case))
 def test_quantities_with_other_parts(case: tuple[str, str, str, str, str], tmp_path: Path) -> None:
-    """From a state at the start; energies of let-go backstops and impacts on rigid ones among them."""
+    """From an initial state; including energies of released backstops and impacts on rigid backstops."""
     magnet, spring, pack, backstop, name = case
     hammer = hammer_of(magnet, spring, pack, backstop, tmp_path)
     drive = drive_of(magnet, name)
@@ -137,7 +137,7 @@ def test_quantities_with_other_parts(case: tuple[str, str, str, str, str], tmp_p
 
 @pytest.mark.slow
 def test_random_hammers() -> None:
-    """From their rest states, which change with the constants too."""
+    """From rest states, which also depend on the constants."""
     draw = Draw(np.random.default_rng(5), spread=0.1)
     struck = 0
     while struck < 6:

@@ -1,4 +1,4 @@
-"""Correlation dimension of sets whose dimension is known."""
+"""Correlation dimension of sets with a known dimension."""
 
 import math
 
@@ -13,7 +13,7 @@ RNG = np.random.default_rng(4)
 
 
 def henon(count: int) -> np.ndarray:
-    """States of x' = 1 - 1.4 x^2 + y, y' = 0.3 x, after some that are left out."""
+    """States of x' = 1 - 1.4 x^2 + y, y' = 0.3 x, after a transient."""
     x, y, states = 0.1, 0.1, []
     for _ in range(count + 100):
         x, y = 1.0 - 1.4 * x * x + y, 0.3 * x

@@ -1,4 +1,4 @@
-"""Curves of bifurcations and grazings of impact oscillators against closed forms.
+"""Bifurcation and grazing curves of impact oscillators against closed forms.
 
 The bouncing ball and the linear oscillator of `tests.truth.impact_orbits`, followed from either end of a
 curve and through either constant; a linear oscillator that touches a pack.
@@ -23,7 +23,7 @@ RESTITUTIONS = (0.55, 0.9)
 
 
 def bounces(restitution: float, gamma: float, width: float = 0.08) -> Branch:
-    """The branch of a ball that bounces once in a period, near a bifurcation."""
+    """The branch of a ball that bounces once per period, near a bifurcation."""
     case = BouncingBall(GRAVITY, restitution, FREQUENCY)
     hammer = ph.Hammer.build(
         MASS,
@@ -42,7 +42,7 @@ def bounces(restitution: float, gamma: float, width: float = 0.08) -> Branch:
 
 
 def ball_curve(kind: str, restitution: float) -> BifurcationCurve:
-    """The fold or doubling in the plane of force and restitution, followed from a restitution."""
+    """The fold or doubling in the plane of force and restitution, traced from a given restitution."""
     case = BouncingBall(GRAVITY, restitution, FREQUENCY)
     branch = bounces(restitution, 1.02 * case.fold if kind == "fold" else 0.99 * case.doubling)
     return ph.bifurcation_curve(
@@ -194,7 +194,7 @@ def fold_of(omega: float) -> float:
 
 @pytest.mark.slow
 def test_a_fold_of_two_periods_has_no_cusp_and_ends_at_the_resonant_grazing() -> None:
-    """Within wide bounds of the force a cusp was listed that the closed form has not."""
+    """With wide bounds of the force, a spurious cusp was listed."""
     rate = 2.6 / TURN
     assert fold_of(2.6) == pytest.approx(0.087142997638, abs=1e-12)
     branch = ph.continuation(

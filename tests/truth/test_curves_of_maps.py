@@ -1,4 +1,4 @@
-"""Curves of bifurcations, normal forms and points of codimension two of maps known in closed form."""
+"""Bifurcation curves, normal forms and codimension-two points of maps known in closed form."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ Bounds = tuple[float, float]
 def curve_through(
     known: Map, kind: str, u: Bounds, at: Bounds, p: Bounds, r: Bounds, firings: int = 1
 ) -> BifurcationCurve:
-    """The curve of a map through a state and parameters, within bounds of both parameters."""
+    """The curve of a map through a given state and parameters, within bounds of both parameters."""
     plane = known_maps.plane(p, r, firings)
     begin = known_maps.start(kind, u, at[0], plane)
     with standing_in(known):
@@ -50,14 +50,14 @@ def points(curve: BifurcationCurve) -> list[tuple[str, float, float]]:
 
 
 def henon_doubling(b: float = 0.0, low: float = -0.5, high: float = 0.5) -> BifurcationCurve:
-    """The doubling of the fixed point of the Hénon map, followed from a value of b."""
+    """The doubling of the fixed point of the Hénon map, traced from a value of b."""
     x = 2.0 / (3.0 * (1.0 - b))
     at = (0.75 * (1.0 - b) ** 2, b)
     return curve_through(HENON, "period doubling", (x, b * x), at, (-1.0, 5.0), (low, high))
 
 
 def lies_on(curve: BifurcationCurve, multiplier: float, other: np.ndarray) -> None:
-    """Assert that one multiplier of every point is known, and the other one as well."""
+    """Assert that one multiplier of every point is as expected, and the other multiplier as well."""
     assert np.abs(curve.multipliers - multiplier).min(axis=1).max() < SHARP
     np.testing.assert_allclose(np.prod(curve.multipliers, axis=1), multiplier * other, atol=SHARP)
 
@@ -127,7 +127,7 @@ def test_a_curve_that_turns_passes_a_value_twice() -> None:
 
 @pytest.mark.parametrize("turned", [0.0, 0.02, 0.4, 1.2, 1.57], ids=str)
 def test_two_folds_meet_in_a_cusp(turned: float) -> None:
-    """Also where the cusp points along an axis of the plane, so that one constant does not turn."""
+    """Also if the cusp points along an axis of the plane, so that one parameter does not turn."""
     axes = np.array([[np.cos(turned), -np.sin(turned)], [np.sin(turned), np.cos(turned)]])
     known = seen_through(CUBIC, np.eye(2), axes)
     p, r = (axes.T @ [-2.0, 3.0]).tolist()

@@ -1,4 +1,4 @@
-"""Contacts of the list with damping: the closed form of Hunt and Crossley, tangent maps and free flight."""
+"""List contacts with damping: the closed form of Hunt and Crossley, tangent maps and free flight."""
 
 import math
 
@@ -72,9 +72,9 @@ def test_a_contact_that_opens_faster_than_its_force_grows_back_never_pulls() -> 
 
 @pytest.mark.parametrize(("law", "within"), [("linear", 1e-6), ("hertz", 2e-5)])
 def test_tangent_maps_through_damped_contacts(law: str, within: float) -> None:
-    """An armature between a damped contact and a rigid backstop, before which another damped contact closes.
+    """An armature between a damped contact and a rigid backstop, in front of which another contact closes.
 
-    The columns take the steps of the run, which at the touch of a Hertz contact are less accurate, whether or
+    The columns use the steps of the run, which are less accurate at the touch of a Hertz contact, whether or
     not the contact is damped.
     """
     rng = np.random.default_rng(440)

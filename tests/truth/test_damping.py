@@ -1,4 +1,4 @@
-"""Damping of the armature: closed forms, the reference, differences of runs; mostly as plain Python."""
+"""Damping of the armature: closed forms, the reference, differences of runs; mostly interpreted Python."""
 
 import math
 
@@ -29,7 +29,7 @@ MASS, STIFFNESS, START = 0.4e-3, 2e4, 80e-6
 
 
 def oscillator(coefficient: float) -> ph.Hammer:
-    """A mass on a spring without preload, damped."""
+    """A damped mass on a spring without preload."""
     spring = {"law": "preload", "preload": "0 N", "stiffness": f"{STIFFNESS} N/m"}
     return made_of(MASS, spring=spring, damping=ViscousDamping(coefficient=coefficient))
 
@@ -111,7 +111,7 @@ def test_contacts_against_the_reference(row: tuple[str, str, str, str, str, floa
 
 
 def test_a_flight_shrinks_areas_as_the_damping_says() -> None:
-    """The determinant of the tangent map is exp(-c t / m), whatever the other forces are."""
+    """The determinant of the tangent map is exp(-c t / m), for any other forces."""
     hammer = made_of(
         magnet=MAGNETS["inverse-root"], spring=SPRINGS["linear"], damping=ViscousDamping(coefficient=2.0)
     )
@@ -133,7 +133,7 @@ def test_what_the_constant_does_against_differences(row: int, constant: str) -> 
 
 @pytest.mark.slow
 def test_lanes_take_damped_hammers_too(hammer: ph.Hammer) -> None:
-    """Dots, states and pictures are those of members that run one by one."""
+    """Dots, states and pictures equal those of members that run one by one."""
     coefficients = np.linspace(0.0, 8.0, 40)
     damped = [
         hammer.replace({"damping": {"law": "viscous", "coefficient": f"{c} N s/m"}}) for c in coefficients
@@ -176,7 +176,7 @@ def test_a_file_says_it_with_a_unit(hammer: ph.Hammer) -> None:
 
 @pytest.mark.parametrize("row", [pytest.param(0, marks=pytest.mark.slow), 2])
 def test_sensitivities_of_the_energies_against_differences(row: int) -> None:
-    """Also through impacts on a rigid backstop, before and after which damping slows at other speeds."""
+    """Also through impacts on a rigid backstop, before and after which the damping acts at other speeds."""
     hammer, drive = case_of(CASES[row])
     names = ["damping.coefficient", "mass"]
     with interpreted():

@@ -1,4 +1,4 @@
-"""Ensembles in lanes against the reference, on hammers drawn at random about the crude one."""
+"""Ensembles in lanes against the reference, for random hammers around the crude hammer."""
 
 import dataclasses
 import functools
@@ -21,7 +21,7 @@ POINTS = 401
 
 @dataclasses.dataclass(frozen=True)
 class Truth:
-    """Members, and what the reference says about each of them up to its horizon.
+    """Members, and the reference run of each member up to its horizon.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class Truth:
     runs
         The reference for each, at `times`.
     counts
-        How many of the times lie before the horizon.
+        Number of the times before the horizon.
     """
 
     hammers: list[ph.Hammer]
@@ -45,7 +45,7 @@ class Truth:
         return ensemble.run(dots=True, strobes=self.times, engine=engine)
 
     def errors(self, result: EnsembleResult) -> npt.NDArray[np.float64]:
-        """Largest error of each member's displacement before its horizon, of the stroke."""
+        """Largest displacement error of each member before its horizon, as a fraction of the stroke."""
         assert result.strobes is not None
         found = []
         for i, (run, count, hammer) in enumerate(zip(self.runs, self.counts, self.hammers, strict=True)):
@@ -134,7 +134,7 @@ def test_dots_before_the_horizon(pulses: int, engine: Any) -> None:
 
 
 def test_peak_forces_are_those_of_the_reference() -> None:
-    """Equation (5) at the indentation where the reference turns round."""
+    """Equation (5) at the largest indentation of the reference."""
     truth = small(1)
     dots = truth.run(TOLERANCE).dots
     assert dots is not None
@@ -159,6 +159,6 @@ def test_hundreds_of_members(seed: int, pulses: int) -> None:
 
 @pytest.mark.slow
 def test_display_tolerance() -> None:
-    """Pictures are good to 1e-4 of the stroke."""
+    """Pictures are accurate to 1e-4 of the stroke."""
     truth = truth_of(7, 25, 1)
     assert truth.errors(truth.run(DISPLAY_TOLERANCE)).max() < 1e-4

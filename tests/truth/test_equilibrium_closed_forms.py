@@ -19,7 +19,7 @@ from printhammer.parts.spring.linear import LinearSpring, PreloadSpring
 
 @dataclass(frozen=True)
 class Bench:
-    """A hammer put together from parts."""
+    """A hammer composed of parts."""
 
     name: str = "bench"
     mass: float = 4e-4
@@ -35,7 +35,7 @@ class Bench:
 
 
 def spread(value: float, ratio: float) -> st.SearchStrategy[float]:
-    """Draw log-uniformly about a value."""
+    """Draw log-uniformly around a value."""
     return st.floats(-1.0, 1.0).map(lambda power: value * ratio**power)
 
 

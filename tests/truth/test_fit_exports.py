@@ -1,4 +1,4 @@
-"""Constants from exports of oscilloscopes: inverted, scaled and delayed columns give the truth.
+"""Constants from exports of oscilloscopes: inverted, scaled and delayed columns give the true values.
 
 A locked coil of R and L on a rail V: i = V/R (1 - exp(-R t / L)).
 """

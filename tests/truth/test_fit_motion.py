@@ -1,4 +1,4 @@
-"""The fit of single shots against what is known: exact records, and intervals that cover the truth."""
+"""The fit of single shots against known answers: exact records, and coverage of the intervals."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -19,12 +19,12 @@ HAMMER = ph.load(CRUDE)
 
 
 def truth(key: str) -> float:
-    """The constant of the hammer from which records are made, SI."""
+    """Constant of the hammer from which the records are generated, SI."""
     return HAMMER.constants[key].si
 
 
 def test_exact_records_give_the_constants_back(tmp_path: Path) -> None:
-    """Without noise, resolution and delay, from 30 % off."""
+    """Without noise, quantisation and delay, from an initial guess 30 % off."""
     path = shots.write(tmp_path / "shot.csv", HAMMER, noise=0.0, resolution=0.0, bandwidth=None)
     keys = ["mass", "backstop.damping", "backstop.stiffness", "pack.stiffness"]
     start = HAMMER.replace({key: 1.3 * truth(key) for key in keys[:2]})
@@ -48,7 +48,7 @@ def test_damping_in_flight_is_found_too(tmp_path: Path) -> None:
 
 
 def test_mass_and_forces_scale_together(tmp_path: Path) -> None:
-    """Twice the forces taken as known, twice the mass found: equations (1) and (2) are linear in both."""
+    """Doubling the known forces doubles the fitted mass: equations (1) and (2) are linear in both."""
     path = shots.write(tmp_path / "shot.csv", HAMMER, seed=1)
     twice = {
         key: 2.0 * truth(key) for key in ("magnet.F0", "spring.Bs", "pack.stiffness", "backstop.stiffness")
@@ -61,7 +61,7 @@ def test_mass_and_forces_scale_together(tmp_path: Path) -> None:
 
 
 def covered(folder: Path, seeds: range) -> dict[str, int]:
-    """How often the 95 % intervals of some laboratories contain the constants."""
+    """Count how often the 95 % intervals of several laboratories contain the constants."""
     count: dict[str, int] = {}
     for seed in seeds:
         path = shots.write(folder / "shot.csv", HAMMER, seed=seed, end=1.2e-3, current_noise=None)
@@ -73,7 +73,7 @@ def covered(folder: Path, seeds: range) -> dict[str, int]:
 
 
 def test_intervals_cover_the_truth_in_a_few_laboratories(tmp_path: Path) -> None:
-    """No constant more often outside than happens once in 10 000 tests with honest intervals."""
+    """No constant is outside its interval more often than correct intervals allow once in 10 000 tests."""
     seeds = range(8)
     least = stats.binom.ppf(1e-4, len(seeds), 0.95)
     for key, count in covered(tmp_path, seeds).items():
@@ -82,13 +82,13 @@ def test_intervals_cover_the_truth_in_a_few_laboratories(tmp_path: Path) -> None
 
 @pytest.mark.slow
 def test_intervals_cover_the_truth_in_89_to_99_of_100(tmp_path: Path) -> None:
-    """The static constants are known here; those of a laboratory, with errors, are in test_recovery.py."""
+    """The static constants are known exactly here; test_recovery.py uses constants with errors."""
     for key, count in covered(tmp_path, range(100)).items():
         assert 89 <= count <= 99, key
 
 
 def test_low_pass_of_a_motion() -> None:
-    """Of t^3 after rest the exact answer is t^3 - 3 tau t^2 + 6 tau^2 t - 6 tau^3 (1 - exp(-t / tau))."""
+    """For t^3 after rest, the exact response is t^3 - 3 tau t^2 + 6 tau^2 t - 6 tau^3 (1 - exp(-t / tau))."""
     tau = 0.7
     t = np.array([0.0, 0.1, 0.5, 0.6, 1.7, 3.0])
     found = lowpass_motion(t, (t**3)[:, np.newaxis], (3.0 * t**2)[:, np.newaxis], tau)[:, 0]
@@ -123,7 +123,7 @@ def test_low_pass_of_a_waveform(shape: str) -> None:
 
 
 def test_noise_and_its_memory() -> None:
-    """White noise has its size and no memory; of x_t = a x_{t-1} + e_t it is (1 + a) / (1 - a)."""
+    """The factor is 1 for white noise, and (1 + a) / (1 - a) for x_t = a x_{t-1} + e_t."""
     noise = np.random.default_rng(8).normal(0.0, 0.3, 40_000)
     assert noise_of_record(noise + np.linspace(0.0, 1.0, len(noise))) == pytest.approx(0.3, rel=0.02)
     assert memory_factor(noise) == pytest.approx(1.0, abs=0.05)

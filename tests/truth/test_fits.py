@@ -90,7 +90,7 @@ def test_restitution_by_the_lambert_function(z: float) -> None:
 
 
 def test_stiffness_of_two_bodies_and_its_error() -> None:
-    """Against k = (4/3) E* sqrt(R), and its relative error by the rule of products."""
+    """Against k = (4/3) E* sqrt(R), and its relative error by propagation of errors."""
     bodies = [(2e-3, 4e-5)], [(200e9, 0.0), (200e9, 0.0)], [(0.3, 0.0), (0.3, 0.0)]
     k = Stiffness.from_bodies(*bodies)
     modulus = 200e9 / (2 * (1 - 0.3**2))
@@ -101,7 +101,7 @@ def test_stiffness_of_two_bodies_and_its_error() -> None:
 
 
 def noisy_magnet(folder: Path, rng: np.random.Generator) -> Fit:
-    """Displacement, current and force all carry errors."""
+    """Displacement, current and force all have errors."""
     tables = []
     for name, columns in (("m.csv", lab.magnet()), ("s.csv", lab.spring())):
         sizes = {"displacement": 2e-7, "current": 2e-3, "force": 0.1}
@@ -117,7 +117,7 @@ def noisy_spring(folder: Path, rng: np.random.Generator) -> Fit:
 
 
 def noisy_pack(folder: Path, rng: np.random.Generator, *, exponents: bool = False) -> Fit:
-    """An error of 0.2 um moves the steep unloading branch by more than that of the force."""
+    """An error of 0.2 um shifts the steep unloading branch more than the force error does."""
     columns, branch = lab.pack()
     columns["indentation"] = columns["indentation"] + 2e-7 * rng.standard_normal(len(branch))
     columns["force"] = columns["force"] + 0.2 * rng.standard_normal(len(branch))
@@ -162,7 +162,7 @@ def covered(
 
 @pytest.mark.parametrize("kind", LABORATORIES)
 def test_intervals_contain_the_truth_in_a_few_laboratories(tmp_path: Path, kind: str) -> None:
-    """With a probability of 95 %, fewer than 13 of 16 would come in one of 1000 tries."""
+    """At a coverage of 95 %, fewer than 13 of 16 would occur once in 1000 repetitions."""
     counts, rejected = covered(tmp_path, *LABORATORIES[kind], seeds=16)
     assert min(counts.values()) >= 13
     assert rejected <= 2
@@ -171,7 +171,7 @@ def test_intervals_contain_the_truth_in_a_few_laboratories(tmp_path: Path, kind:
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", LABORATORIES)
 def test_intervals_contain_the_truth_as_often_as_they_say(tmp_path: Path, kind: str) -> None:
-    """Of 400 with probability 95 %, outside 362 to 394 comes once in some 1000 tries."""
+    """Of 400 intervals at 95 %, a count outside 362 to 394 occurs about once in 1000 repetitions."""
     counts, rejected = covered(tmp_path, *LABORATORIES[kind], seeds=400)
     assert all(362 <= count <= 394 for count in counts.values()), counts
     assert rejected <= 14

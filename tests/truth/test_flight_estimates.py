@@ -1,4 +1,4 @@
-"""With a perfect sensor the estimate of a touch is the touch: of a parabola, and of the kernel."""
+"""With a perfect sensor, the estimated touch is exact: for a parabola, and for the kernel."""
 
 import numpy as np
 import pytest

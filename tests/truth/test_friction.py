@@ -50,7 +50,7 @@ def test_a_block_on_an_incline_is_released_at_the_angle_of_static_friction() -> 
 
 @pytest.mark.parametrize("static", [1.0, 1.9, 2.4])
 def test_free_decay_ends_where_friction_holds(static: float) -> None:
-    """A half swing takes π/w and costs 2 Fk/k; the mass stays where k |x| <= Fs first (Lorenz 1924)."""
+    """A half cycle takes π/w and costs 2 Fk/k; the mass stops where k |x| <= Fs first (Lorenz 1924)."""
     mass, k, kinetic, start = 0.5, 200.0, 1.0, 0.0631
     spring = {"law": "spring", "stiffness": k, "position": 0.0}
     motion = still(block(mass, kinetic, static, spring=spring), start, 0.0, 5.0)
@@ -71,7 +71,7 @@ def test_free_decay_ends_where_friction_holds(static: float) -> None:
 
 @pytest.mark.parametrize("beta", [0.42, 0.7, 1.4, 2.5])
 def test_forced_motion_under_friction(beta: float) -> None:
-    """Outside the boundary of Den Hartog the mass never stops; just inside it does."""
+    """Outside Den Hartog's boundary the mass never stops; just inside, it does."""
     exact = DenHartog(beta, 0.3)
     hammer = block(1.0, 0.3, spring={"law": "spring", "stiffness": 1.0, "position": 0.0})
     cycle = 2.0 * math.pi / beta
@@ -163,7 +163,7 @@ def test_bounces_follow_a_geometric_series(friction: float) -> None:
 
 
 def test_a_pack_with_memory_holds_an_armature_under_friction() -> None:
-    """A blow that friction stops in the pack leaves the armature there; the ledger closes."""
+    """After an impact that friction stops in the pack, the armature stays there; the ledger closes."""
     hammer = ph.load("hendriks-1983").replace("backstop", None).replace("coil", None)
     front = hammer.front
     assert front is not None
@@ -225,7 +225,7 @@ def test_random_plungers_stop_and_start_in_a_pack_with_memory() -> None:
 
 
 def test_a_stop_in_the_pack_at_the_limit_of_friction() -> None:
-    """With equal static and kinetic force, rounding decides between rest and reloading; both must go on."""
+    """With equal static and kinetic force, rounding decides between rest and reloading; both continue."""
     friction = 0.3064143688906136
     hammer = block(0.03766332309391442, friction, friction).replace(
         {

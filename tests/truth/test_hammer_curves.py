@@ -1,4 +1,4 @@
-"""Curves of the paper's hammer in (rate, damping) and (rate, pulse width), by another Newton's method."""
+"""Curves of the paper's hammer in (rate, damping) and (rate, pulse width), by another Newton solver."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def branch() -> Branch:
 
 
 def solved(curve: BifurcationCurve, place: int) -> float:
-    """The rate at which the orbit has the multiplier 1 or -1, the second constant being kept."""
+    """The rate at which the orbit has the multiplier 1 or -1, at a fixed second constant."""
     phase = float(curve.phase[place])
     regime = Regime.of(curve.regime.hammer, rate=float(curve.first[place]), phase=phase)
     regime = regime.with_(curve.names[1], float(curve.second[place]))

@@ -1,4 +1,4 @@
-"""The idealised hammer of Tung and Shaw against its piecewise closed form, which is independent of it.
+"""The idealised hammer of Tung and Shaw against an independent, piecewise closed form.
 
 Between impacts the equation of motion is linear with constant coefficients,
 
@@ -32,7 +32,7 @@ State = tuple[float, float]
 
 @dataclass(frozen=True)
 class Piece:
-    """A motion in closed form from the time `start` on."""
+    """A motion in closed form from the time `start` onward."""
 
     start: float
     end: float
@@ -58,7 +58,7 @@ class Hammer:
     def flight(
         self, start: float, state: State, pulse: float | None, paper: bool
     ) -> Callable[[float], State]:
-        """Solution from a state on; `pulse` is the time of the firing under way."""
+        """Solution from an initial state; `pulse` is the time of the active firing."""
         damping = self.pack_damping if paper else 0.0
         stiffness = self.stiffness + (self.pack_stiffness if paper else 0.0)
         constant = self.preload + (self.pack_stiffness * self.front if paper else 0.0)
@@ -87,7 +87,7 @@ class Hammer:
         return self.pack_stiffness * (state[0] - self.front) + self.pack_damping * state[1]
 
     def take_off(self) -> float:
-        """Time after a firing at which the force overcomes the hold."""
+        """Time after a firing at which the force overcomes the holding force."""
         return math.asin(-self.preload / self.amplitude) * self.width / math.pi
 
     def pieces(
@@ -166,7 +166,7 @@ def plain(hammer: "ph.Hammer") -> Hammer:
 
 
 def compared(hammer: "ph.Hammer", fired: list[float], end: float, slowest: float) -> Hammer:
-    """Hold displacements, velocities and touches of a run against the closed form, which is returned."""
+    """Compare displacements, velocities and touches of a run with the closed form; return the closed form."""
     exact = plain(hammer)
     pieces = exact.pieces(fired, end, slowest)
     times = np.linspace(pieces[0].start, pieces[-1].end, 1500)[1:-1]

@@ -1,4 +1,4 @@
-"""Sections whose touches can be written down: a bouncing ball, and the linear impact oscillator."""
+"""Sections with touches in closed form: a bouncing ball, and the linear impact oscillator."""
 
 import math
 
@@ -16,7 +16,7 @@ CLOSE = 1e-9
 
 @pytest.mark.parametrize("restitution", [0.5, 0.9])
 def test_a_bouncing_ball(restitution: float) -> None:
-    """Under a pull g every flight lasts 2 v/g and every bounce leaves e times the speed."""
+    """Under a pull g every flight lasts 2 v/g, and every bounce multiplies the speed by e."""
     pull, speed, period, count = 1e4, 0.4, 0.05e-3, 8
     hammer = made_of(
         spring=hammers.preload(-pull * MASS), pack=hammers.power(), backstop=hammers.rigid(restitution)

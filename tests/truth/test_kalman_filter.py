@@ -1,4 +1,4 @@
-"""The estimators of feedback against textbook Kalman filters, written here with numpy alone.
+"""The estimators of feedback against textbook Kalman filters, implemented here with NumPy alone.
 
 R. E. Kalman, J. Basic Eng. 82 (1960) 35; the measurement update in the form of Joseph.
 """
@@ -146,7 +146,7 @@ def test_without_samples_the_expectation_stands() -> None:
 
 
 def test_the_estimate_is_as_far_off_as_it_says() -> None:
-    """The squares of errors by the inverse of their covariance are distributed as chi squared."""
+    """Squared errors, weighted by the inverse covariance, follow a chi-squared distribution."""
     rng = np.random.default_rng(4)
     runs, error = 600, 1.5e-6
     prior = np.diag([4e-6, 0.05, 0.03]) ** 2

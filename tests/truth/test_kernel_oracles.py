@@ -21,7 +21,7 @@ def decades(low: float, high: float) -> st.SearchStrategy[float]:
 
 
 def alone(mass: float, stiffness: float, damping: float = 0.0, pack: float = 259.0) -> ph.Hammer:
-    """Pack and backstop, and no force between them."""
+    """Pack and backstop, without a force between them."""
     return hammers.made_of(
         mass,
         spring=hammers.preload(0.0),

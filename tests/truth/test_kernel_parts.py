@@ -68,7 +68,7 @@ QUICK = [(p, b) for p, b in PAIRS if (list(PACKS).index(p) + list(BACKSTOPS).ind
 
 @pytest.mark.parametrize(("pack", "backstop"), QUICK, ids=lambda name: name or "none")
 def test_pairs_of_contacts(pack: str, backstop: str, tmp_path_factory: pytest.TempPathFactory) -> None:
-    """The other parts and the drives in turn; the slow test has every pair."""
+    """The other parts and the drives in turn; the slow test covers every pair."""
     turn = QUICK.index((pack, backstop))
     magnet = ["inverse-root", "", "table"][turn % 3]
     spring = list(SPRINGS)[turn % 2]
@@ -151,7 +151,7 @@ def test_every_drive_on_compiled_combinations(
 
 
 def test_machine_code_and_plain_python_agree() -> None:
-    """Contraction of multiply and add is the only freedom of the compiler."""
+    """The contraction of multiply and add is the only freedom of the compiler."""
     hammer = hammers.crude()
     drive = ph.PulseTrain(hammer.waveform)
     times = np.linspace(0.0, 2e-3, 201)

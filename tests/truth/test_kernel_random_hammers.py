@@ -1,4 +1,4 @@
-"""The compiled kernel against the reference on hammers drawn at random about the crude one.
+"""The compiled kernel against the reference, for random hammers around the crude hammer.
 
 Every constant is log-uniform within 20 %; hammers that `warnings` names or refuses are drawn again and
 counted. Default tolerance throughout.
@@ -55,7 +55,7 @@ def check_trains(seed: int, count: int, record: pytest.FixtureRequest) -> None:
 
 
 def report(record: pytest.FixtureRequest, draw: Draw, errors: list[float]) -> None:
-    """Put what was drawn on record (`pytest --junit-xml`), and on the terminal with `-s`."""
+    """Record the draws (`pytest --junit-xml`), and print them on the terminal with `-s`."""
     told = f"{draw.drawn} hammers, {draw.redrawn} drawn again; error median {np.median(errors):.1e}"
     told += f", largest {max(errors):.1e} of the stroke"
     record.node.user_properties.append(("random hammers", told))
@@ -85,7 +85,7 @@ def test_two_hundred_trains(seed: int, request: pytest.FixtureRequest) -> None:
 
 
 def test_the_draw_is_what_it_says() -> None:
-    """All constants vary, within 20 % of the crude ones, and none that is drawn is warned about."""
+    """All constants vary, within 20 % of the crude hammer, and no drawn hammer causes a warning."""
     draw = Draw(np.random.default_rng(7))
     drawn = [draw() for _ in range(20)]
     crude = hammers.crude()

@@ -152,7 +152,7 @@ def test_the_closed_form_without_damping_is_the_other_one() -> None:
 
 
 def test_a_cubic_spring_against_the_reference() -> None:
-    """Two wells, both contacts, damping, and a push."""
+    """Two wells, both contacts, damping, and a constant force."""
     spring = CubicSpring(stiffness=-2e4, cubic=4e12, center=STOP + 70e-6)
     hammer = made_of(
         spring=spring, pack=PACKS["power"], backstop=rigid(0.6), damping=ViscousDamping(coefficient=0.2)
@@ -171,7 +171,7 @@ def test_a_cubic_spring_against_the_reference() -> None:
 
 @pytest.mark.slow
 def test_the_exponent_of_duffings_equation_by_another_way() -> None:
-    """Many trains side by side, by the classical Runge-Kutta rule: mean growth of a neighbour."""
+    """Many trains in parallel, by the classical Runge-Kutta method: mean growth of a perturbation."""
     rng = np.random.default_rng(3)
     trains, periods, left_out, steps = 1000, 250, 50, 100
     y = np.stack([*rng.uniform(-1.0, 1.0, (2, trains)), np.ones(trains), np.zeros(trains)])

@@ -48,7 +48,7 @@ def test_the_pack_bench_shows_both_branches_of_equation_5() -> None:
 
 @pytest.mark.parametrize("factor", [1e-3, 1.0, 30.0])
 def test_rebounds_obey_the_exact_law(factor: float) -> None:
-    """z - ln(1 + z) = -(y + ln(1 - y)), with logarithms of long numbers."""
+    """z - ln(1 + z) = -(y + ln(1 - y)), with logarithms in extended precision."""
     ratio = factor * C["backstop.damping"] / C["backstop.stiffness"]
     hammer = HAMMER.replace("backstop.damping", ratio * C["backstop.stiffness"])
     table = ph.measure("backstop", hammer, sensor=EXACT).values

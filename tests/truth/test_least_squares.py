@@ -1,4 +1,4 @@
-"""The machinery of the fits against closed forms."""
+"""The least-squares routines of the fits against closed forms."""
 
 import itertools
 
@@ -13,7 +13,7 @@ from printhammer.support.arrays import FloatArray
 
 
 def test_the_sandwich_of_a_mean() -> None:
-    """For one mean, HC2 is s^2 / n and has n - 1 degrees of freedom, whatever the data."""
+    """For one mean, HC2 is s^2 / n with n - 1 degrees of freedom, for any data."""
     data = np.random.default_rng(0).standard_normal(17)
     covariance, freedoms = sandwich(np.ones((17, 1)), data - data.mean())
     assert covariance[0, 0] == pytest.approx(data.var(ddof=1) / 17, rel=1e-12)
@@ -36,7 +36,7 @@ def test_the_sandwich_of_two_groups_is_that_of_welch() -> None:
 
 
 def test_the_sandwich_of_a_row_that_stands_alone() -> None:
-    """A row that alone determines a parameter has the noise of the others: s^2 (1 + 1 / n)."""
+    """A row that alone determines a parameter has the noise of the other rows: s^2 (1 + 1 / n)."""
     n = 15
     data = np.random.default_rng(4).standard_normal(n)
     rows = np.column_stack([np.ones(n + 1), np.append(np.zeros(n), 1.0)])
@@ -86,7 +86,7 @@ def test_runs_against_all_orders() -> None:
 
 
 def test_intervals_are_those_of_student() -> None:
-    """Quantiles of printed tables."""
+    """Quantiles from printed tables."""
     assert student(4) == pytest.approx(2.776, abs=5e-4)
     assert student(30) == pytest.approx(2.042, abs=5e-4)
     assert student(np.inf) == pytest.approx(1.95996, abs=1e-5)

@@ -1,4 +1,4 @@
-"""The bound of positive work against closed forms, and a burst against the laws of energy."""
+"""The lower bound on the positive work against closed forms, and a burst against the energy balance."""
 
 import math
 
@@ -20,7 +20,7 @@ from printhammer.run.energy import coil_power
 
 @pytest.mark.parametrize("softer", [1.0, 2.0])
 def test_bound_in_closed_form(softer: float) -> None:
-    """With the softer spring the stored energy has a crest before the pack."""
+    """With the softer spring the stored energy has a maximum before the pack."""
     crude = hammers.crude()
     assert isinstance(crude.spring, LinearSpring)
     hammer = crude.replace("spring.As", softer * crude.spring.As)

@@ -1,4 +1,4 @@
-"""Force and flux linkage of magnets: slopes of one coenergy, an exact inverse, the limits of the textbook."""
+"""Force and flux linkage of magnets: slopes of one coenergy, an exact inverse, textbook limits."""
 
 import math
 from collections.abc import Callable
@@ -40,7 +40,7 @@ def positive(low: float, high: float) -> st.SearchStrategy[float]:
 
 @st.composite
 def circuits(draw: st.DrawFn, *, saturates: bool = True) -> ReluctanceMagnet:
-    """Circuits whose gap is closed at 0, of either pull, with and without fringe and leakage."""
+    """Circuits whose gap closes at 0, of either pull direction, with and without fringe and leakage."""
     fringes, leaks = draw(st.booleans()), draw(st.booleans())
     area, residual = draw(positive(1e-6, 1e-3)), draw(positive(2e-5, 1e-3))
     core = {

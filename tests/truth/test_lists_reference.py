@@ -1,4 +1,4 @@
-"""Hammer files with lists of forces and contacts, drawn at random, against the oracle for lists.
+"""Random hammer files with lists of forces and contacts, against the oracle for lists.
 
 The oracle knows a contact as a mode with events; the kernel integrates the sum of all elastic contacts. A run
 is compared as long as a start moved by 1e-12 of the stroke changes the displacement by less than 1e-10.
@@ -171,7 +171,7 @@ def test_many_random_lists_with_dry_friction(seed: int) -> None:
 
 
 def test_random_lists_with_damped_contacts_and_dry_friction_between_two_stops() -> None:
-    """All of them in each hammer; the slow tests draw hammers with fewer of them."""
+    """All forces and contacts in each hammer; the slow tests draw hammers with fewer of them."""
     closings, sticks, impacts = check(4, 12, dry=True, front=True, lossy=True)
     assert closings > 12
     assert sticks > 0

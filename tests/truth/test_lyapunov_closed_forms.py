@@ -1,4 +1,4 @@
-"""Exponents, dimensions and tests for chaos of systems whose answers can be written down."""
+"""Exponents, dimensions and tests for chaos, for systems with analytic results."""
 
 import math
 from itertools import pairwise
@@ -20,13 +20,13 @@ CLOSE = 1e-9
 
 
 def oscillator(damping: float, stiffness: float = 3e4) -> ph.Hammer:
-    """A mass that always touches a spring and a dashpot."""
+    """A mass in permanent contact with a spring and a dashpot."""
     pack = DashpotPack(stiffness=stiffness, damping=damping, front=-1.0, pull=True)
     return made_of(pack=pack, spring=hammers.preload(stiffness))
 
 
 def test_an_overdamped_oscillator() -> None:
-    """Neighbouring motions die out as exp(s t), m s^2 + C s + k = 0: the exponents are s times the period."""
+    """Perturbations decay as exp(s t), m s^2 + C s + k = 0: the exponents are s times the period."""
     damping, stiffness, period = 10.0, 3e4, 0.2e-3
     rates = np.sort(np.roots([MASS, damping, stiffness]).real)[::-1]
     with interpreted():
@@ -49,7 +49,7 @@ def test_an_overdamped_oscillator() -> None:
 
 
 def test_an_underdamped_oscillator() -> None:
-    """Growth wavers as the motion turns; the sum does not, and both exponents are -C/(2 m) in the mean."""
+    """Growth fluctuates as the motion rotates; the sum does not, and both exponents average to -C/(2 m)."""
     damping, period, firings = 1.5, 0.4e-3, 60
     with interpreted():
         found = ph.lyapunov(
@@ -88,7 +88,7 @@ def test_the_dimension_of_the_map_of_henon() -> None:
 
 
 def test_the_error_of_the_dimension_is_that_of_many_repetitions() -> None:
-    """Independent growth of known scatter, D = 1 - l1/l2 linearised: the error bar covers what is seen."""
+    """Independent growth of known scatter, D = 1 - l1/l2 linearised: the error bar covers the scatter."""
     rng = np.random.default_rng(7)
     means, scatter, count = np.array([0.4, -1.6]), np.array([[0.5, 0.0], [-0.4, 0.2]]), 2000
     found = [kaplan_yorke(means + rng.standard_normal((count, 2)) @ scatter.T) for _ in range(200)]
@@ -100,7 +100,7 @@ def test_the_error_of_the_dimension_is_that_of_many_repetitions() -> None:
 
 
 def test_the_exponent_of_the_logistic_map() -> None:
-    """At r = 4 it is ln 2; the error bar says how far the estimate may be off."""
+    """At r = 4 the exponent is ln 2; the error bar covers the deviation of the estimate."""
     x = np.random.default_rng(1).uniform(0.1, 0.9)
     logs = []
     for _ in range(20000):

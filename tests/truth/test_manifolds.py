@@ -1,4 +1,4 @@
-"""Manifolds of saddles: of a map whose curves are known, and of Duffing's strobe map."""
+"""Manifolds of saddles: of a map with known manifolds, and of Duffing's strobe map."""
 
 import math
 from typing import Any
@@ -111,7 +111,7 @@ def test_what_lies_on_the_manifolds_of_duffings_saddle(curves: Any) -> None:
 
 
 def test_the_unstable_manifold_is_the_attractor(curves: Any) -> None:
-    """Of a strange motion the states lie along it."""
+    """The states of a strange motion lie along the manifold."""
     own = Scaled(curves.orbit.regime, 1e-11)
     states = ph.strobe(
         curves.orbit.regime.hammer, drive=FORCE, state=(0.1, 0.1), points=60, transient=100, verdict=False

@@ -84,7 +84,7 @@ def pair_run(pair: TwoStops, phase: float, speed: float, cycles: float) -> Run:
 
 @pytest.mark.parametrize("pair", PAIRS)
 def test_symmetric_orbit_between_two_stops(pair: TwoStops) -> None:
-    """Impacts come every half cycle; a small change of the start grows as the derivative of the map says."""
+    """Impacts occur every half cycle; a small change of the start grows by the derivative of the map."""
     half, restitution = math.pi / pair.rate, pair.restitution
     orbits = [orbit for orbit in pair.orbits() if kinds(pair_run(pair, *orbit, 1.0))[0][1] == "right"]
     assert orbits

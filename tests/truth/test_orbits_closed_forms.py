@@ -112,7 +112,7 @@ def oscillator(stop: float, restitution: float) -> ph.Hammer:
 
 
 def one_impact_orbit(omega: float, stop: float, e: float) -> tuple[tuple[float, float], np.ndarray, float]:
-    """The orbit of x'' + x = cos(omega t), one impact a period: state at t = 0, multipliers, speed after it.
+    """The orbit of x'' + x = cos(omega t) with one impact per period: state at t = 0, multipliers, speed.
 
     With g = 1 / (1 - omega^2), T = 2 pi / omega and the impact at t0, x = A cos(t - t0) + B sin(t - t0)
     + g cos(omega t). Position and velocity just after t0 and just before t0 + T give A and B as multiples
@@ -190,7 +190,7 @@ def test_a_damped_oscillator() -> None:
 
 @pytest.mark.parametrize("gamma", [0.8, 1.1])
 def test_a_search_finds_both_orbits_of_the_bouncing_ball(gamma: float) -> None:
-    """From nothing but the hammer and its drive: there is no pack that would tell how far to look."""
+    """From the hammer and its drive alone: there is no pack that would bound the search."""
     exact = BouncingBall(gravity=9.80665, restitution=0.8, frequency=50.0)
     ball = made_of(backstop=rigid(0.8, position=0.0), spring=preload(-MASS * exact.gravity))
     drive = ph.SineForce(gamma * MASS * exact.gravity, exact.frequency)
@@ -217,7 +217,7 @@ def test_indices_of_all_orbits_add_up_to_one() -> None:
 def test_indices_never_ask_for_more_orbits_than_are_missing(
     made: list[tuple[int, float]], data: st.DataObject
 ) -> None:
-    """Leave out orbits of a complete list: one attractor, and pairs that folds add."""
+    """Remove orbits from a complete list: one attractor, and pairs that folds add."""
     multipliers = [(count, abs(size) + 1.01) for count, size in made]
     pairs = [(count, np.array([end, 0.0], complex)) for count, size in multipliers for end in (0.5, size)]
     complete = [(1, np.array([0.2, 0.1], complex)), *pairs]
@@ -231,7 +231,7 @@ def test_indices_never_ask_for_more_orbits_than_are_missing(
 
 
 def orbits_of_a_ball(longest: int) -> Orbits:
-    """Search for orbits of up to some firings of a ball on a table that vibrates at 60 Hz."""
+    """Search for orbits with a limited number of firings of a ball on a table that vibrates at 60 Hz."""
     ball = ph.load("tufillaro-1992")
     force = ph.SineForce(1.1705e-4 * (2.0 * math.pi * 60.0) ** 2 * ball.mass, 60.0)
     return ph.orbits(ball, drive=force, longest=longest)
@@ -257,7 +257,7 @@ def test_a_longer_search_finds_what_a_shorter_one_does(up_to_three: Orbits) -> N
 
 @pytest.mark.slow
 def test_orbits_near_chatter_are_found_near_others(up_to_three: Orbits) -> None:
-    """Newton's method from a fine grid of states, on the exact flights of the ball, finds these orbits."""
+    """Newton's method from a fine grid of states, with exact flights of the ball, finds these orbits."""
     exact = {509.707: (8.637200107e-06, 1.9766846923e-03), -1023.899: (8.365746153e-06, 5.8140712776e-03)}
     for multiplier, (x, v) in exact.items():
         of_three = [own for own in up_to_three if own.firings == 3]

@@ -1,7 +1,7 @@
 """Periodic orbits of a hammer, stable and unstable, re-integrated with the independent reference.
 
-The reference starts at time 0, with nothing fired before: trains whose pulses end before the next firing,
-or are cut off by it, have no need of that.
+The reference starts at time 0, without earlier pulses: trains whose pulses end before the next firing,
+or are cut off by it, need no earlier pulses.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ TIGHT = 1e-14
 
 
 def found_at(period: float, overlap: str, longest: int, starts: int) -> Orbits:
-    """Search from few starts, without branches: what a search finds is tested in tests/chaos/orbits."""
+    """Search from few starts, without branches; tests/chaos/orbits tests what a search finds."""
     found = ph.orbits(
         ph.load(CRUDE),
         period=period,
@@ -47,7 +47,7 @@ def cut() -> Orbits:
 
 
 def truth(orbit: Orbit, state: np.ndarray | None = None) -> ReferenceRun:
-    """One period from a section by the reference, or from another state."""
+    """Integrate one period with the reference, from a section or from another state."""
     regime = orbit.regime
     assert orbit.phase == 0.0
     drive = ph.PulseTrain(
@@ -59,7 +59,7 @@ def truth(orbit: Orbit, state: np.ndarray | None = None) -> ReferenceRun:
 
 
 def check(orbit: Orbit) -> None:
-    """The orbit closes in the reference, and meets the same states and contacts on the way."""
+    """The orbit closes in the reference, with the same states and contacts."""
     scales = orbit.regime.window.half_widths
     run = truth(orbit)
     assert run.status == "ok"
@@ -76,7 +76,7 @@ def check(orbit: Orbit) -> None:
 
 
 def differences(orbit: Orbit, step: float) -> np.ndarray:
-    """Derivative of the state after a period by that before it, from central differences of references."""
+    """Derivative of the state after a period with respect to the initial state, by central differences."""
     columns = []
     for spacing in step * orbit.regime.window.half_widths * np.eye(2):
         ends = [truth(orbit, orbit.section + sign * spacing) for sign in (1.0, -1.0)]
@@ -86,7 +86,7 @@ def differences(orbit: Orbit, step: float) -> np.ndarray:
 
 
 def check_multipliers(orbit: Orbit) -> None:
-    """Differences extrapolated after Richardson, relative to the larger multiplier."""
+    """Richardson-extrapolated differences, relative to the larger multiplier."""
     matrix = (4.0 * differences(orbit, 1e-4) - differences(orbit, 2e-4)) / 3.0
     theirs = np.linalg.eigvals(matrix)
     theirs = theirs[np.argsort(-np.abs(theirs))]

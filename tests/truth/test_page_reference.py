@@ -1,4 +1,4 @@
-"""A printed line against the reference integrator: where each dot lands, which ones are lost."""
+"""A printed line against the reference integrator: positions of the dots, and lost dots."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ FINE = 1e-12
 
 @pytest.fixture(scope="module")
 def page() -> Page:
-    """Two wires, fast enough that dots of theirs are off."""
+    """Two wires at a rate at which some dots deviate."""
     return print_page(ph.load(CRUDE), Pattern("two wires", marks()), RATE, tolerance=FINE)
 
 
@@ -26,7 +26,7 @@ def marks() -> np.ndarray:
 
 
 def touches(slots: np.ndarray) -> np.ndarray:
-    """The first touch of the pack after each firing and before the next, s; NaN for a lost dot."""
+    """First pack touch after each firing and before the next firing, s; NaN for a lost dot."""
     hammer = ph.load(CRUDE)
     fired = FIRST_SLOT + slots / RATE
     drive = ph.PulseTrain(hammer.waveform, at=fired)

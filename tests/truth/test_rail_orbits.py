@@ -1,4 +1,4 @@
-"""Orbits behind a rail: where no current flows at the firing, displacement and velocity are the state."""
+"""Orbits with a rail driver: if no current flows at the firing, displacement and velocity are the state."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ RAIL = Rail(voltage=100.0, width=177.24e-6, decay="diode", decay_resistance=159.
 
 @pytest.fixture(scope="module")
 def hammer() -> ph.Hammer:
-    """The paper's, behind a rail that makes its current."""
+    """The paper's hammer, with a rail driver that gives its current."""
     coil = {"coil.resistance": 28.612, "coil.inductance": 6.5468e-3}
     return ph.load("hendriks-1983-1").replace({**coil, "waveform": RAIL})
 
@@ -54,7 +54,7 @@ def test_a_multiplier_of_an_orbit_is_the_exponent_of_its_train(hammer: ph.Hammer
 
 
 def test_a_current_at_the_firing_is_named(hammer: ph.Hammer) -> None:
-    """A bounce induces one against the diode: displacement and velocity are not the whole state then."""
+    """A bounce induces a current through the diode: displacement and velocity are not the full state then."""
     image = strobe_map(Regime.of(hammer, rate=800.0), [5.04e-5, 0.0])
     assert image.status == CURRENT
     assert not np.isfinite(image.state).any()

@@ -1,6 +1,6 @@
-"""Hammer, measurements, constants, hammer: what is found is what was measured, as well as it says.
+"""Hammer, measurements, constants, hammer: the constants are recovered within the stated errors.
 
-The measurements are those of an ordinary bench, `printhammer.identify.bench.laboratory.SENSORS`.
+The measurements are those of a typical bench, `printhammer.identify.bench.laboratory.SENSORS`.
 """
 
 import functools
@@ -41,20 +41,20 @@ def laboratory(seed: int) -> Recovery:
 
 
 def held(fits: list[Fit], key: str, truths: list[float]) -> int:
-    """How many intervals contain the truth."""
+    """Count the intervals that contain the true value."""
     ends = [fit[key].interval for fit in fits]
     return sum(low <= true <= high for (low, high), true in zip(ends, truths, strict=True))
 
 
 def mahalanobis(fit: Fit, hammer: ph.Hammer) -> float:
-    """Squared distance of all constants from the truth, in terms of their covariance."""
+    """Squared distance of all constants from the true values, in terms of their covariance."""
     apart = np.array([fit[key].value - true_value(hammer, key) for key in fit.keys])
     scale = np.sqrt(np.diag(fit.covariance))
     return float((apart / scale) @ np.linalg.solve(fit.correlation, apart / scale))
 
 
 def test_static_constants_of_a_few_laboratories(tmp_path: Path) -> None:
-    """Of 8 intervals, honest ones miss more than these at most once in 10 000."""
+    """Of 8 intervals, correct ones miss more than these at most once in 10 000 repetitions."""
     count = 8
     found: dict[str, list[Fit]] = {"magnet": [], "pack": [], "backstop": []}
     for seed in range(200, 200 + count):
@@ -89,7 +89,7 @@ def test_one_laboratory_from_end_to_end() -> None:
 
 
 def test_the_hammer_that_is_built_moves_like_the_one_that_was_measured() -> None:
-    """The displacements differ by no more than the covariance of the constants has them.
+    """The displacements deviate by no more than the covariance of the constants implies.
 
     By Cauchy and Schwarz (g . d)^2 <= (g C g) (d C^-1 d) for the change d of the constants, their covariance
     C and the gradient g of a displacement; d C^-1 d follows chi squared.
@@ -125,7 +125,7 @@ def test_the_hammer_that_is_built_moves_like_the_one_that_was_measured() -> None
 
 
 def test_exact_measurements_give_the_hammer_back() -> None:
-    """Without errors of the sensors nothing is left but rounding, and the steps of the kernel."""
+    """Without sensor errors, only rounding and the steps of the kernel remain."""
     with tempfile.TemporaryDirectory() as folder:
         for kind in ("magnet", "spring", "pack", "backstop"):
             ph.measure(kind, HAMMER, sensor={"exact": True}).write(Path(folder) / f"{kind}.csv")
@@ -142,7 +142,7 @@ def test_exact_measurements_give_the_hammer_back() -> None:
 
 
 def count_all(found: list[Recovery]) -> dict[str, int]:
-    """Count the intervals that hold, for each constant in each fit."""
+    """Count the intervals that contain the true value, for each constant in each fit."""
     counts = {}
     for kind, keys in CONSTANTS.items():
         for key in keys:
@@ -183,7 +183,7 @@ def test_sixteen_laboratories() -> None:
 
 @pytest.mark.slow
 def test_laboratories_with_hammers_of_their_own() -> None:
-    """So it is for other hammers that print, each constant up to 20 % from the shipped one."""
+    """The same holds for other printing hammers, with constants up to 20 % from the shipped hammer."""
     labs = 8
     found = [recover(hammer, seed) for seed, hammer in enumerate(printing_hammers(labs))]
     counts = count_all(found)
@@ -192,7 +192,7 @@ def test_laboratories_with_hammers_of_their_own() -> None:
 
 
 def printing_hammers(count: int) -> Iterator[ph.Hammer]:
-    """Draw hammers whose single pulse prints and comes back to the backstop."""
+    """Draw hammers whose single pulse prints and returns to the backstop."""
     draw = hammers.Draw(np.random.default_rng(1983))
     while count:
         hammer = draw()

@@ -33,7 +33,7 @@ WAVEFORM = Rectangle(amplitude=0.9266, width=352e-6, rise=10.7e-6, decay=24.3e-6
 
 
 def made_of(mass: float = MASS, **parts: Any) -> SimpleNamespace:
-    """A hammer of some parts, as the reference sees one."""
+    """A hammer composed of parts, in the form that the reference reads."""
     return SimpleNamespace(mass=mass, **{role: parts.get(role) for role in ROLES})
 
 
@@ -249,7 +249,7 @@ def test_tolerances_agree() -> None:
 
 
 def _second_method(t_end: float, times: np.ndarray) -> np.ndarray:
-    """The single pulse by SciPy's DOP853, mode by mode, its switches located by its own root finder."""
+    """The single pulse by SciPy's DOP853, mode by mode, with switches located by its own root finder."""
     state, t, r_max = np.array([reference(WHOLE, ONE_PULSE, 1e-9).x[0] * 1e3, 0.0]), 0.0, math.nan
     out = np.full(times.size, math.nan)
     mode = "stop"

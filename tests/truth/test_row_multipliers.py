@@ -1,4 +1,4 @@
-"""Multipliers of rows, from differences in an ensemble, beside those of orbits from the tangent flow."""
+"""Multipliers of rows, from differences in an ensemble, against those of orbits from the tangent flow."""
 
 import numpy as np
 import pytest
@@ -61,7 +61,7 @@ def test_short_rows_are_refused(shipped: ph.Hammer) -> None:
 
 
 def test_a_relay_at_rest_on_its_stop_forgets() -> None:
-    """It bounces less than a run of a table errs, or rests, where x has no lower neighbour."""
+    """Its bounces are smaller than the error of a table's run, or it rests, with no lower neighbour in x."""
     relay = ph.load("relay-5v")
     short = ph.PulseTrain(relay.waveform.model_copy(update={"width": 10e-3}), rate=30.0, pulses=DOTS)
     rows = [ph.PulseTrain(relay.waveform, rate=30.0, pulses=DOTS), short]

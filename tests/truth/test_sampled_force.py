@@ -1,4 +1,4 @@
-"""Forces sampled over the displacement: motions piece by piece, energies, tangent maps, sensitivities."""
+"""Forces sampled against displacement: motions piece by piece, energies, tangent maps, sensitivities."""
 
 import math
 from pathlib import Path
@@ -17,7 +17,7 @@ MASS = 2e-3
 def sampled(
     folder: Path, x: np.ndarray, force: np.ndarray, interpolation: str = "pchip", name: str = "curve"
 ) -> dict[str, str]:
-    """Entry of the list of forces whose samples lie in a table, written here."""
+    """Entry of the list of forces with samples in a table, which this function writes."""
     path = folder / f"{name}.csv"
     rows = (f"{place!r},{value!r}\n" for place, value in zip(x.tolist(), force.tolist(), strict=True))
     path.write_text("displacement [m],force [N]\n" + "".join(rows), encoding="utf-8")
@@ -25,7 +25,7 @@ def sampled(
 
 
 def random_curve(rng: np.random.Generator, count: int, slope: float) -> tuple[np.ndarray, np.ndarray]:
-    """Samples from -3 to 3 mm that scatter about a spring; the forces at the ends turn a motion back."""
+    """Samples from -3 to 3 mm, scattered about a spring; the forces at the ends reverse the motion."""
     x = np.sort(np.concatenate([[-3e-3, 3e-3], rng.uniform(-2.9e-3, 2.9e-3, count - 2)]))
     force = -slope * x + 0.3 * slope * 3e-3 * rng.uniform(-1.0, 1.0, count)
     force[[0, -1]] = 1.5 * slope * 3e-3, -1.5 * slope * 3e-3
@@ -127,7 +127,7 @@ def test_energy_is_conserved_along_the_curve_of_scipy(tmp_path: Path, interpolat
 
 
 def test_a_curve_with_kinks_equals_a_spring_with_contacts(tmp_path: Path) -> None:
-    """The contact spring of a relay, as it is measured and as a list: the same dots."""
+    """The contact spring of a relay, as a measured table and as a list: the same dots."""
     parts = {
         "backstop": {"law": "rigid", "position": 0.0, "restitution": 0.3},
         "pack": {"law": "dashpot", "front": 0.5e-3, "stiffness": 1e6, "damping": 10.0},

@@ -1,4 +1,4 @@
-"""Strobe points of the schemes of 1983 against a second, plain program of the same schemes."""
+"""Strobe points of the schemes of 1983 against a second, independent program."""
 
 import itertools
 

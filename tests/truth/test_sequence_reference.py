@@ -1,4 +1,4 @@
-"""Drives whose firings differ: against the reference, differences, and the train where they do not."""
+"""Sequences of different pulses, against the reference and differences, and against equal trains."""
 
 import functools
 from typing import Any
@@ -24,7 +24,7 @@ MIXED = ["shapes", "a record"]
 
 
 def pulse(amplitude: float, width: float) -> Rectangle:
-    """A rectangle of the time constants of the crude hammer's waveform."""
+    """A rectangle with the time constants of the crude hammer's waveform."""
     own: Any = crude().waveform
     return Rectangle(amplitude=amplitude, width=width, rise=own.rise, decay=own.decay)
 

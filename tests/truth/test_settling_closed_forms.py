@@ -1,4 +1,4 @@
-"""Settling and wear against bounces that can be computed with a pencil."""
+"""Settling and wear against bounces with a closed form."""
 
 import math
 

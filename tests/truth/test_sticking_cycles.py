@@ -1,4 +1,4 @@
-"""Cycles of a ball that comes to rest on its table: each forgets its past, and repeats itself."""
+"""Cycles of a ball that comes to rest on its table: each rest erases the past, so that cycles repeat."""
 
 import math
 
@@ -15,7 +15,7 @@ OMEGA, GRAVITY = 2.0 * math.pi * FREQUENCY, 9.80665
 
 
 def force(centimetres: float) -> float:
-    """Amplitude of the force in the frame of a table of this amplitude, N."""
+    """Amplitude of the force, N, in the frame of a table with this amplitude."""
     return BALL.mass * 0.01 * centimetres * OMEGA**2
 
 

@@ -16,7 +16,7 @@ RANGE = (0.25, 1.65)
 
 @pytest.fixture(scope="module")
 def asymmetric() -> Branch:
-    """The branch through one of two orbits that are mirror images of each other."""
+    """The branch through one of two orbits that are mirror images."""
     hammer = ph.load("duffing-holmes")
     where = {"drive": FORCE, "state": (0.44227198, -0.43609727), "firings": 1}
     return ph.continuation(hammer, "drive.amplitude", RANGE, most=200, **where)

@@ -1,4 +1,4 @@
-"""A compensation table in the eyes of the independent reference: touches come at their time, and as hard."""
+"""A compensation table, verified by the independent reference: touch times and impact strength."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def test_touches_come_as_those_of_the_single_pulse() -> None:
     table = ph.tune(hammer, rate=rate, history=2)
 
     def dots(drive: ph.PulseSequence | ph.PulseTrain) -> tuple[np.ndarray, np.ndarray]:
-        """Return the times of the touches, and the largest displacements after them."""
+        """Return the touch times, and the largest displacement after each touch."""
         grid = np.arange(0.0, float(drive.times[-1]) + 0.4e-3, 0.5e-6)
         run = reference(hammer, drive, float(grid[-1]), times=grid, tolerance=1e-10)
         found = np.array([event.time for event in run.events if event.kind == "pack-touch"])

@@ -1,4 +1,4 @@
-"""Tangent maps that can be written down: flights, bounces, one contact, a damped oscillator, a dead stop."""
+"""Tangent maps in closed form: flights, bounces, one contact, a damped oscillator, a plastic impact."""
 
 import math
 
@@ -19,7 +19,7 @@ CLOSE = 1e-9
 def map_of(
     hammer: ph.Hammer, end: float, state: tuple[float, float], start: float = 0.0, drive: object = None
 ) -> TangentMap:
-    """Tangent map without a drive, computed by plain Python."""
+    """Tangent map without a drive, computed in interpreted Python."""
     with interpreted():
         found = tangent_map(hammer, drive or idle(), start, end, state=state, tolerance=SHARP)
     assert found.ok
@@ -127,7 +127,7 @@ def test_the_memory_of_the_pack() -> None:
 
 
 def test_areas_are_kept_until_the_first_reversal_in_the_pack() -> None:
-    """Without dashpots only reversals in the pack shrink areas, whatever the drive does."""
+    """Without dashpots, only reversals in the pack contract areas, for any drive."""
     hammer = hammers.shelf(-4.0)
     drive = hammers.drives("force")["half-sine"]
     end = 0.14e-3
@@ -137,7 +137,7 @@ def test_areas_are_kept_until_the_first_reversal_in_the_pack() -> None:
 
 
 def test_the_linear_impact_oscillator() -> None:
-    """Against differences of the piecewise exact motion, which has no tangent of its own."""
+    """Against differences of the piecewise exact motion, which has no tangent flow of its own."""
     mass, stiffness, frequency, end = 0.02, 3000.0, 95.0, 0.11
     oscillator = oracles.Oscillator(
         mass, stiffness, 40.0, 2.0 * math.pi * frequency, 0.3, surface=-1e-3, restitution=0.7
@@ -168,7 +168,7 @@ def test_the_linear_impact_oscillator() -> None:
 
 
 def damped_oscillator(damping: float = 1.5, stiffness: float = 3e4) -> ph.Hammer:
-    """A mass that always touches a spring and a dashpot: both exponents are -damping / (2 m)."""
+    """A mass in permanent contact with a spring and a dashpot: both exponents are -damping / (2 m)."""
     pack = DashpotPack(stiffness=stiffness, damping=damping, front=-1.0, pull=True)
     return made_of(pack=pack, spring=hammers.preload(stiffness))
 
@@ -188,7 +188,7 @@ def test_exponents_of_a_damped_linear_oscillator() -> None:
 
 
 def test_a_ball_that_comes_to_rest_forgets_everything() -> None:
-    """On a rigid stop all bounces are over in a finite time."""
+    """On a rigid stop, infinitely many bounces end in a finite time."""
     restitution, pull, speed = 0.5, 1e4, 0.4
     hammer = made_of(
         spring=hammers.preload(-pull * MASS),

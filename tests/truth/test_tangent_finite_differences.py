@@ -1,4 +1,4 @@
-"""The tangent flow against differences of neighbouring runs, for all kinds of parts, drives and contacts.
+"""The tangent flow against differences of runs, for all kinds of parts, drives and contacts.
 
 Runs of tolerance 1e-13, central differences extrapolated after Richardson, touches faster than 1 mm/s.
 """
@@ -87,7 +87,7 @@ def test_starts_inside_contacts() -> None:
 
 @pytest.mark.parametrize("end", [0.4e-3, 0.8e-3, 1.9e-3])
 def test_differences_of_the_reference(end: float) -> None:
-    """Nothing of the kernel on the other side: two pulses, the second of them into the settling out."""
+    """Against the independent reference: two pulses, the second during the settle-out."""
     hammer = crude()
     drive = ph.PulseTrain(hammer.waveform, at=[0.0, 1.1e-3])
     rest = rest_state(hammer)
@@ -115,7 +115,7 @@ def test_differences_of_the_reference(end: float) -> None:
 @pytest.mark.parametrize("depth", [1e-11, 1e-12, 1e-13, 1e-15])
 @pytest.mark.parametrize("pack", ["power", "curve"])
 def test_a_contact_that_is_hardly_one(pack: str, depth: float) -> None:
-    """A pack that is touched ever so slightly leaves the flow as it is without a pack.
+    """A very light touch of a pack leaves the flow as it is without a pack.
 
     Thrown back from where a fall from the depth comes by, the armature comes to that depth.
     """

@@ -32,7 +32,7 @@ def stable(exact: TwoStops) -> tuple[float, float]:
 
 @pytest.mark.parametrize(("name", "exact"), CASES)
 def test_symmetric_orbits_repeat(name: str, exact: TwoStops) -> None:
-    """Impacts alternate every half period; the drive replaces what the impacts and the damping lose."""
+    """Impacts alternate every half period; the drive replaces the energy lost in impacts and damping."""
     phase, speed = stable(exact)
     motion = run(name, exact, exact.amplitude, phase, speed, 5.25)
     assert [each.surface for each in motion.contacts] == ["pack", "backstop"] * 5
@@ -65,7 +65,7 @@ def test_multipliers_of_symmetric_orbits(name: str, exact: TwoStops) -> None:
 
 @pytest.mark.parametrize(("name", "exact"), CASES)
 def test_beyond_the_pitchfork_the_times_between_impacts_differ(name: str, exact: TwoStops) -> None:
-    """5 % below the critical amplitude the times become equal, 5 % above they do not."""
+    """5 % below the critical amplitude the flight times become equal, 5 % above they do not."""
     uneven = []
     for factor in (0.95, 1.05):
         amplitude = factor * exact.pitchfork
