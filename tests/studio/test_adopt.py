@@ -28,7 +28,6 @@ def ask() -> Iterator[Any]:
 @pytest.mark.parametrize("name", NAMES)
 def test_a_hammer_file_gives_the_numbers_of_python(ask: Any, name: str) -> None:
     hammer = ph.load(name)
-    # Where forces and contacts are added to the spring, the page has no controls of their constants.
     keys = [control["key"] for control in describe(hammer)["constants"]]
     changed = hammer.replace({key: RAISED * hammer.constants[key].si for key in keys}).replace("name", "mine")
     found = ask("adopt", changed.to_toml())["found"]
@@ -41,6 +40,8 @@ def test_a_hammer_file_gives_the_numbers_of_python(ask: Any, name: str) -> None:
         for entry in ("value", "low", "high"):
             assert other[entry] == pytest.approx(control[entry], rel=1e-9), control["key"]
     assert described["places"] == pytest.approx(expected["places"])
+    for contact, other in zip(expected["contacts"], described["contacts"], strict=True):
+        assert other == {**contact, "position": pytest.approx(contact["position"])}
     for control, other in zip(expected["combined"], described["combined"], strict=True):
         assert (other["value"], other["low"]) == pytest.approx((control["value"], control["low"]))
     if hammer.waveform is not None:
@@ -72,13 +73,15 @@ def test_another_hammer_file_is_refused(ask: Any, change: tuple[str, str], reaso
     assert reason in answer["refused"], json.dumps(answer)[:300]
 
 
-def test_constants_without_a_control_must_be_those_of_the_page(ask: Any) -> None:
+def test_contacts_are_refused_where_python_refuses_them(ask: Any) -> None:
     relay = ph.load("relay-5v")
-    assert "found" in ask("adopt", relay.replace("backstop.restitution", 0.4).to_toml())
-    for key in ("contact.make.position", "contact.break.stiffness", "spring.stiffness"):
-        answer = ask("adopt", relay.replace(key, RAISED * relay.constants[key].si).to_toml())
-        assert f"dropped file: {key} = " in answer["refused"]
+    text = relay.to_toml()
     assert "contact.break" in ask("adopt", relay.replace("contact.break", None).to_toml())["refused"]
+    assert "contact.break.side = front" in ask("adopt", text.replace('"back"', '"front"'))["refused"]
+    behind = relay.replace("contact.break.position", 1.25e-6).to_toml().replace("1.25e-06", "-1e-6")
+    with pytest.raises(ph.InputError, match="position not before"):
+        ph.Hammer.from_toml(behind)
+    assert "contact.break.position = -0.000001 m" in ask("adopt", behind)["refused"]
 
 
 def test_a_file_lists_its_views(ask: Any) -> None:

@@ -41,6 +41,24 @@ STEEPEST = 3.0
 """Larger than the power of the indentation with which the force of any pack grows."""
 THROUGHPUT = 1e-4  # Rounding moves the ends of steps, on which the sum of the works of all steps depends
 WORKS = ("loading_work", "net_loss")
+MOVED = {
+    "mass": 1.1e-3,
+    "spring.preload": -0.45,
+    "spring.stiffness": 120.0,
+    "force.weight.angle": 0.7,
+    "force.guide.kinetic": 0.12,
+    "force.guide.static": 0.25,
+    "contact.make.position": 0.33e-3,
+    "contact.make.stiffness": 1.3e5,
+    "contact.make.damping": 0.5,
+}
+"""Constants of spring, forces and contacts as sliders of the page set them."""
+REFUSED: list[tuple[dict[str, float], str]] = [
+    ({"contact.make.position": -1e-5}, "expected a position not before backstop.position = 0 m"),
+    ({"contact.second.position": 0.33e-3}, "expected another position than that of contact.make"),
+    ({"force.guide.static": 0.05}, "force.guide.static = 0.05 N: expected at least force.guide.kinetic"),
+]
+"""Values that page and Python refuse, with what the page expects."""
 FIELDS = ("flight_time", "impact_speed", "peak_force", "indentation", "contact_time", *WORKS)
 
 State = dict[str, Any]
@@ -169,13 +187,18 @@ def check_state(engine: Engine, state: State) -> str:
         return f"{before} dots"
     assert (curve["status"], curve["steps"]) == (motion.status, motion.steps)
     assert bool(curve["message"]) == bool(motion.message or motion.unsettled)
+    check_energies(motion, shown)
+    return "whole"
+
+
+def check_energies(motion: Motion, shown: State) -> None:
+    """Compare the energy ledger of a run with that of a page."""
     ledger = motion.energy
     for name, value in shown["energy"].items():
         expected = getattr(ledger, name)
         scale = max(abs(expected), 1e-3 * abs(ledger.throughput))
         within = (THROUGHPUT if name == "throughput" else AGREES) * scale
         assert value == pytest.approx(expected, rel=0.0, abs=within), name
-    return "whole"
 
 
 def check_dots(engine: Engine, wave: dict[str, Any]) -> None:
@@ -200,6 +223,14 @@ def test_a_page_fires_records_and_drivers_of_the_coil(tmp_path: Path) -> None:
         assert "expected strictly increasing times" in refused["refusal"]
 
 
+def run_in_full(hammer: Hammer, drive: Drive, nudge: float) -> Motion:
+    """Run of a device at the tolerance of the page, with a mass that differs by a relative amount."""
+    hammer = hammer.replace({"mass": hammer.mass * (1.0 + nudge)}) if nudge else hammer
+    problem = Problem(hammer, drive, (hammer.rest, 0.0), 0.0, DISPLAY_TOLERANCE)
+    record = problem.run(end_of_run(hammer, drive, None))
+    return Motion(problem, record, float(record.nodes[-1, 0]), record.nodes[:, 0].copy(), "default")
+
+
 @pytest.mark.parametrize(
     ("dry", "front", "damping"), [(False, False, 0.4), (True, False, None), (False, True, None)]
 )
@@ -213,6 +244,7 @@ def test_a_page_follows_forces_and_contacts(
             "backstop": {"law": "rigid", "position": 0.0, "restitution": 0.3},
             "force.weight": {"law": "gravity", "angle": "60 deg"},
             "contact.make": contact,
+            "contact.second": {**contact, "position": 0.36e-3},
         }
     )
     if dry:
@@ -225,20 +257,26 @@ def test_a_page_follows_forces_and_contacts(
     assert (describe(hammer)["dry"], describe(hammer)["rigid_front"]) == (False, front)
     wave = {"shape": "half-sine", "amplitude": 3.0, "width": 1.5e-3, "quantity": "force"}
     state = {**STATE, "hammer": "listed", "waveform": wave, "rate": 300.0, "pulses": 3}
-    stops = ["backstop.position", "backstop.restitution"]
-    stops = ["pack.front", "pack.restitution", *stops] if front else stops
-    assert [control["key"] for control in describe(hammer)["constants"]] == stops
+    moved = {key: MOVED[key] for key in MOVED if key in hammer.constants}
     with Engine(Shelf(hammer, only=True), tmp_path) as engine:
-        curve = engine.work("curves", state)[0]
-    drive = ph.PulseTrain(
-        SHAPES["half-sine"](amplitude=3.0, width=1.5e-3, quantity="force"), rate=300.0, pulses=3
-    )
-    problem = Problem(hammer, drive, (hammer.rest, 0.0), 0.0, DISPLAY_TOLERANCE)
-    record = problem.run(end_of_run(hammer, drive, None))
-    motion = Motion(problem, record, float(record.nodes[-1, 0]), record.nodes[:, 0].copy(), "default")
-    assert len(motion.closings) >= 2
-    assert (curve["status"], curve["steps"], curve["message"]) == ("ok", motion.steps, "")
-    check_curves(motion, curve, math.inf)
+        shown = [engine.work("curves", {**state, "constants": constants}) for constants in ({}, moved)]
+        refused = [engine.work("curves", {**state, "constants": {**moved, **wrong}}) for wrong, _ in REFUSED]
+    drive = drive_of(state, None)
+    for device, (curve, dots) in zip((hammer, hammer.replace(moved)), shown, strict=True):
+        motion, other = (run_in_full(device, drive, nudge) for nudge in (0.0, NUDGE))
+        horizon = horizon_of(motion, other)
+        assert len(motion.closings) >= 2
+        assert (curve["status"], curve["message"]) == ("ok", "")
+        assert curve["contacts"] == describe(device)["contacts"]
+        check_curves(motion, curve, horizon)
+        if math.isinf(horizon):
+            assert curve["steps"] == motion.steps
+            check_energies(motion, dots)
+    for (wrong, expected), frames in zip(REFUSED, refused, strict=True):
+        if set(wrong) <= set(hammer.constants):
+            assert expected in frames[0]["refusal"]
+            with pytest.raises(ph.InputError):
+                hammer.replace({**moved, **wrong})
 
 
 def oscillators(count: int) -> list[ph.Hammer]:

@@ -159,6 +159,19 @@ def test_texts_describe_the_state(
     assert ask("file", texts["file"])["found"] == {"state": state, "notes": []}
 
 
+def test_the_hammer_file_of_a_state_changes_entries_by_name(ask: Any) -> None:
+    relay = ph.load("relay-5v")
+    constants = {"spring.stiffness": 400.0, "contact.make.position": 3e-4, "contact.break.stiffness": 2500.0}
+    state = {**STATE, "hammer": relay.name, "constants": constants}
+    texts = ask("texts", state)["found"]
+    assert ph.Hammer.from_toml(texts["hammer"]).fingerprint == relay.replace(constants).fingerprint
+    assert ask("file", texts["file"])["found"] == {"state": state, "notes": []}
+    wrong = {"constants": {"contact.make.position": 1.0, "contact.make.colour": 1.0}, "hammer": relay.name}
+    notes = ask("taken", wrong)["found"]["notes"]
+    assert "contact.make.position = 1 m: expected 0.00015 to 0.00065" in notes[0]
+    assert "contact.make.colour is not known" in notes[1]
+
+
 def test_the_command_runs_with_the_saved_file(
     ask: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

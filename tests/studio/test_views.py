@@ -53,6 +53,27 @@ def test_one_header_row_and_controls_in_front_of_one_fold(page: Page) -> None:
     assert not page.run("document.querySelector('.more').open")
 
 
+def test_constants_of_forces_and_contacts_have_sliders(page: Page) -> None:
+    choose(page, "relay-5v")
+    page.run("document.querySelector('.fold').open = true")
+    headings = page.run("[...document.querySelectorAll('.fold h3')].map((each) => each.textContent)")
+    assert {"Spring", "Contact: make", "Contact: break"} <= set(headings)
+    label = page.run("document.querySelector('[for=control-contact-make-position]').textContent")
+    assert label == "make: position x0"
+    slider = "document.querySelector('[data-key=\"contact.make.position\"]')"
+    assert page.run(f"{slider}.closest('.row').querySelector('.unit').textContent") == "µm"
+    page.run(f"{slider}.value = 250; {slider}.dispatchEvent(new Event('input'))")
+    page.wait(QUIET)
+    moved = page.run(f"{STUDIO}.store.state.constants['contact.make.position']")
+    assert 0.15e-3 < moved < 0.4e-3
+    assert page.run(f"{STUDIO}.frames.motion.contacts[0].position") == moved
+    # The contact cannot lie behind the backstop.
+    page.run(f"{STUDIO}.store.set({{ constants: {{ 'backstop.position': 1e-4 }} }}); 1")
+    page.wait("document.querySelector('.status').textContent.includes('expected a position not before')")
+    page.run(f"{STUDIO}.store.set({{ constants: {{}} }}); 1")
+    page.wait(QUIET)
+
+
 def test_figure_6_shows_both_curves_and_every_story_its_view(page: Page) -> None:
     heroes = []
     for k in range(6):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 LARGEST_MESSAGE: Final = 1_000_000
@@ -36,6 +37,12 @@ LARGEST: Final = {"V": LARGEST_VOLTAGE, "ohm": 1e6}
 
 SPAN: Final = 10.0
 """Largest factor by which a control may change a constant from its value in the loaded hammer; arbitrary."""
+
+SPAN_OF_PLACES: Final = 100e-6
+"""Range of a control about the only position of a device, at 0, m; arbitrary."""
+
+QUARTER_TURN: Final = 0.5 * math.pi
+"""Range of a control of an angle, rad."""
 
 MOST_STEPS: Final = 50_000
 """Step limit of the single run that the curves show; arbitrary."""

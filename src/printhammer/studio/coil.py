@@ -14,10 +14,10 @@ from printhammer.drive.waveforms.drivers import Rail
 from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import Range, range_of
 from printhammer.parts.coil import REFERENCE, Winding
-from printhammer.parts.friction import DryFriction
-from printhammer.parts.spring.terms import TERMS, Gravity
+from printhammer.parts.spring.terms import TERMS
 from printhammer.run.supply import inductance
 from printhammer.studio.bounds import SPAN
+from printhammer.studio.terms import span_of_term
 from printhammer.support.constants import Constant, quantities
 
 _SOURCE: Final = "not in the hammer file; assumed where a voltage drives the coil"
@@ -67,17 +67,13 @@ def open_constants(hammer: Hammer) -> dict[str, tuple[Constant, Range]]:
 def span_of(hammer: Hammer, constant: Constant) -> Range | None:
     """Return the range of the control of a constant of a hammer; None for a constant without a control.
 
-    If the file lists additional forces or contacts, the page receives only their sum with the spring, or with
-    the damping for dry friction: the constants of these parts, and the mass if a force is its weight, then
-    have no control.
+    Constants of the waveform have no control here: the editor of the pulse changes them.
     """
     section = constant.key.partition(".")[0]
-    if section == "waveform" or section in TERMS or (hammer.terms and section == "spring"):
+    if section == "waveform":
         return None
-    if section == "damping" and isinstance(hammer.damping, DryFriction):
-        return None
-    if constant.key == "mass" and any(isinstance(term, Gravity) for term in hammer.terms.values()):
-        return None
+    if section in TERMS:
+        return span_of_term(hammer, constant.key)
     if constant.si_unit == "degC" and TEMPERATURES.low <= constant.si <= TEMPERATURES.high:
         return TEMPERATURES
     return range_of(hammer, constant.key, SPAN)

@@ -10,11 +10,12 @@ from printhammer.drive.waveforms.drivers import DRIVERS, Rail
 from printhammer.drive.waveforms.shapes import SHAPES, Sine, Waveform
 from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import Range
-from printhammer.parts.base import Part
+from printhammer.parts.base import PARTS, Part
 from printhammer.parts.coil import Winding
 from printhammer.parts.friction import DryFriction
-from printhammer.parts.spring.terms import LinearContact
+from printhammer.parts.spring.terms import Term
 from printhammer.studio.coil import open_constants, rail_of, span_of
+from printhammer.studio.terms import contacts_of, frictions_of
 from printhammer.support.constants import Constant, quantities
 from printhammer.units import from_si
 
@@ -33,6 +34,7 @@ SHOWN: Final = {
     "Wb": ("mWb", "mWb"),
     "F": ("uF", "uF"),
     "degC": ("degC", "degC"),
+    "rad": ("deg", "deg"),
 }
 """Display units of a quantity, metric and inch-pound, by SI unit; the SI unit itself if not listed."""
 
@@ -44,6 +46,12 @@ _SLOW: Final = 2e-3
 
 _WIDE: Final = 3e-3
 """Stroke above which the page shows lengths in mm, m; arbitrary."""
+
+_SHARE: Final = 0.2
+"""Pulse width as a fraction of the initial period of a device with long pulses; arbitrary."""
+
+_METRES: Final = {"kg": ("kg", "lb"), "N/m": ("N/m", "lbf/in"), "J": ("J", "in lbf")}
+"""Units of a device whose lengths are shown in m, such as an oscillator in dimensionless form."""
 
 EQUATIONS: Final = {
     "mass": "m x'' = Fm + Fs + Fp + Fb + Fe",
@@ -118,8 +126,10 @@ def describe(hammer: Hammer) -> dict[str, Any]:
         `open` (coil constants that the file leaves open), `rail` (default rail driver, or None), `combined`
         (controls that change several constants), `waveform` (shape and constants, or None), `start` (entries
         of the initial state that differ from the default), `places` (positions), `contacts` (name, side and
-        position), `rigid` and `rigid_front` (whether backstop and front are rigid), and `dry` (whether dry
-        friction acts and the hammer has a magnet: a voltage may then drive the coil, without exponents).
+        position), `frictions` (keys of kinetic and static friction where both are stated), `sprung`
+        (whether a spring, force or contact acts), `rigid` and `rigid_front` (whether backstop and front are
+        rigid), and `dry` (whether dry friction acts and the
+        hammer has a magnet: a voltage may then drive the coil, without exponents).
     """
     spans = [(constant, span_of(hammer, constant)) for constant in hammer.constants.values()]
     return {
@@ -133,15 +143,13 @@ def describe(hammer: Hammer) -> dict[str, Any]:
         "waveform": None if hammer.waveform is None else fields_of(hammer.waveform),
         "start": opening_of(hammer),
         "places": {"backstop": hammer.position, "front": hammer.front, "platen": hammer.platen},
-        "contacts": [
-            {"name": key.partition(".")[2], "side": contact.side, "position": contact.position}
-            for key, contact in hammer.terms.items()
-            if isinstance(contact, LinearContact)
-        ],
+        "contacts": contacts_of(hammer),
+        "frictions": frictions_of(hammer),
         "strike": hammer.strike,
         "struck": hammer.struck,
         "mover": hammer.mover,
         "views": list(hammer.views),
+        "sprung": hammer.spring is not None,
         "rigid": hammer.backstop is not None and hammer.backstop.rigid,
         "rigid_front": hammer.pack is not None and hammer.pack.rigid,
         "dry": isinstance(hammer.damping, DryFriction) and hammer.magnet is not None,
@@ -149,11 +157,12 @@ def describe(hammer: Hammer) -> dict[str, Any]:
 
 
 def _control(hammer: Hammer, constant: Constant, span: Range) -> dict[str, Any]:
-    section = constant.key.partition(".")[0]
-    part = hammer.parts.get(section) or (Winding() if section == "coil" else None)
+    section = constant.key.rpartition(".")[0] or "armature"
+    entry = hammer.terms.get(section)
+    kind = _law_of(hammer, section)
     return {
         "key": constant.key,
-        "section": "armature" if part is None else section,
+        "section": "armature" if entry is None and kind is None else section,
         "symbol": constant.symbol,
         "meaning": constant.meaning,
         "value": constant.si,
@@ -163,24 +172,47 @@ def _control(hammer: Hammer, constant: Constant, span: Range) -> dict[str, Any]:
         "log": span.logarithmic,
         "status": constant.status,
         "source": constant.source,
-        "equation": equation_of(section, part),
+        "equation": equation_of(constant.key.partition(".")[0], kind) if entry is None else _head_of(entry),
     }
+
+
+def _law_of(hammer: Hammer, section: str) -> type[Part] | None:
+    """Return the class of a part as the file states it; None for other sections."""
+    part = hammer.parts.get(section)
+    if part is None:
+        return Winding if section == "coil" else None
+    # With forces and contacts, the part of the hammer is a sum.
+    return PARTS.get((section, hammer.laws.get(section, "")), type(part))
+
+
+def _head_of(entry: Term) -> str:
+    """Return the first line of the docstring of a force or contact, without its full stop."""
+    return (type(entry).__doc__ or "").partition("\n")[0].removesuffix(".")
 
 
 def opening_of(hammer: Hammer) -> dict[str, Any]:
     """Return the initial page settings of a hammer that has no pulse or is unlike a print hammer."""
-    opening = OPENINGS.get(hammer.name, {})
+    opening = OPENINGS.get(hammer.name)
     if hammer.waveform is not None:
-        return opening
+        return _slow_opening(hammer.waveform) if opening is None else opening
     quantity = "current" if "magnet" in hammer.parts else "force"
-    return {"waveform": _half_sine(1.0, 3e-4, quantity), **opening}
+    return {"waveform": _half_sine(1.0, 3e-4, quantity), **(opening or {})}
 
 
-def equation_of(section: str, part: Part | None) -> str:
-    """Return the equation of the law of a part, or else the first line of its module docstring."""
+def _slow_opening(waveform: Waveform) -> dict[str, Any]:
+    """Return the initial rates of a device whose pulses would overlap at the rates of print hammers."""
+    width = getattr(waveform, "width", None) or 0.0
+    if width <= _SLOW:
+        return {}
+    rate = float(f"{_SHARE / width:.1g}")
+    return {"rate": rate, "pulses": 3, "low": 0.5 * rate, "high": 3.0 * rate}
+
+
+def equation_of(section: str, part: type[Part] | None) -> str:
+    """Return the equation of the law of a class of parts, or else the first line of its module docstring."""
     if part is None:
         return EQUATIONS.get(section, "")
-    text = import_module(type(part).__module__).__doc__ or ""
+    text = import_module(part.__module__).__doc__ or ""
     return EQUATIONS.get(f"{section}.{part.law}", text.strip().partition("\n")[0])
 
 
@@ -258,11 +290,12 @@ def _large(hammer: Hammer) -> dict[str, tuple[str, str]]:
         places = [place for place in (hammer.position, hammer.front) if place is not None]
         if max(places, default=0.0) - min(places, default=0.0) > _WIDE:
             units["m"] = ("mm", "in")
-    return units | {si: (unit, _INCHES.get(unit, unit)) for si, unit in hammer.shown_units.items()}
+    stated = {si: (unit, _INCHES.get(unit, unit)) for si, unit in hammer.shown_units.items()}
+    return units | stated | (_METRES if hammer.shown_units.get("m") == "m" else {})
 
 
 def _signed(unit: str) -> str:
-    signs = {"us": "µs", "um": "µm", "uF": "µF", "in lbf": "in·lbf", "degC": "°C", "^2": "²"}
+    signs = {"us": "µs", "um": "µm", "uF": "µF", "in lbf": "in·lbf", "degC": "°C", "deg": "°", "^2": "²"}
     for plain, sign in signs.items():
         unit = unit.replace(plain, sign)
     return unit

@@ -34,6 +34,7 @@ from printhammer.studio.bundle import deltas, merged, page_files, sources
 from printhammer.studio.controls import SINE, describe, units_of, vocabulary
 from printhammer.studio.launch import FORMAT, KIND
 from printhammer.studio.shelf import Shelf
+from printhammer.studio.terms import sums_of
 from printhammer.support.constants import quantities
 
 if TYPE_CHECKING:
@@ -186,13 +187,16 @@ def _hammer(shelf: Shelf, name: str, modules: dict[Laws, str]) -> dict[str, Any]
             # Without the linker, modules of other driving quantities are omitted.
             if quantity == pulse["quantity"]:
                 raise
-    carry = fresh_carry(0.0, (math.pi, 0.0))
+    carry, sums = fresh_carry(0.0, (math.pi, 0.0)), sums_of(hammer)
     return {
         "described": described,
         "units": units_of(hammer),
         "text": hammer.to_toml(),
         "shipped": shelf.is_shipped(name),
-        "numbers": {role: (keys, _numbers_of(own)) for role, (keys, own) in numbers_of(hammer).items()},
+        "numbers": {
+            role: (keys, _numbers_of(own), sums.get(role, []))
+            for role, (keys, own) in numbers_of(hammer).items()
+        },
         "size": len(constants_of(hammer)),
         "carry": _numbers_of(carry),
         "placeOfRest": carry.tolist().index(math.pi),

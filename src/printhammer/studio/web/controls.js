@@ -54,10 +54,12 @@ export function buildControls(holder, studio) {
   // What a voltage drives is looked at first.
   const listed = [...described.constants, ...described.open ?? []].sort((one, other) => (other.section === "coil") - (one.section === "coil"));
   const mover = moverOf(described);
+  const titles = { ...TITLES, armature: large(mover) };
   for (const constant of listed) {
-    const meaning = mover === "armature" ? constant.meaning : constant.meaning.replace("armature", mover);
-    add(section(constant.section, constant.section === "armature" ? large(mover) : TITLES[constant.section]), {
-      ...constant, id: constant.key, name: constant.unit === "degC" ? "temperature" : meaning, title: constant.key,
+    const meaning = constant.meaning.replace("armature", mover).replace("mass of the mass", "mass");
+    const [list, entry] = constant.section.split(".");
+    add(section(constant.section, entry ? `${large(list)}: ${entry}` : titles[constant.section]), {
+      ...constant, id: constant.key, name: constant.unit === "degC" ? "temperature" : entry ? `${entry}: ${constant.key.split(".").at(-1)}` : meaning, title: constant.key,
       hint: `${constant.key}: ${meaning}${constant.unit === "1" ? "" : `, ${constant.unit}`}. ${constant.equation}. ${constant.status}: ${constant.source}.`,
       get: (state) => state.constants[constant.key] ?? constant.value,
       set: (value) => ({ constants: { ...studio.store.state.constants, [constant.key]: value } }),

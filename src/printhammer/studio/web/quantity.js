@@ -1,6 +1,6 @@
 // Quantities as they are typed: numbers, units and arithmetic, such as `1/660us` or `2*12.5 N/mm`.
 
-// Powers of kg, m, s and A, and the size in SI.
+// Powers of kg, m, s, A and rad, and the size in SI.
 const UNITS = {};
 const BASES = {
   g: [1e-3, [1, 0, 0, 0]], m: [1, [0, 1, 0, 0]], s: [1, [0, 0, 1, 0]], A: [1, [0, 0, 0, 1]], Hz: [1, [0, 0, -1, 0]],
@@ -8,17 +8,18 @@ const BASES = {
 };
 const PREFIXES = { "": 1, n: 1e-9, u: 1e-6, "\u00b5": 1e-6, "\u03bc": 1e-6, m: 1e-3, c: 1e-2, k: 1e3, M: 1e6, G: 1e9 };
 for (const [base, [size, powers]] of Object.entries(BASES)) {
-  for (const [prefix, factor] of Object.entries(PREFIXES)) UNITS[prefix + base] = { value: size * factor, powers };
+  for (const [prefix, factor] of Object.entries(PREFIXES)) UNITS[prefix + base] = { value: size * factor, powers: [...powers, 0] };
 }
 const INCH = 0.0254;
 const POUND = 0.45359237;
 const GRAVITY = 9.80665;
 Object.assign(UNITS, {
-  in: { value: INCH, powers: [0, 1, 0, 0] }, mil: { value: 1e-3 * INCH, powers: [0, 1, 0, 0] }, lb: { value: POUND, powers: [1, 0, 0, 0] }, oz: { value: POUND / 16, powers: [1, 0, 0, 0] },
-  lbf: { value: POUND * GRAVITY, powers: [1, 1, -2, 0] }, ozf: { value: (POUND * GRAVITY) / 16, powers: [1, 1, -2, 0] },
-  psi: { value: (POUND * GRAVITY) / INCH ** 2, powers: [1, -1, -2, 0] }, ksi: { value: (1e3 * POUND * GRAVITY) / INCH ** 2, powers: [1, -1, -2, 0] }, "%": { value: 0.01, powers: [0, 0, 0, 0] },
+  in: { value: INCH, powers: [0, 1, 0, 0, 0] }, mil: { value: 1e-3 * INCH, powers: [0, 1, 0, 0, 0] }, lb: { value: POUND, powers: [1, 0, 0, 0, 0] }, oz: { value: POUND / 16, powers: [1, 0, 0, 0, 0] },
+  lbf: { value: POUND * GRAVITY, powers: [1, 1, -2, 0, 0] }, ozf: { value: (POUND * GRAVITY) / 16, powers: [1, 1, -2, 0, 0] },
+  psi: { value: (POUND * GRAVITY) / INCH ** 2, powers: [1, -1, -2, 0, 0] }, ksi: { value: (1e3 * POUND * GRAVITY) / INCH ** 2, powers: [1, -1, -2, 0, 0] }, "%": { value: 0.01, powers: [0, 0, 0, 0, 0] },
+  rad: { value: 1, powers: [0, 0, 0, 0, 1] }, deg: { value: Math.PI / 180, powers: [0, 0, 0, 0, 1] },
 });
-const PLAIN = [0, 0, 0, 0];
+const PLAIN = [0, 0, 0, 0, 0];
 const TOKEN = /\s*(?:(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)|([A-Za-z\u00b5\u03bc%]+)|(.))/y;
 
 class Problem extends Error {}
@@ -40,7 +41,7 @@ const scaled = (a, b, way) => ({ value: way > 0 ? a.value * b.value : a.value / 
 const raised = (a, power) => ({ value: a.value ** power, powers: a.powers.map((each) => each * power), unit: a.unit });
 const alike = (a, b) => a.powers.every((power, k) => Math.abs(power - b.powers[k]) < 1e-9);
 
-/** Return what an expression amounts to: its value in SI and its powers of kg, m, s and A. */
+/** Return what an expression amounts to: its value in SI and its powers of kg, m, s, A and rad. */
 function evaluate(text) {
   const list = tokens(text);
   let at = 0;
@@ -104,7 +105,7 @@ function evaluate(text) {
 export function readQuantity(text, si, shown) {
   // A comma between digits is a decimal one.
   const typed = text.trim().replace(/(\d),(\d)/g, "$1.$2");
-  const plain = si === "degC" ? typed.replace(/\s*(°\s*C|degC)$/, "") : typed;
+  const plain = si === "degC" ? typed.replace(/\s*(°\s*C|degC)$/, "") : typed.replace(/°/g, "deg");
   if (!plain) return { problem: "it is empty" };
   try {
     const read = evaluate(plain);

@@ -90,7 +90,7 @@ export function sketchView(body, studio) {
     const { backstop, front, platen } = frame.places;
     const mover = moverOf(studio.described);
     const isArmature = mover === "armature";
-    const contacts = studio.described?.contacts ?? [];
+    const { contacts } = frame;
     const known = [backstop, front, platen, ...contacts.map(({ position }) => position), ...(isArmature ? frame.data.x.subarray(0, 1) : extent(frame.data.x))].filter((place) => place !== null);
     const low = Math.min(...known);
     // Without a platen the pack has no end, unless it is rigid.
@@ -164,8 +164,7 @@ export function sketchView(body, studio) {
     const [low, high] = span();
     scrub.value = String(Math.round((1000 * (studio.cursor - low)) / (high - low || 1)));
     const frame = studio.frames.motion;
-    const contacts = frame ? studio.described?.contacts ?? [] : [];
-    const states = contacts.map((contact) => stateOf(contact.name, isClosed(contact, displacementAt(frame, studio.cursor))));
+    const states = (frame?.contacts ?? []).map((contact) => stateOf(contact.name, isClosed(contact, displacementAt(frame, studio.cursor))));
     scrub.setAttribute("aria-valuetext", [shown(studio.cursor, "s"), ...states].join(", "));
     area.draw();
   }

@@ -7,7 +7,10 @@ const LONG = 1e-2; // s, from which a time is no longer told in µs
 export function setUnits(units) { known = units; }
 export function setSystem(number) { system = number; }
 
-export function unitOf(si) { return known[si]?.[system] ?? { name: si === "1" ? "" : si, factor: 1 }; }
+const RAISED = { 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹", ".": "·" };
+const signed = (si) => si.replace(/\^([\d.]+)/g, (_all, power) => [...power].map((sign) => RAISED[sign]).join(""));
+
+export function unitOf(si) { return known[si]?.[system] ?? { name: si === "1" ? "" : signed(si), factor: 1 }; }
 
 /** Return the unit of a time axis: long ones are told in ms, or in s. */
 export function timeUnit(span) { return span > 3 ? { name: "s", factor: 1 } : span > 3e-3 ? { name: "ms", factor: 1e3 } : unitOf("s"); }

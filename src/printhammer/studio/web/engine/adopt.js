@@ -1,8 +1,10 @@
 // Hammer files of the user's own: constants in the place of those of a hammer of the page that has the same laws.
 import { quantityOf, tomlOf, waveformOf } from "./drive.js";
-import { isTable, Refusal } from "./read.js";
+import { checkFrictions, contactsOf, isTable, Refusal, replaced, valuesOf } from "./read.js";
 
 const PLACES = ["backstop.position", "pack.front", "platen"];
+const ENTRY_PLACE = /^(force|contact)\..*\.(position|center)$/;
+const SIGNED = ["degC", "rad"]; // units in which a value of either sign has the same control
 const SPAN = 10; // of a control about its value, as in printhammer/hammer/names.py
 const WORDS = ["name", "title", "note", "strike", "struck", "mover"];
 const SECTIONS = ["magnet", "coil", "spring", "pack", "backstop", "damping"];
@@ -23,6 +25,7 @@ function entriesOf(document) {
   }
   return found;
 }
+const isSigned = ({ key, unit }) => PLACES.includes(key) || ENTRY_PLACE.test(key) || SIGNED.includes(unit);
 const isQuantity = (entry) => isTable(entry) && "value" in entry;
 const bare = (entry) => (isQuantity(entry) ? { value: entry.value, unit: entry.unit } : entry);
 
@@ -40,9 +43,19 @@ function differenceOf(own, known, controls) {
   return other ? `${other} = ${(isQuantity(own[other]) ? `${own[other].value} ${own[other].unit}` : String(own[other])).slice(0, 40)}` : "";
 }
 
+/** The range of a control of a position of a force or contact about its value; see printhammer/studio/terms.py. */
+function rangeOfEntry(key, value, places, values, limits) {
+  const all = [...places, ...Object.keys(values).filter((own) => ENTRY_PLACE.test(own)).map((own) => values[own])];
+  const reach = 0.5 * (Math.max(...all) - Math.min(...all)) || Math.abs(value) || limits.SPAN_OF_PLACES;
+  const backstop = key.startsWith("contact.") ? values["backstop.position"] : undefined;
+  return { low: Math.max(value - reach, backstop ?? -Infinity), high: value + reach, log: false };
+}
+
 /** The range of a control about its value. */
-function rangeOf(control, value, places) {
+function rangeOf(control, value, places, values, limits) {
   const { key, low, high, value: before } = control;
+  if (ENTRY_PLACE.test(key)) return rangeOfEntry(key, value, places, values, limits);
+  if (control.unit === "rad") return { low: Math.min(-limits.QUARTER_TURN, value), high: Math.max(limits.QUARTER_TURN, value), log: false };
   if (PLACES.includes(key)) {
     const reach = 0.5 * (Math.max(...places) - Math.min(...places)) || 0.5 * (high - low);
     return { low: value - reach, high: value + reach, log: false };
@@ -82,23 +95,28 @@ function entryOf(text, shelf, templates) {
   for (const control of described.constants) {
     if (!(control.key in own)) continue;
     const [value] = quantityOf(bare(own[control.key]), [control.unit], control.key);
-    if (!Number.isFinite(value) || (Math.sign(value) !== Math.sign(control.value) && !PLACES.includes(control.key) && control.value !== 0)) throw new Refusal(`${where}: ${control.key} = ${value} ${control.unit}: expected a number like ${control.value} ${control.unit}; \`printhammer studio FILE\` takes others`);
+    if (!Number.isFinite(value) || (Math.sign(value) !== Math.sign(control.value) && !isSigned(control) && control.value !== 0)) throw new Refusal(`${where}: ${control.key} = ${value} ${control.unit}: expected a number like ${control.value} ${control.unit}; \`printhammer studio FILE\` takes others`);
     values[control.key] = value;
   }
   const places = PLACES.map((key) => values[key]).filter((place) => place !== undefined);
   const constants = described.constants.map((control) => {
     if (!(control.key in values)) return control;
     const { status, source } = isQuantity(own[control.key]) ? own[control.key] : {};
-    return { ...control, value: values[control.key], ...rangeOf(control, values[control.key], places), status: STATUSES.includes(status) ? status : "assumed", source: typeof source === "string" ? source.slice(0, 500) : "the dropped file" };
+    return { ...control, value: values[control.key], ...rangeOf(control, values[control.key], places, values, shelf.limits), status: STATUSES.includes(status) ? status : "assumed", source: typeof source === "string" ? source.slice(0, 500) : "the dropped file" };
   });
   const words = Object.fromEntries(WORDS.filter((key) => typeof document[key] === "string").map((key) => [key, document[key].slice(0, 2000)]));
   const waveform = document.waveform === undefined ? null : waveformOf(isTable(document.waveform) ? Object.fromEntries(Object.entries(document.waveform).map(([key, entry]) => [key, bare(entry)])) : document.waveform, shelf);
   const place = (key, before) => (before === null ? null : values[key] ?? before);
+  // A slow device of the page opens slowly with the pulse of a file, too.
+  const { waveform: _own, ...rates } = described.start;
   const made = {
     ...described, name: "dropped file", title: "", note: "", ...words, views: shelf.readers.views(document.views ?? []), constants, combined: combinedOf(described.combined, values), waveform: waveform && shelf.readers.waveform(waveform),
-    start: waveform ? {} : described.start.waveform ? described.start : { waveform: described.waveform }, places: { backstop: place("backstop.position", described.places.backstop), front: place("pack.front", described.places.front), platen: place("platen", described.places.platen) },
+    start: waveform ? rates : described.start.waveform ? described.start : { waveform: described.waveform }, places: { backstop: place("backstop.position", described.places.backstop), front: place("pack.front", described.places.front), platen: place("platen", described.places.platen) },
   };
-  const set = ([keys, list]) => [keys, list.map((number, k) => (keys[k] in values ? values[keys[k]] : number))];
+  const value = valuesOf(described, values);
+  checkFrictions(described, value);
+  made.contacts = contactsOf(described, value);
+  const set = (group) => group.with(1, replaced(group, values, value));
   return { ...template, described: made, numbers: Object.fromEntries(Object.entries(numbers).map(([name, pair]) => [name, set(pair)])), text, shipped: false };
 }
 

@@ -1,5 +1,5 @@
 // The arguments of the kernel for a state, in the memory of its module; see printhammer/run/problem.py.
-import { Refusal, settingsOf } from "./read.js";
+import { checkFrictions, contactsOf, Refusal, replaced, settingsOf, valuesOf } from "./read.js";
 
 const FLIGHTS = { nodes: 2048, contacts: 256, each: 40, most: 1e6 }; // sizes of the first working space
 export const STATUS = ["ok", "range left", "runaway", "step limit", "step underflow"];
@@ -40,10 +40,9 @@ function check(code, entry, out, limits) {
 }
 
 /** The arrays of numbers of a hammer by name, with the constants of a state. */
-function numbersOf({ numbers, described, circuit }, { constants }) {
-  const taken = settingsOf({ described, constants, byVoltage: circuit });
-  const set = ([keys, own]) => own.map((number, k) => (keys[k] ? taken[keys[k]] : undefined) ?? Number(number));
-  return Object.fromEntries(Object.entries(numbers).map(([name, pair]) => [name, set(pair)]));
+function numbersOf({ numbers, described }, taken) {
+  const value = valuesOf(described, taken);
+  return Object.fromEntries(Object.entries(numbers).map(([name, group]) => [name, replaced(group, taken, value).map(Number)]));
 }
 
 /** The places of a hammer, m; null where there is none. */
@@ -104,8 +103,13 @@ let latest = { key: null }; // what was prepared last: many works in a row have 
 
 /** The numbers of a device and its pulse that do not depend on the train, with arrays in the memory of the module. */
 function prepare(kernel, hammer, state, limits) {
-  const numbers = numbersOf(hammer, state);
+  const { described, circuit } = hammer;
+  const taken = settingsOf({ described, constants: state.constants, byVoltage: circuit });
+  const numbers = numbersOf(hammer, taken);
   const places = placesOf(numbers);
+  const value = valuesOf(described, taken);
+  checkFrictions(described, value);
+  const touching = contactsOf(described, value);
   const [mass] = numbers.body;
   const [constants, domain] = [kernel.array("f", hammer.size), kernel.array("f", 2)];
   kernel.call("constants", ...ARRAYS.map((name) => kernel.copy("f", numbers[name])), constants, domain);
@@ -116,10 +120,10 @@ function prepare(kernel, hammer, state, limits) {
   const { pieces, about } = pulseOf(kernel, hammer, state, limits);
   const ends = kernel.copy("f", [...domain.values, ...numbers.limits.slice(2)]);
   const found = kernel.array("f", 4);
-  if (hammer.circuit) check(...kernel.call("supply", constants, ends, about, found), "supply", found, limits);
+  if (circuit) check(...kernel.call("supply", constants, ends, about, found), "supply", found, limits);
   const device = {
-    constants, pieces, ends, about, mass, places, peak: about.values[ABOUT.largest],
-    circuit: hammer.circuit, width: hammer.circuit ? 9 : 5, columns: hammer.circuit ? 15 : 10,
+    constants, pieces, ends, about, mass, places, touching, peak: about.values[ABOUT.largest],
+    circuit, width: circuit ? 9 : 5, columns: circuit ? 15 : 10,
   };
   device.rest = restOf(kernel, hammer, constants, ends, limits);
   const carry = hammer.carry.map(Number).with(hammer.placeOfRest, device.rest);

@@ -106,6 +106,46 @@ export function settingsOf({ described, constants, byVoltage }) {
   return Object.fromEntries(Object.entries(constants).filter(([key]) => !(key in left)));
 }
 
+/** The numbers of an array with other values of constants: those that a constant sets, and the sums of products in which one occurs. */
+export function replaced([keys, own, sums], values, value) {
+  const list = own.map((number, k) => (keys[k] ? values[keys[k]] : undefined) ?? number);
+  const product = ([factor, up, down, sines]) => {
+    const over = down.reduce((part, key) => part / value(key), up.reduce((part, key) => part * value(key), factor));
+    return sines.reduce((part, key) => part * Math.sin(value(key)), over);
+  };
+  for (const [index, products] of sums) {
+    if (products.some(([, ...groups]) => groups.flat().some((key) => key in values))) list[index] = products.reduce((sum, each) => sum + product(each), 0);
+  }
+  return list;
+}
+
+/** Return what gives the value of a constant of a hammer with other values of some. */
+export function valuesOf({ constants, open }, values) {
+  const own = new Map([...constants, ...open].map(({ key, value }) => [key, value]));
+  return (key) => values[key] ?? own.get(key);
+}
+
+/** The contacts of a hammer at other values of constants; refused behind the backstop, and at one position on one side. */
+export function contactsOf({ contacts }, value) {
+  const [placed, backstop] = [[], value("backstop.position") ?? -Infinity];
+  for (const contact of contacts) {
+    const key = `contact.${contact.name}.position`;
+    const position = value(key);
+    if (position < backstop) throw new Refusal(`${key} = ${short(position)} m: expected a position not before backstop.position = ${short(backstop)} m`);
+    const same = placed.find((other) => other.side === contact.side && other.position === position);
+    if (same) throw new Refusal(`${key} = ${short(position)} m: expected another position than that of contact.${same.name}`);
+    placed.push({ ...contact, position });
+  }
+  return placed;
+}
+
+/** Check that no static friction is less than the kinetic friction of its entry. */
+export function checkFrictions({ frictions }, value) {
+  for (const [kinetic, still] of frictions) {
+    if (value(still) < value(kinetic)) throw new Refusal(`${still} = ${short(value(still))} N: expected at least ${kinetic} = ${short(value(kinetic))} N`);
+  }
+}
+
 /** Check that a hammer has a constant, and that a value lies in the range of its control. */
 export function checkConstant(described, key, value) {
   const all = [...described.constants, ...described.open];

@@ -1,6 +1,6 @@
 // A state as texts: the file of its hammer and of its drive, a script, a command line.
 import { driveText } from "./drive.js";
-import { settingsOf } from "./read.js";
+import { Refusal, settingsOf } from "./read.js";
 
 const HAMMER_FILE = "studio-hammer.toml";
 const DRIVE_FILE = "studio-drive.toml";
@@ -36,16 +36,30 @@ function hammerFile(state, hammer) {
   return text;
 }
 
+/** The section of each line of a TOML text; that of an entry of a list has the name of the entry, such as "force.weight". */
+function sectionsOf(lines) {
+  const heads = lines.map((line) => /^\s*\[(\[?)\s*([\w.-]+)\s*\]/.exec(line));
+  let here = "";
+  return heads.map((head, k) => {
+    if (!head) return here;
+    here = head[2];
+    if (head[1]) {
+      const after = heads.findIndex((other, at) => at > k && other);
+      const names = lines.slice(k + 1, after < 0 ? lines.length : after).map((line) => /^\s*name\s*=\s*["']([^"']*)["']/.exec(line));
+      here = `${here}.${names.find((found) => found)?.[1] ?? ""}`;
+    }
+    return here;
+  });
+}
+
 /** Set one value of a TOML text: the first line of a section that gives it, or a new one at the end of the section. */
 function changed(text, section, name, value, unit) {
   const whole = unit === "1" ? value : `"${value} ${unit}"`;
   const lines = text.split("\n");
-  let here = "";
+  const sections = sectionsOf(lines);
   let last = -1;
   for (let k = 0; k < lines.length; k += 1) {
-    const head = /^\s*\[([\w.-]+)\]/.exec(lines[k]);
-    if (head) [, here] = head;
-    if (here !== section) continue;
+    if (sections[k] !== section) continue;
     if (lines[k].trim()) last = k;
     if (new RegExp(`^\\s*${name}\\s*=`).test(lines[k])) {
       const apart = /unit\s*=/.test(lines[k]);
@@ -55,6 +69,7 @@ function changed(text, section, name, value, unit) {
       return lines.join("\n");
     }
   }
+  if (section.includes(".")) throw new Refusal(`${section}.${name}: expected its entry under [[${section.split(".")[0]}]] in the hammer file, one constant a line`);
   const added = `${name} = { value = ${value}, ${unit === "1" ? "" : `unit = "${unit}", `}status = "assumed", source = "set in the studio" }`;
   if (last < 0 && section) lines.push(`[${section}]`, added, "");
   else lines.splice(last + 1, 0, added);
