@@ -151,7 +151,7 @@ export function key(pen, box, entries) {
   pen.textAlign = "right";
   let [place, row] = [box.x + box.w - 4, box.y + 8];
   const placed = [];
-  for (const { name, colour, dash = [] } of [...entries].reverse()) {
+  for (const { name: own, title: name = own, colour, dash = [] } of [...entries].reverse()) {
     const wide = pen.measureText(name).width + 4 + 14;
     if (place - wide < box.x) [place, row] = [box.x + box.w - 4, row + 14];
     placed.push({ name, colour, dash, place, row, wide });

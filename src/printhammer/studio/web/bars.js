@@ -6,6 +6,8 @@ import { colours, FONT } from "./theme.js";
 import { digits, shown, unitOf } from "./units.js";
 
 const SIDES = [52, 52]; // the margins of the motion, below which the dots lie
+const ROUNDING = 1e-9; // m, a place on the paper that is told as none
+const placed = (place) => shown(Math.abs(place) < ROUNDING ? 0 : place, "m", 3);
 
 /** Energy that each dot put into the pack, and what the pack kept. */
 export function energyView(body, studio) {
@@ -21,7 +23,7 @@ export function energyView(body, studio) {
     const most = Math.max(...dots.map((dot) => dot.loading_work ?? 0), 1e-12);
     pen.font = FONT;
     const supply = energy.supply_work ? `supply ${of("supply_work")}, copper ${of("copper_loss")}, driver ${of("driver_loss")}${energy.eddy_loss ? `, eddy currents ${of("eddy_loss")}` : ""}, ` : "";
-    const words = broken(pen, `${supply}${energy.drive_work ? `drive ${of("drive_work")}` : `coil ${of("coil_work")}`}, pack ${of("pack_loss")}, backstop ${of("backstop_loss")}${energy.damping_loss ? `, damping ${of("damping_loss")}` : ""} ${unit.name}`, width - 12);
+    const words = broken(pen, said(`${supply}${energy.drive_work ? `drive ${of("drive_work")}` : `coil ${of("coil_work")}`}, pack ${of("pack_loss")}, backstop ${of("backstop_loss")}${energy.damping_loss ? `, damping ${of("damping_loss")}` : ""} ${unit.name}`, studio.described), width - 12);
     const margin = { left: 46, right: 10, top: 24 + 14 * words.length, bottom: 32 };
     const plane = axes(pen, width, height, { low: 0.5, high: dots.length + 0.5, label: "firing", factor: 1, space: 30, whole: true }, { low: 0, high: 1.08 * most, label: `energy, ${unit.name}`, factor: unit.factor }, margin);
     where = plane;
@@ -42,7 +44,7 @@ export function energyView(body, studio) {
     pen.fillStyle = c.ink;
     let place = 6;
     words.forEach((text, k) => pen.fillText(text, 6, 20 + 14 * k));
-    for (const [colour, text] of [[c.x, "into the pack"], [c.pack, "kept by it"]]) {
+    for (const [colour, text] of [[c.x, said("into the pack", studio.described)], [c.pack, "kept by it"]]) {
       pen.fillStyle = colour;
       pen.fillRect(place, 6, 9, 9);
       place += 13;
@@ -161,7 +163,7 @@ export function printed(pen, width, height, frame, alone = false) {
   const faults = Object.entries(frame.faults).map(([name, count]) => `${count} ${name}`).join(", ");
   const words = [
     `${frame.good} of ${frame.wanted} dots within limits${faults ? `: ${faults}` : ""}`,
-    ...(frame.force ? [`force ${digits(100 * frame.force[0], 3)} to ${digits(100 * frame.force[1], 3)} % of the single pulse's`, `off by ${shown(frame.placement[0], "m", 3)} to ${shown(frame.placement[1], "m", 3)} along the line`] : []),
+    ...(frame.force ? [`force ${digits(100 * frame.force[0], 3)} to ${digits(100 * frame.force[1], 3)} % of the single pulse's`, `off by ${placed(frame.placement[0])} to ${placed(frame.placement[1])} along the line`] : []),
   ];
   // On one line where they fit, so that the text is as large as it can be.
   const joined = words.join("; ");

@@ -77,7 +77,8 @@ const TEXTS = {
     if (mover !== "armature") {
       const stops = [...(backstop === null ? [] : [stopOf(studio.described)]), ...(front === null ? [] : [packOf(studio.described)])];
       const met = stops[0] === stops[1] && stops.length ? [`two ${stops[0]}s`] : stops.map((name) => `the ${name}`);
-      return `${[`The ${mover}`, ...met].join(" and ")}, to scale along the direction of motion.`;
+      const named = [`The ${mover}`, ...met];
+      return `${named.slice(0, -1).join(", ")}${met.length ? " and " : ""}${named.at(-1)}, to scale along the direction of motion.`;
     }
     const places = [...motion.data["strobe x"]].slice(1);
     if (backstop === null || front === null || !places.length) return "The face of the armature, to scale along its stroke.";
@@ -109,8 +110,10 @@ const TEXTS = {
     const { backstop, pack } = hardest(motion, studio.described?.rigid);
     const { places } = motion;
     const stop = places.backstop === null ? [] : [backstop === null ? "a rigid backstop, whose blows take no time and have no force" : `${shown(backstop, "N", 3)} at the backstop`];
-    const parts = [...stop, ...(places.front === null ? [] : [`${shown(pack, "N", 3)} at the pack`])];
-    return parts.length ? `${large(parts.join(", "))}${backstop > 2 * pack && places.front !== null ? ": the hardest blow prints nothing" : ""}.` : "Neither stop nor pack: the force of flight.";
+    const hard = studio.described?.rigid_front;
+    const struck = places.front === null ? [] : [hard ? "a rigid pack, whose blows take no time and have no force" : `${shown(pack, "N", 3)} at the pack`];
+    const parts = hard && stop.length && backstop === null ? ["rigid stops, whose blows take no time and have no force"] : [...stop, ...struck];
+    return parts.length ? `${large(parts.join(", "))}${backstop > 2 * pack && places.front !== null && !hard ? ": the hardest blow prints nothing" : ""}.` : "Neither stop nor pack: the force of flight.";
   },
   phase: ({ motion }) => (motion.fired.length > 1 ? "Where the states at the firings fall together, the train repeats itself." : loopText(motion)) + (most(motion.data.v) > 0 ? ` Fastest: ${shown(most(motion.data.v), "m/s", 3)}.` : ""),
   strobe: ({ strobe, motion }) => {

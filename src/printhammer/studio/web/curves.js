@@ -1,6 +1,7 @@
 // Displacement and current, and the forces, against time: drawn by uPlot, and by a pen where they are exported.
 import uPlot from "./vendor/uPlot.js";
 import { axes, before, curve, extent, inside, key, line, MARGIN, ticks, widened } from "./axes.js";
+import { said } from "./captions.js";
 import { colours, FONT } from "./theme.js";
 import { digits, shown, timeUnit, unitOf } from "./units.js";
 import { has, packOf, stopOf } from "./words.js";
@@ -24,10 +25,13 @@ export function motionView(body, studio) {
     ],
     scales: (frame) => ({ x: placesRange(frame), ...driveRanges(frame) }),
     under: (pen, plane, box) => {
-      places(pen, plane, box, studio.frames.motion, stopOf(studio.described), packOf(studio.described));
+      places(pen, plane, box, studio.frames.motion);
       ghosts(pen, plane, studio);
     },
-    over: (pen, plane, box) => remarks(pen, plane, box, studio),
+    over: (pen, plane, box) => {
+      placeNames(pen, plane, box, studio.frames.motion, stopOf(studio.described), packOf(studio.described));
+      remarks(pen, plane, box, studio);
+    },
   });
 }
 
@@ -35,7 +39,7 @@ export function motionView(body, studio) {
 export function forcesView(body, studio) {
   return curveView(body, studio, {
     label: "Forces against time",
-    series: () => forcesOf(studio.frames.motion, studio.described).map((name) => ({ name, si: "N", scale: "x", colour: colours()[name], values: (f) => f.data[`F ${name}`], dash: DASHES[name] })),
+    series: () => forcesOf(studio.frames.motion, studio.described).map((name) => ({ name, title: said(name, studio.described), si: "N", scale: "x", colour: colours()[name], values: (f) => f.data[`F ${name}`], dash: DASHES[name] })),
     scales: (frame) => {
       const [low, high] = widened(...forcesOf(frame, studio.described).reduce((ends, name) => extent(frame.data[`F ${name}`], ...ends), [0, 0]));
       // The key lies above the peaks; forces of rounding only are none.
@@ -50,7 +54,7 @@ const widthOf = ({ name, thin }) => (thin || name === "total" ? 0.8 : 1.3);
 /** Return the forces of the laws that a device has; a rigid stop acts without one. */
 function forcesOf(frame, described) {
   const stop = described.places.backstop !== null && !described.rigid;
-  const laws = { magnet: has(described, "magnet"), spring: has(described, "spring"), pack: described.places.front !== null, backstop: stop, damping: stop };
+  const laws = { magnet: has(described, "magnet"), spring: described.sprung, pack: described.places.front !== null && !described.rigid_front, backstop: stop, damping: stop };
   return FORCES.filter((name) => laws[name] ?? (name === "total" || !frame || `F ${name}` in frame.data));
 }
 
@@ -81,32 +85,52 @@ function within(frame, scale, value) {
   return value >= 1.01 * low - 1e-9 && value <= 1.01 * high;
 }
 
-function places(pen, plane, box, frame, stop, pack) {
+/** The surfaces that are struck as lines, and the firings as marks on the axis. */
+function places(pen, plane, box, frame) {
   const c = colours();
   const { backstop, front, platen } = frame.places;
   pen.save();
-  pen.font = FONT;
   pen.globalAlpha = 0.16;
   pen.fillStyle = c.pack;
   if (front !== null) pen.fillRect(box.x, plane.Y(platen ?? front), box.w, Math.max(plane.Y(front) - plane.Y(platen ?? front), 1));
   pen.globalAlpha = 1;
-  for (const [name, place] of [[stop, backstop], [pack, front], ["platen", platen]]) {
-    if (place === null) continue;
-    pen.strokeStyle = c.muted;
-    pen.setLineDash([]);
-    pen.lineWidth = 0.8;
-    line(pen, box.x, plane.Y(place), box.x + box.w, plane.Y(place));
-    pen.fillStyle = c.muted;
-    pen.textAlign = "right";
-    const low = plane.Y(place) > box.y + 16;
-    pen.textBaseline = low ? "bottom" : "top";
-    pen.fillText(name, box.x + box.w - 3, plane.Y(place) + (low ? -1 : 2));
-  }
+  pen.setLineDash([]);
+  pen.strokeStyle = c.muted;
+  pen.lineWidth = 0.8;
+  for (const place of [backstop, front, platen]) if (place !== null) line(pen, box.x, plane.Y(place), box.x + box.w, plane.Y(place));
   pen.strokeStyle = c.drive;
   pen.lineWidth = 1;
   for (const fired of frame.fired) line(pen, plane.X(fired), box.y + box.h, plane.X(fired), box.y + box.h - 6);
+  pen.restore();
+}
+
+/** The names of the surfaces that are struck, and the time between the first two firings, over the curves. */
+function placeNames(pen, plane, box, frame, stop, pack) {
+  const c = colours();
+  const { backstop, front, platen } = frame.places;
+  pen.save();
+  pen.font = FONT;
+  for (const [name, place] of [[stop, backstop], [pack, front], ["platen", platen]]) {
+    if (place === null) continue;
+    const low = plane.Y(place) > box.y + 16;
+    const wide = pen.measureText(name).width;
+    grounded(pen, name, box.x + box.w - 3 - 0.5 * wide, plane.Y(place) + (low ? -8 : 8), c.muted, c);
+  }
   spacing(pen, plane, box, frame.fired, c);
   pen.restore();
+}
+
+/** Write a text about a centre on a ground that lets the curves below show faintly. */
+function grounded(pen, text, x, y, colour, c) {
+  const wide = pen.measureText(text).width;
+  pen.globalAlpha = 0.75;
+  pen.fillStyle = c.panel;
+  pen.fillRect(x - 0.5 * wide - 1, y - 6.5, wide + 2, 13);
+  pen.globalAlpha = 1;
+  pen.fillStyle = colour;
+  pen.textAlign = "center";
+  pen.textBaseline = "middle";
+  pen.fillText(text, x, y);
 }
 
 /** Write between the first two firings how far they are apart, where there is room. */
@@ -115,10 +139,10 @@ function spacing(pen, plane, box, fired, c) {
   const [from, to] = [plane.X(fired[0]), plane.X(fired[1])];
   const text = shown(fired[1] - fired[0], "s", 4);
   if (to - from < pen.measureText(text).width + 12 || to > box.x + box.w || from < box.x) return;
-  pen.fillStyle = c.drive;
-  pen.textAlign = "center";
-  pen.textBaseline = "bottom";
-  pen.fillText(text, 0.5 * (from + to), box.y + box.h - 7);
+  pen.strokeStyle = c.drive;
+  pen.lineWidth = 1;
+  pen.setLineDash([]);
+  grounded(pen, text, 0.5 * (from + to), box.y + box.h - 14, c.drive, c);
   line(pen, from + 1, box.y + box.h - 4, to - 1, box.y + box.h - 4);
 }
 
@@ -160,8 +184,6 @@ function remarks(pen, plane, box, studio) {
   pen.font = FONT;
   pen.setLineDash([]);
   pen.lineWidth = 1;
-  pen.textAlign = "left";
-  pen.textBaseline = "middle";
   for (const [time, text] of studio.remarks?.() ?? []) {
     const [x, y] = [plane.X(time), plane.Y(displacementAt(frame, time))];
     const wide = pen.measureText(text).width;
@@ -169,12 +191,7 @@ function remarks(pen, plane, box, studio) {
     const at = Math.min(Math.max(y - 16, box.y + 10), box.y + box.h - 10);
     pen.strokeStyle = c.ink;
     line(pen, x, y, left > x ? left - 2 : left + wide + 2, at);
-    pen.globalAlpha = 0.85;
-    pen.fillStyle = c.panel;
-    pen.fillRect(left - 2, at - 8, wide + 4, 16);
-    pen.globalAlpha = 1;
-    pen.fillStyle = c.ink;
-    pen.fillText(text, left, at);
+    grounded(pen, text, left + 0.5 * wide, at, c.ink, c);
   }
 }
 
