@@ -38,7 +38,7 @@ class Stretch(NamedTuple):
     event : int
         Index of the guard function that ended the stretch; -1 at the requested end.
     at : array
-        Displacements, m, at the requested times up to the end time.
+        Displacements [m] at the requested times up to the end time.
     """
 
     t: float

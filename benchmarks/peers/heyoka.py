@@ -194,12 +194,12 @@ class Single:
         self.integrator.reset_cooldowns()
 
     def run(self, end: float) -> None:
-        """Integrate from rest to time `end`, s."""
+        """Integrate from rest to time `end` [s]."""
         self._begin(end)
         self.integrator.propagate_until(1e9, max_delta_t=_LONGEST)
 
     def positions(self) -> FloatArray:
-        """Return the displacement on the grid, m, from the Taylor series of all steps."""
+        """Return the displacement [m] on the grid from the Taylor series of all steps."""
         self._begin(FIRST)
         out = np.full(GRID.size, np.nan)
         wanted = GRID / TIME

@@ -22,7 +22,7 @@ _APART: Final = 1e-10
 
 @lru_cache(maxsize=2)
 def single(task: Task) -> FloatArray:
-    """Return the reference displacement of the single run, m, on the grid of the table."""
+    """Return the reference displacement [m] of the single run on the grid of the table."""
     return reference(task.hammer, task.drive(_pulses(task)), FIRST, tolerance=_FINE, times=GRID).x
 
 

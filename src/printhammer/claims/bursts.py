@@ -355,7 +355,7 @@ def erratic_share(
     """Compute the fraction of erratic pairs of rates, from the first rate with unequal dots up to hang-up.
 
     Return the fraction and that first rate [Hz]; None if dots vary at no rate, or only above the hang-up rate
-    `hang_up`, Hz. The masks `erratic` and `varies` are from `erratic_pairs`.
+    `hang_up` [Hz]. The masks `erratic` and `varies` are from `erratic_pairs`.
     """
     if not varies.any():
         return None, None

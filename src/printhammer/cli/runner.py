@@ -402,7 +402,7 @@ def firing_of(
     """Extract the firing options from `passed`; return them as keywords of `Regime.of`.
 
     If `timed`, exactly one of period and rate is required; a drive file may replace period and rate: a
-    continuous periodic force, or pulses at a constant rate. Error messages suggest a `period`, s,
+    continuous periodic force, or pulses at a constant rate. Error messages suggest a `period` [s],
     scaled to the device. Raises InputError for a hammer without a waveform, any other drive file, or
     superfluous options.
     """

@@ -56,13 +56,13 @@ class Axis:
 
 
 def _on_rail(hammer: Hammer, value: float) -> Hammer:
-    """Return a copy of the hammer whose driver has the rail voltage `value`, V."""
+    """Return a copy of the hammer whose driver has the rail voltage `value` [V]."""
     _check_driver(hammer, "rail")
     return hammer.replace("waveform.voltage", value)
 
 
 def _warm(hammer: Hammer, value: float) -> Hammer:
-    """Return a copy of the hammer with the coil temperature `value`, degC."""
+    """Return a copy of the hammer with the coil temperature `value` [degC]."""
     _check_driver(hammer, "temperature")
     return hammer.replace("coil.temperature", value)
 
@@ -196,7 +196,7 @@ class AxisTables:
     def save(self, path: str | Path, *, tick: float | str = NANOSECOND, budget: int | None = None) -> None:
         """Write the tables as a C header (.h), or as .csv, .json, .nc, .zarr or .parquet, by the file suffix.
 
-        In a header, times are whole multiples of `tick`, s, and the arrays must fit into `budget` bytes.
+        In a header, times are whole multiples of `tick` [s], and the arrays must fit into `budget` bytes.
         """
         suffix = Path(path).suffix.lower()
         if suffix == ".h":

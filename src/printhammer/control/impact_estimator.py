@@ -186,7 +186,7 @@ class ImpactEstimator:
     def estimate(self, samples: FloatArray) -> ImpactEstimate:
         """Estimate the time from firing to impact, and flag a doubtful estimate.
 
-        `samples`, A or V, begin at the firing; samples beyond the first `count` are ignored.
+        `samples` [A or V] begin at the firing; samples beyond the first `count` are ignored.
         """
         samples = np.asarray(samples, np.float64)
         left = samples[: self.count] - self._free
@@ -373,7 +373,7 @@ class Sampling(Declared):
         return UNITS[self.signal]
 
     def scaled_to(self, largest: float) -> Sampling:
-        """Return a copy with the range `largest`, A or V, unless a range is set."""
+        """Return a copy with the range `largest` [A or V], unless a range is set."""
         return self if self.full_scale is not None else replace(self, full_scale=largest)
 
     @property

@@ -81,7 +81,7 @@ def _course(hammer: Hammer, pulse: Waveform, span: float) -> tuple[FloatArray, F
 
 
 def of_width(pulse: Waveform, width: float) -> Waveform:
-    """Return a copy of a pulse with the width `width`, s."""
+    """Return a copy of a pulse with the width `width` [s]."""
     kind: Any = type(pulse)
     return kind(**{**dict(pulse), "width": width})  # type: ignore[no-any-return]
 

@@ -233,7 +233,7 @@ class _Look:
     rows: dict[int, int]
 
     def columns(self, t: float) -> tuple[FloatArray, FloatArray]:
-        """Return the state at one of the `marks`, s, and its derivatives with respect to the constants."""
+        """Return the state at one of the `marks` [s], and its derivatives with respect to the constants."""
         row = int(np.searchsorted(self.marks, t))
         return self.flow.states[row], self.flow.changes[row]
 

@@ -319,7 +319,7 @@ def _problem(hammer: Hammer, drive: Drive, state: Sequence[float] | None, tolera
 def _strobes(
     waveform_or_drive: Waveform | Drive, period: float | None, first: int, last: int
 ) -> tuple[Drive, FloatArray, float]:
-    """Return the drive, the times of the firings 1 to `last`, s, and the time between firings, s."""
+    """Return the drive, the times of the firings 1 to `last` [s], and the firing period [s]."""
     if not 1 <= first < last:
         raise InputError(
             f"first = {first!r} and last = {last!r}",

@@ -223,7 +223,7 @@ def fill_values(table: Any, times: Any, values: Any) -> None:
 
 
 def largest_inside(kind: float, p0: float, p1: float, p2: float, p3: float, length: float) -> float:
-    """Return the largest absolute value of a segment of duration `length`, s: at its ends or extrema."""
+    """Return the largest absolute value of a segment of duration `length` [s]: at its ends or extrema."""
     best = abs(segment_value(kind, p0, p1, p2, p3, 0.0))
     if not math.isinf(length):
         best = max(best, abs(segment_value(kind, p0, p1, p2, p3, length)))
@@ -364,10 +364,10 @@ def pulse(shape: int, fields: Any, table: Any, about: Any) -> int:
 
 
 def fill_firings(rate: float, marks: Any, pattern: bool, times: Any) -> int:
-    """Write the firing times of a train to `times`, s, ascending; return their number.
+    """Write the firing times of a train to `times` [s], ascending; return their number.
 
     Slot k is fired if ``marks[k]`` is not 0; its time is k times the period, or, in a `pattern`, k divided by
-    the `rate`, Hz, which may differ by rounding.
+    the `rate` [Hz], which may differ by rounding.
     """
     count = 0
     period = 1.0 / rate

@@ -79,7 +79,7 @@ class PulseTrain(_Pulsed):
     overlap
         "add": overlapping pulses add up; "replace": each firing cuts off the preceding pulse.
     start
-        Time of the first firing, or shift of the times `at`, s.
+        Time of the first firing, or shift of the times `at` [s].
 
     Raises
     ------

@@ -71,7 +71,7 @@ def inked(
     """Render dots; return optical densities of the paper's pixels from the top left, shape (rows, columns).
 
     The dots are given by centres [m], densities and a common diameter [m], and clipped at the edges of the
-    sheet. The pixel size is at least `finest`, m.
+    sheet. The pixel size is at least `finest` [m].
     """
     size, rows, columns = sheet.pixels(finest)
     radius = 0.5 * diameter / size
@@ -243,7 +243,7 @@ def _zoom_title(page: Page) -> str:
 
 
 def _dots(page: Page) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return positions across and down, m, and optical densities of all dots, extra contacts included."""
+    """Return positions across and down [m], and optical densities, of all dots, extra contacts included."""
     printed, extra = (*page.places, page.density), (*page.extra_places, page.extra_density)
     across, down, density = (
         np.concatenate([values[page.printed], more]) for values, more in zip(printed, extra, strict=True)
@@ -252,7 +252,7 @@ def _dots(page: Page) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _paper(ax: Axes, sheet: Sheet, page: Page, dots: tuple[FloatArray, ...], finest: float) -> None:
-    """Draw a sheet of paper with dots; pixels are at least `finest`, m."""
+    """Draw a sheet of paper with dots; pixels are at least `finest` [m]."""
     across, down, density = dots
     picture = coloured(inked(sheet, across, down, density, page.head.wire_diameter, finest))
     extent = (sheet.left, sheet.right, sheet.bottom, sheet.top)

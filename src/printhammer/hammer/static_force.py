@@ -55,7 +55,7 @@ class StaticForce:
 
     Magnet, spring and the elastic force of the backstop are functions of x; the pack acts on its loading
     branch, as when fresh paper is pressed slowly. A `rigid` backstop excludes positions below its surface.
-    `limits`, m, is the range in which the laws are valid and no rigid backstop is penetrated. `low`
+    `limits` [m] is the range in which the laws are valid and no rigid backstop is penetrated. `low`
     and `high` [m] bound the default search for equilibria: from the lower limit to the platen, the end of the
     pack or the upper limit, and at most 1 m from the origin.
     """

@@ -143,7 +143,7 @@ def reach_of(far: float, s: Statics) -> tuple[float, float]:
 def compressed(current: float, low: float, s: Statics) -> float:
     """Return the equilibrium in a compressed elastic backstop that is nearest to the surface, m.
 
-    The result is NaN without an equilibrium above `low`, m.
+    The result is NaN without an equilibrium above `low` [m].
     """
     depth = max(NEAREST, spacing(s.position))
     above = s.position

@@ -109,7 +109,7 @@ def fit_coil(
         Displacement at which the armature was held, m; by default the value in a comment
         ``# locked: 100 um``, else the armature is free.
     offset, gain, delay : float or str, optional
-        Offset, A, gain, and delay, s, of the probe.
+        Offset [A], gain and delay [s] of the probe.
     bandwidth : float or str, optional
         Bandwidth of the probe, Hz; by default the value in a comment ``# bandwidth: 200 kHz``, else
         unlimited.

@@ -125,7 +125,7 @@ class Trace(Declared, eq=False):
         return float(np.median(np.diff(self.times)))
 
     def driven(self, shifts: FloatArray) -> Waveform:
-        """Return the recorded voltage; `shifts`, s, move each edge from the middle between its two rows."""
+        """Return the recorded voltage; `shifts` [s] shift each edge from the middle between its two rows."""
         if not self.edges.size:
             return self.waveform
         t, volts = self.times, self.table.values["voltage"]

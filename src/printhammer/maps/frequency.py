@@ -124,7 +124,7 @@ def on_times(chart: xr.Dataset, row: int, times: FloatArray) -> FloatArray:
 def interpolated(at: npt.ArrayLike, values: npt.ArrayLike, times: FloatArray) -> FloatArray:
     """Interpolate samples linearly at given times; NaN outside, and next to a NaN sample.
 
-    The samples are taken at ascending times `at`, s. At the time of a sample, the result equals the sample.
+    The samples are taken at ascending times `at` [s]. At the time of a sample, the result equals the sample.
     """
     known, samples = np.asarray(at, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if known.size == 0:

@@ -88,7 +88,7 @@ class Part(BaseModel):
         return (*(_number(value, kind) for value, kind in values), float(self.variant))
 
     def content(self) -> Mapping[str, Any]:
-        """Return the numbers read from an additional file, such as a table, which identify the part."""
+        """Return the numbers read from an additional file, such as a table, for the digest of the hammer."""
         return {}
 
     @property
@@ -158,7 +158,7 @@ class PackPart(Part):
     """Base class of ribbon and paper packs.
 
     A pack defines `pack_loading`, `pack_memory`, `pack_unloading` and `MEMORY`; a rigid stop defines
-    `RIGID_FRONT` and `pack_rebound` instead. A subclass has the constant `front`, the displacement, m, at
+    `RIGID_FRONT` and `pack_rebound` instead. A subclass has the constant `front`, the displacement [m] at
     which the armature first touches the pack.
     """
 

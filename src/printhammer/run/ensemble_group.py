@@ -212,7 +212,7 @@ class Job:
     """Integration of a group of members: requested results, and their arrays.
 
     The results are the dots and extra contacts, if requested; the states at the `moments`, times in s for
-    each member of the ensemble; and the displacements at the times of the `grid`, s, in `x`, the array of the
+    each member of the ensemble; and the displacements at the times of the `grid` [s] in `x`, the array of the
     whole ensemble, which is used directly if the group is the whole ensemble.
     """
 

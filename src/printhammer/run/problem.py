@@ -191,7 +191,7 @@ def bounds_of(hammer: Hammer, scales: tuple[float, float]) -> tuple[float, float
 class Problem:
     """Hammer under a drive, ready for integration.
 
-    `state` is displacement [m] and velocity [m/s] at the time `start`, s. The tolerance is the error of
+    `state` is displacement [m] and velocity [m/s] at the time `start` [s]. The tolerance is the error of
     one step, in units of the stroke and of a typical speed. In the pack, and under a voltage drive, the state
     has further components, `beyond`.
     """

@@ -192,7 +192,7 @@ class Touches(Declared):
 def touches_of(problem: Problem, surface: Surface, after: float, end: float, most: int) -> Touches:
     """Integrate up to `most` touches of a surface, or to the end of the run; return the touches.
 
-    Only touches between the time `after`, s, and the `end` of the run, s, count; a contact that is already
+    Only touches between `after` [s] and the `end` [s] of the run count; a contact that is already
     open at the start of the run does not count.
     """
 

@@ -30,7 +30,7 @@ from printhammer.support.arrays import FloatArray
 def waits_of(
     hammers: Sequence[Hammer], waveforms: Sequence[Waveform], threads: int | None = None
 ) -> FloatArray:
-    """Compute the time from the last firing to the end of each run, s, as `wait_of` does for a single run."""
+    """Compute the time [s] from the last firing to the end of each run, as `wait_of` does for one run."""
     return windows_of(hammers, waveforms, threads)[0]
 
 

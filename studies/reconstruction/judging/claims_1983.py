@@ -47,7 +47,7 @@ class SchemeContext(Context):
     """A hammer with motions computed by a scheme of 1983, on the schedule that the claims use."""
 
     def dots(self, drives: Sequence[Drive], tail: float = TAIL) -> Any:
-        """Run many drives; return `struck`, `peak_force`, N, and `flight_time`, s, of each firing."""
+        """Run many drives; return `struck`, `peak_force` [N] and `flight_time` [s] of each firing."""
         rows = [self.run(drive, float(drive.times[-1]) + tail).dots for drive in drives]
         return SimpleNamespace(
             struck=np.array([[dot.struck for dot in row] for row in rows]),

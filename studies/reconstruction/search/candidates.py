@@ -103,7 +103,7 @@ def candidates(points: Sequence[FloatArray], shape: Shape = "rectangle") -> list
 def _stiffnesses(
     values: Sequence[dict[str, float]], rests: dict[int, float], shape: Shape
 ) -> dict[int, float]:
-    """Solve for the pack stiffnesses, N, with which hammers of the mass `_MASS` have the printed stroke."""
+    """Solve for the pack stiffnesses [N] with which hammers of the mass `_MASS` have the printed stroke."""
     wanted = math.log(geometry()["top"] - geometry()["xp"])
     guess = dict.fromkeys(rests, math.log(_STIFFNESS))
     before: dict[int, tuple[float, float]] = {}

@@ -239,7 +239,7 @@ def pairs(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
 
 
 def half_times(some: Sequence[Candidate]) -> list[float]:
-    """Return the time after the firing, s, at which each current first reaches half of its peak."""
+    """Return the time after the firing [s] at which each current first reaches half of its peak."""
     return [half_rise(candidate.waveform) for candidate in some]
 
 
@@ -270,7 +270,7 @@ def _judge_quench(score: Score, gaps: FloatArray, peaks: FloatArray, place: int)
 
 
 def _late(x: npt.NDArray[np.float32], times: FloatArray, moment: float) -> float:
-    """Return the delay, s, from a moment until the armature first rises; infinite if it never rises."""
+    """Return the delay [s] from a moment until the armature first rises; infinite if it never rises."""
     first = int(np.searchsorted(times, moment))
     up = np.flatnonzero(np.diff(x[first:]) > 0.0)
     return float(times[first + up[0]] - moment) + _COARSE if up.size else math.inf
@@ -367,5 +367,5 @@ def _deepest_distinct(x: npt.NDArray[np.float32], times: FloatArray, firings: Fl
 
 
 def _highest(drive: PulseTrain) -> float:
-    """Return the approximate largest current of a train, A, from 400 samples."""
+    """Return the approximate largest current [A] of a train from 400 samples."""
     return float(np.abs(drive.value(np.linspace(0.0, float(drive.times[-1]) + 1e-3, 400))).max())

@@ -168,7 +168,7 @@ def constants_at(
 ) -> dict[str, float]:
     """Convert values of the variables to constants of a hammer file, SI, for any scale of the mass.
 
-    `mass` is the mass of the armature, kg, `stiffness` that of the pack, N, and `shape` the waveform shape.
+    `mass` is the mass of the armature [kg], `stiffness` of the pack [N], and `shape` the waveform shape.
     """
     b = geometry()["b"]
     current = max(CURRENT, values["release"] * BEYOND * largest_current())
@@ -191,7 +191,7 @@ def constants_at(
 
 
 def _pulse_values(constants: Mapping[str, float]) -> tuple[float, float, float, float]:
-    """Return the search variables of a waveform: width, rise and decay, s, and its largest current, A."""
+    """Return the search variables of a waveform: width, rise and decay [s], and its largest current [A]."""
     amplitude, width = constants["waveform.amplitude"], constants["waveform.width"]
     shape = shape_of(constants)
     if shape == "rectangle":

@@ -107,7 +107,7 @@ def fly(
 
 
 def _acceleration(problem: Problem, time: float) -> float:
-    """Compute the acceleration of the armature, m/s^2, at the start of a run of length `time`, s."""
+    """Compute the acceleration of the armature [m/s^2] at the start of a run of length `time` [s]."""
     record = problem.run(problem.start + time)
     (row,) = problem.resample(record, np.array([problem.start]))
     push = row[2] if problem.drive.quantity == "force" else 0.0

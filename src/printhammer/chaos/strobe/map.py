@@ -244,7 +244,7 @@ def quiet_section(
     regime : Regime
         Regime with the phase at which the state is known.
     state : array, shape (2,)
-        Displacement, m, and velocity, m/s.
+        Displacement [m] and velocity [m/s].
     firings : int
         Number of firings after which the orbit repeats.
     tolerance : float

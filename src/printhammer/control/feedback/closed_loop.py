@@ -92,7 +92,7 @@ class FeedbackStrategy(Declared):
         return loops
 
     def _legs(self, hammer: Hammer, now: Sequence[tuple[Loop, int]], ends: FloatArray) -> list[Leg]:
-        """Split runs up to `ends`, s, into stages with one pack each; the pack changes at a firing."""
+        """Split runs up to `ends` [s] into stages with one pack each; the pack changes at a firing."""
         if self.places is None:
             return [Leg([hammer] * len(now), ends)]
         before = [self.places[loop.slots[max(dot - 1, 0)]] for loop, dot in now]
@@ -123,7 +123,7 @@ class FeedbackStrategy(Declared):
         self.controller.estimate(loops, flights)
 
     def _carry(self, legs: list[Leg], loops: list[Loop], since: FloatArray) -> tuple[Samples, Samples]:
-        """Advance runs through stages; return sensor samples of contacts and of flights after `since`, s."""
+        """Advance runs through stages; return sensor samples of contacts and of flights after `since` [s]."""
         controller, sensor, ends = self.controller, self.sensor, legs[-1].ends
         starts = np.array([loop.time for loop in loops])
         # An empty time span for a run without a contact.

@@ -129,7 +129,7 @@ class Flight:
 def flight_from_samples(
     samples: Samples, expected: Expected, front: FloatArray, accelerations: Accelerations
 ) -> Flight:
-    """Estimate flights from sensor samples; predict the next contact with the pack at `front`, m.
+    """Estimate flights from sensor samples; predict the next contact with the pack at `front` [m].
 
     `accelerations` maps displacements [m], times [s] and scales, all broadcastable to the shape (M, K), to
     accelerations of a flying armature, m/s².

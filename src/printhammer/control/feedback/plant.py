@@ -95,7 +95,7 @@ class Driver(Declared):
         return self.switched((0.0, width), (self.current, 0.0))
 
     def drive(self, pulses: Sequence[Switched], at: Sequence[float] = (0.0,)) -> BoundedSequence:
-        """Return the drive that fires pulses at the times `at`, s."""
+        """Return the drive that fires pulses at the times `at` [s]."""
         return BoundedSequence(pulses, at, self.current)
 
 
@@ -117,7 +117,7 @@ class BoundedSequence(PulseSequence):
 def driver_of(hammer: Hammer, current: float = LARGEST_CURRENT, edge: float | None = None) -> Driver:
     """Return a driver for a current-driven hammer, with a current limit, A.
 
-    The time constant `edge`, s, applies to rise and decay; by default it is the decay time constant of the
+    The time constant `edge` [s] applies to rise and decay; by default it is the decay time constant of the
     hammer's waveform. The current of the hammer's waveform rises more slowly; the faster rise of the driver
     needs a higher supply voltage.
     """
@@ -150,7 +150,7 @@ _FARTHEST: Final = 5.0
 class Pulse:
     """A firing of the closed loop, with the current switchings decided so far.
 
-    The command changes to `levels`, A, at the times `at`, s.
+    The command changes to `levels` [A] at the times `at` [s].
     """
 
     fired: float
@@ -163,7 +163,7 @@ class Pulse:
         self.levels.append(level)
 
     def waveform(self, edge: float) -> Switched:
-        """Return the pulse as a waveform with the time constant `edge`, s."""
+        """Return the pulse as a waveform with the time constant `edge` [s]."""
         return Switched(at=tuple(t - self.fired for t in self.at), levels=tuple(self.levels), edge=edge)
 
 

@@ -73,11 +73,11 @@ class PositionSensor(Declared):
         return max(float(np.hypot(self.noise, self.step / np.sqrt(12.0))), _LEAST_ERROR)
 
     def count(self, time: float) -> int:
-        """Return the number of samples in a time span, s; at least 1."""
+        """Return the number of samples in a time span [s]; at least 1."""
         return max(1, round(time / self.interval))
 
     def numbers(self, since: FloatArray, until: FloatArray, most: int) -> IntArray:
-        """Return the indices of each run's latest samples from `since` to `until`, s, shape (M, most).
+        """Return the indices of each run's latest samples from `since` to `until` [s], shape (M, most).
 
         `until` is the time at which the samples are needed, so the latest sample is one delay older. The
         indices ascend, padded with -1 at the front.

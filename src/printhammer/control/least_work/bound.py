@@ -94,7 +94,7 @@ def _strongest(static: StaticForce, x: FloatArray, largest: float) -> FloatArray
 def _given_back(hammer: Hammer, most: float) -> float:
     """Return the largest rebound energy [J] of an undriven armature at the backstop.
 
-    The maximum is over incident energies up to `most`, J.
+    The maximum is over incident energies up to `most` [J].
     """
     bottom, front = hammer.position, hammer.front
     assert bottom is not None

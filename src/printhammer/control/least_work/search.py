@@ -91,7 +91,7 @@ def descend(
 def deviations(late: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Normalise arrival deviations and excess forces by their tolerances.
 
-    `late`, s, is not finite for a lost dot; `force` is relative to the requested force.
+    `late` [s] is not finite for a lost dot; `force` is relative to the requested force.
     """
     return np.where(np.isfinite(late), late / ARRIVAL, LOST), (force - 1.0) / _FORCE
 

@@ -130,7 +130,7 @@ class Task:
     tolerance: float  # Error tolerance per integration step
 
     def run(self, begin: SlotState, currents: FloatArray, duration: float, tolerance: float) -> Outcomes:
-        """Simulate M slots of `duration`, s, with nodal currents, A, shape (M, nodes), first node omitted."""
+        """Simulate M slots of `duration` [s] with nodal currents [A], (M, nodes), first node omitted."""
         front = self.hammer.front
         assert front is not None
         grid = np.linspace(0.0, duration, _SAMPLES)

@@ -232,7 +232,7 @@ def _path(ways: Ways, groups: Sequence[IntArray], jump: float) -> IntArray:
     """Choose one candidate per group by dynamic programming over costs and branch changes; return indices.
 
     A table can be interpolated between two periods only if the branch is the same: if firing times
-    relative to the slots differ by at most `jump`, s.
+    relative to the slots differ by at most `jump` [s].
     """
     if not groups:
         return np.zeros(0, np.int64)

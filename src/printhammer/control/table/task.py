@@ -84,7 +84,7 @@ class Task:
     """Settings for tuning a compensation table: hammers, limits, pulse shapes and bounds.
 
     The table is tuned on `hammers`, the design first; the hammers of `spread` are perturbed copies of the
-    design. No pulse is wider than `widest`, s, and none begins earlier than `wait`, s, after the end of a
+    design. No pulse is wider than `widest` [s], and none begins earlier than `wait` [s] after the end of a
     brake pulse. `report` is called after each step of the work.
     """
 

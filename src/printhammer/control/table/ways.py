@@ -47,8 +47,8 @@ def solve(
     The values of a dot are its firing time (or advance) and width [s]; `start` contains the initial guesses.
     `measure(values, active, shifts)` returns the deviations of the dots with the indices `active` for each of
     the shifts of their values, as fractions of the limits, NaN for a lost dot; shape (active, shifts,
-    deviations). Derivatives are finite differences with `steps`, s, forward in time and backward in width. A
-    step is at most `longest`, s, and widths stay between `least` and `most`, s. `bounded(values, active,
+    deviations). Derivatives are finite differences with `steps` [s], forward in time and backward in width. A
+    step is at most `longest` [s], and widths stay between `least` and `most` [s]. `bounded(values, active,
     stepped)` clips the values in place; `stepped` is the mask of the active dots that made a step. A dot is
     finished when its largest deviation is at most `good`.
     """
@@ -94,7 +94,7 @@ def changes(
 
     `off`, shape (dots, deviations), are the deviations; `slopes`, shape (dots, deviations, 2), are their
     derivatives with respect to firing time (or advance) and width, 1/s. The step of the width is clipped to
-    the range from `least` to `most`, s, one value per dot, and both steps to at most `longest`, s.
+    the range from `least` to `most` [s], one value per dot, and both steps to at most `longest` [s].
     """
     turned = slopes.transpose(0, 2, 1)
     # The damping keeps the step finite in a direction that does not affect the deviations.

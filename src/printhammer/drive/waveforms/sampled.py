@@ -204,5 +204,5 @@ class Sampled(Waveform):
         )
 
     def content(self) -> dict[str, FloatArray]:
-        """Return the samples, which identify the waveform: times [s] and values [A or N]."""
+        """Return the samples for the digest of the waveform: times [s] and values [A or N]."""
         return {"times": self.times, "values": self.values}

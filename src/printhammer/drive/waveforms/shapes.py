@@ -125,7 +125,7 @@ def _validate(parts: object) -> tuple[tuple[float, Waveform], ...]:
 
 
 def _is_over(begun: float, waveform: Waveform, time: float) -> bool:
-    """Whether a waveform that began at `begun`, s, has ended or decayed to its tail by `time`, s."""
+    """Whether a waveform that began at `begun` [s] has ended or decayed to its tail by `time` [s]."""
     segments = waveform.segments()
     # A driver's circuit carries current after the supply is off.
     end = waveform.support

@@ -35,7 +35,7 @@ def waveform_of(hammer: Hammer) -> Waveform:
 def fired(hammer: Hammer, times: Iterable[float] = (0.0,), duration: float | str | None = None) -> Motion:
     """Simulate a hammer whose standard waveform is fired at given times, s.
 
-    The run ends at `duration`, s, or text with a unit; the default is that of `printhammer.simulate`.
+    The run ends at `duration` [s] or text with a unit; the default is that of `printhammer.simulate`.
     """
     from printhammer.drive.trains import PulseTrain
     from printhammer.run.simulate import simulate

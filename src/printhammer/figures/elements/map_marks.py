@@ -134,7 +134,7 @@ def picture(ax: Axes, chart: xr.Dataset, scales: Scales) -> QuadMesh:
 
 
 def firing_lines(ax: Axes, chart: xr.Dataset, scales: Scales) -> None:
-    """Draw the time of each firing as a thin curve over the rates, bold at rates where its dot is lost.
+    """Draw the time of each firing against the rate as a thin curve, bold where its dot is lost.
 
     For maps with fewer than 50 rates, a vertical mark in the row of each rate replaces the curve.
     """

@@ -231,7 +231,7 @@ def legend_below(ax: Axes, *entries: Any, **options: Any) -> None:
 
 
 def contact_spans(ax: Axes, motion: Motion, until: float, shown: Scale) -> None:
-    """Tint the time intervals in which the armature touches pack or backstop, up to `until`, s."""
+    """Tint the time intervals in which the armature touches pack or backstop, up to `until` [s]."""
     for contact in motion.contacts:
         end = until if contact.t_out is None else min(contact.t_out, until)
         if contact.t_in >= end:

@@ -197,7 +197,7 @@ def pack(
 
 
 def backstop(hammer: Hammer, sensor: Sensor, *, speeds: npt.ArrayLike | None = None) -> Bench:  # noqa: ARG001
-    """Compute rebound speeds of the armature alone, thrown at the backstop at `speeds`, m/s."""
+    """Compute rebound speeds of the armature alone, thrown at the backstop at `speeds` [m/s]."""
     if hammer.backstop is None:
         raise InputError(
             f"{hammer.path}: the hammer has no [backstop]",
@@ -263,7 +263,7 @@ def current(
     before: float | str = BEFORE,
     locked: float | str | None = None,
 ) -> Bench:
-    """Simulate the coil current of one voltage-driven shot, the armature free or locked at `locked`, m."""
+    """Simulate the coil current of one voltage-driven shot, the armature free or locked at `locked` [m]."""
     from printhammer.drive.input import read_number
 
     check_driver(hammer)

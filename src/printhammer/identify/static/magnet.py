@@ -70,7 +70,7 @@ class TotalLaw:
         return np.column_stack([magnet, 1.0 - magnet, (self._slope(p) * magnet) ** 2, by_current**2])
 
     def at(self, p: FloatArray, x: FloatArray, current: FloatArray) -> FloatArray:
-        """Compute the force at displacements measured from x = 0, m, and currents, A."""
+        """Compute the force at displacements [m], measured from x = 0, and currents [A]."""
         return TotalLaw(x, current, self.position, 0.0).value(p)
 
     def richer(self, p: FloatArray, *, by_current: bool) -> dict[str, FloatArray]:

@@ -142,7 +142,7 @@ class PackLaw:
     """Equation (5) at measured indentations relative to the thickness of the pack, r, shape (m,).
 
     p = [S, ln rho of each cycle with unloading rows], followed by the two exponents if they are fitted.
-    `thickness`, m, converts an error of the indentation to an error of r.
+    `thickness` [m] converts an error of the indentation to an error of r.
     """
 
     def __init__(self, r: FloatArray, cycles: Cycles, exponents: bool, thickness: float) -> None:

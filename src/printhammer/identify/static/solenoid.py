@@ -60,7 +60,7 @@ def fit_solenoid(
 ) -> Fit:
     """Fit the law `reluctance` to a table of one coil with a given number of turns.
 
-    `current`, A, applies to all rows of a table without a column of currents. The `CONSTANTS` are fitted for
+    `current` [A] applies to all rows of a table without a column of currents. The `CONSTANTS` are fitted for
     a magnet that pulls toward the paper and is closed at 0; a table over the gap does not determine that
     position.
     Common options are described with `printhammer.identify.fitting.fit`.

@@ -171,7 +171,7 @@ class GridMagnet(MagnetPart):
         Parameters
         ----------
         x, current : sequence of float
-            Displacements, m, and currents, A.
+            Displacements [m] and currents [A].
         values : sequence of sequence of float
             Forces [N], or flux linkages [Wb], shape (len(x), len(current)).
         file : str, optional

@@ -78,7 +78,7 @@ def judge(
     """Compare the dots of an ensemble, one firing per dot, with the limits.
 
     `wanted`, shape (members, firings), is the mask of dots to evaluate; the dots of a lead-in, for instance,
-    are excluded. `slot_times`, s, of the same shape, may differ from the firing times, and are ignored where
+    are excluded. `slot_times` [s], of the same shape, may differ from the firing times, and are ignored where
     no dot is evaluated. `nominal` is the single-pulse dot: one for all members, or one for each. `ok`, shape
     (members,), is the mask of simulations that reached their ends; the last dot of an incomplete simulation
     counts as "not run", since its contact may still be open.

@@ -112,7 +112,7 @@ class Paper(Declared):
         return np.asarray(np.clip(off, -_WIDEST, _WIDEST))
 
     def hammers(self, hammer: Hammer, slots: int, pitch: float) -> tuple[Hammer, ...]:
-        """Return one hammer per slot, with the pack of that slot, for a slot `pitch`, m."""
+        """Return one hammer per slot, with the pack of that slot, for a slot `pitch` [m]."""
         spread = {"pack.stiffness": self.stiffness, "pack.front": self.front}
         for key, value in spread.items():
             if value and key not in hammer.constants:

@@ -49,7 +49,7 @@ class Wear(Declared):
 
 @dataclass(frozen=True)
 class Rebound:
-    """Rebound between two backstop touches: start and end, s, and largest height, m."""
+    """Rebound between two backstop touches: start and end [s], and largest height [m]."""
 
     start: float
     end: float
@@ -145,7 +145,7 @@ def wear_of(motion: Motion | PiecewiseMotion) -> Wear:
 
 
 def rebounds(motion: Motion, position: float) -> list[Rebound]:
-    """List the intervals between consecutive touches of a backstop at `position`, m."""
+    """List the intervals between consecutive touches of a backstop at `position` [m]."""
     times, x = motion.maxima
     intervals = []
     for before, after in itertools.pairwise(touches(motion)):

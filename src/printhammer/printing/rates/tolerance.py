@@ -162,7 +162,7 @@ class ToleranceYield(Result):
         return float(math.sqrt(share * (1.0 - share) / count))
 
     def share_at(self, rate: float) -> float:
-        """Return the fraction of hammers whose safe rate is at least `rate`, Hz."""
+        """Return the fraction of hammers whose safe rate is at least `rate` [Hz]."""
         return float((self.safe_rates >= rate).mean())
 
 

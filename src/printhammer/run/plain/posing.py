@@ -222,7 +222,7 @@ def is_window(ok: bool, flight: float, x: float, v: float, rest: float, front: f
     """Whether a window is long enough: it holds `FLIGHTS` flight times and ends with the armature at rest.
 
     `ok` is whether the single pulse was completed, `flight` its flight time [s], NaN without a dot; `x` and
-    `v`, m and m/s, are the state at the end of the window `wait`, s.
+    `v` (SI) are the state at the end of the window `wait` [s].
     """
     if not ok:
         return True

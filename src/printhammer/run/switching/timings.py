@@ -136,7 +136,7 @@ def _timing(
 
 
 def timing_facts(timings: Sequence[Timing], closings: Sequence[Closing], end: float) -> list[FactRow]:
-    """Return the switching times of each contact, for the summary of a run that ends at `end`, s.
+    """Return the switching times of each contact, for the summary of a run that ends at `end` [s].
 
     Without switching times, the rows state the closings of each contact.
     """
