@@ -45,7 +45,7 @@ def delayed_logistic(u: Any, p: float) -> MapValue:
 
 
 def ring(u: Any, p: float) -> MapValue:
-    """Fixed points on the unit circle of state and parameter."""
+    """Return the image under a map whose fixed points lie on the unit circle of state and parameter."""
     return MapValue(u + 0.3 * (1.0 - u * u - p * p), np.array([[1.0 - 0.6 * u[0]]]), np.array([-0.6 * p]))
 
 

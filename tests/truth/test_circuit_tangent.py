@@ -41,7 +41,7 @@ def moving_coil() -> ph.Hammer:
 
 
 def flow_for(time: float) -> np.ndarray:
-    """Matrix exponential in displacement, velocity and flux linkage."""
+    """Return the matrix exponential in displacement, velocity and flux linkage."""
     return np.asarray(LINKED @ expm(RATES * time) @ np.linalg.inv(LINKED))
 
 
@@ -122,7 +122,7 @@ def behind(circuit: dict[str, Any]) -> ph.Hammer:
 @pytest.mark.parametrize("name", DRIVERS)
 @pytest.mark.parametrize("circuit", [PLAIN, TURN], ids=["plain", "turn"])
 def test_through_contacts_and_switches(name: str, circuit: dict[str, Any]) -> None:
-    """Two firings: thresholds, the end of the current, pack on both branches, backstop."""
+    """Two firings pass thresholds, the end of the current, both branches of the pack, and the backstop."""
     hammer = behind(circuit)
     drive = ph.PulseTrain(DRIVERS[name], period=1.1e-3, pulses=2)
     for end in (1e-4, 1.9e-4, 3e-4, 5e-4, 1.4e-3):

@@ -220,7 +220,7 @@ UNITS = {
 
 
 def dimension(unit: str) -> np.ndarray:
-    """Exponents of kg, m, s and A of a unit such as "N^0.5 m^0.25/A"."""
+    """Return the exponents of kg, m, s and A of a unit such as "N^0.5 m^0.25/A"."""
     total, sign = np.zeros(4), 1.0
     for word in unit.replace("/", " / ").split():
         if word == "/":

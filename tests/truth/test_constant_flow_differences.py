@@ -23,7 +23,7 @@ LATER = 20e-6
 
 @pytest.mark.parametrize("end", [0.3e-3, 0.33e-3, 0.4e-3, 0.5e-3, 0.56e-3, 0.8e-3, 1.5e-3])
 def test_a_single_pulse(end: float) -> None:
-    """In flight, in the pack on both branches, in the backstop, between rebounds."""
+    """The end lies in flight, in the pack on both branches, in the backstop, or between rebounds."""
     hammer = crude()
     drive = ph.PulseTrain(hammer.waveform)
     rest = rest_state(hammer), 0.0
@@ -78,7 +78,7 @@ def test_some_parts_and_drives(case: int, constant: str, tmp_path: Path) -> None
 def compare_quantities(
     hammer: ph.Hammer, drive: ph.PulseTrain, duration: float, state: object = None
 ) -> None:
-    """All sensitivities of dots and run against differences of runs."""
+    """Compare all sensitivities of dots and run with differences of runs."""
     found = ph.sensitivities(hammer, drive, duration=duration, state=state, tolerance=1e-13)
     assert found.ok
     assert found.smooth

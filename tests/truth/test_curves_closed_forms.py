@@ -182,7 +182,7 @@ def test_grazing_of_an_undamped_oscillation_at_a_rigid_stop() -> None:
 
 
 def fold_of(omega: float) -> float:
-    """The fold of the orbits of `shaw-holmes-1983` with one impact in two periods of the force.
+    """Return the fold of the orbits of `shaw-holmes-1983` with one impact in two periods of the force.
 
     The squared amplitude of the force is quadratic in the A of an orbit; the fold is its minimum.
     """

@@ -229,7 +229,7 @@ def test_a_doubling_turns_subcritical_where_its_coefficient_is_zero() -> None:
 
 
 def coefficient_of(known: Map, u: Bounds, p: float, r: float) -> float:
-    """The coefficient of the doubling of a fixed point."""
+    """Return the coefficient of the doubling of a fixed point."""
     plane = known_maps.plane((-9.0, 9.0), (-9.0, 9.0))
     matrix = np.array(known.derivative(np.array(u), p, r))
     place = CurvePoint(p + SHIFT, r, UNITS * np.array(u), 0.0, matrix, "")

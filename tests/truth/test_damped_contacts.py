@@ -13,7 +13,7 @@ MASS = 1e-3
 
 
 def struck(law: str, sign: float, stiffness: float, damping: float, speed: float) -> ph.Motion:
-    """Run of a free mass that strikes a damped contact 0.1 mm away."""
+    """Run a free mass that strikes a damped contact 0.1 mm away."""
     waveform = {"shape": "half-sine", "amplitude": "1e-9 N", "width": 1e-6}
     contact = {
         "law": law,
@@ -30,7 +30,7 @@ def struck(law: str, sign: float, stiffness: float, damping: float, speed: float
 @pytest.mark.parametrize("law", ["linear", "hertz"])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_rebound_and_indentation_of_a_free_mass(law: str, sign: float) -> None:
-    """Speed after the impact and largest indentation from the first integral of the motion in the contact."""
+    """Speed after impact and largest indentation follow from the first integral of the motion in contact."""
     rng = np.random.default_rng(1975)
     power = 1.5 if law == "hertz" else 1.0
     for _ in range(4):

@@ -35,7 +35,7 @@ def oscillator(coefficient: float) -> ph.Hammer:
 
 
 def decay(coefficient: float, t: np.ndarray) -> np.ndarray:
-    """Displacement from START at rest, m."""
+    """Return the displacement [m] from START at rest."""
     rate, own = 0.5 * coefficient / MASS, STIFFNESS / MASS
     if rate * rate < own:
         w = math.sqrt(own - rate * rate)

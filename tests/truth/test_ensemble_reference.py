@@ -56,7 +56,7 @@ class Truth:
         return np.array(found)
 
     def touches(self, i: int) -> list[tuple[int, float]]:
-        """Latest firing and time of the touches of the pack by a member before its horizon."""
+        """Return the latest firing and the time of each pack touch of a member before its horizon."""
         end = self.times[i][self.counts[i] - 1] * (1.0 - 1e-6)
         touched = [e.time for e in self.runs[i].events if e.kind == "pack-touch" and e.time < end]
         fired = np.searchsorted(self.drives[i].times, touched, side="right") - 1

@@ -98,7 +98,7 @@ def test_low_pass_of_a_motion() -> None:
 
 @pytest.mark.parametrize("shape", ["rectangle", "half-sine", "trapezoid", "sampled"])
 def test_low_pass_of_a_waveform(shape: str) -> None:
-    """Against the convolution with exp(-t / tau) / tau by quadrature between the edges."""
+    """The result equals the convolution with exp(-t / tau) / tau, by quadrature between the edges."""
     from scipy.integrate import quad
     from tests.hammers import waveforms
 

@@ -16,7 +16,7 @@ G = 9.80665
 
 
 def block(mass: float, kinetic: float, static: float | None = None, **terms: dict[str, object]) -> ph.Hammer:
-    """Mass under dry friction and further forces, by name."""
+    """Return a mass under dry friction and further forces, by name."""
     friction: dict[str, object] = {"law": "friction", "kinetic": kinetic}
     if static is not None:
         friction["static"] = static

@@ -24,7 +24,7 @@ Array = npt.NDArray[np.float64]
 
 
 def updated(mean: Array, covariance: Array, row: Array, shown: float, variance: float) -> tuple[Array, Array]:
-    """Measurement update of a Kalman filter by one number."""
+    """Return the measurement update of a Kalman filter by one number."""
     gain = covariance @ row / (row @ covariance @ row + variance)
     keep = np.eye(len(mean)) - np.outer(gain, row)
     return mean + gain * (shown - row @ mean), keep @ covariance @ keep.T + variance * np.outer(gain, gain)
@@ -73,14 +73,14 @@ def pulled(x: Array, _t: Array, scale: Array) -> Array:
 
 
 def carried(mean: Array, covariance: Array, time: float) -> tuple[Array, Array]:
-    """Time update: x + v t - (1 + s) PULL t^2 / 2 and its speed."""
+    """Return the time update, x + v t - (1 + s) PULL t^2 / 2 and its speed."""
     matrix = np.array([[1.0, time, -0.5 * PULL * time**2], [0.0, 1.0, -PULL * time], [0.0, 0.0, 1.0]])
     drift = -PULL * np.array([0.5 * time**2, time, 0.0])
     return matrix @ mean + drift, matrix @ covariance @ matrix.T
 
 
 def filtered(times: Array, shown: Array, error: float, prior: Array) -> tuple[Array, Array]:
-    """Textbook filter: back to the first sample, through all of them, and on to the expected touch."""
+    """Run a textbook filter back to the first sample, through all samples, and on to the expected touch."""
     mean, covariance, now = np.array([FRONT, SPEED, 0.0]), prior, TOUCH
     for time, each in zip(times, shown, strict=True):
         mean, covariance = carried(mean, covariance, time - now)

@@ -37,7 +37,7 @@ def hammer_of(magnet: str, spring: str, pack: str, backstop: str, folder: Path) 
 
 
 def check(hammer: ph.Hammer, drive: ph.PulseTrain | ph.SineForce) -> None:
-    """Motion, touches and ledger; the start is beyond the backstop, moving, so that all hammers have one."""
+    """Compare motion, touches and ledger from a moving start beyond the backstop, which all hammers allow."""
     state = STOP + 20e-6, -0.4
     found = compare(hammer, drive, DURATION, state=state, sensitive=True)
     motion, truth = found.motion, found.truth

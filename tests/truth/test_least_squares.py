@@ -67,7 +67,7 @@ def test_components_of_the_variance_are_found() -> None:
 
 
 def test_runs_against_all_orders() -> None:
-    """With 8 of either sign, against the share of all orders that have as few runs, or as many."""
+    """With 8 of either sign, the p value is near the share of all orders with as few runs or as many."""
     n, above = 16, 8
     counts = []
     for places in itertools.combinations(range(n), above):
@@ -151,7 +151,7 @@ def test_a_parameter_is_held_where_the_noise_hides_what_it_does() -> None:
 
 
 def test_what_is_known_beforehand_counts_with_its_error() -> None:
-    """Mean and variance of a normal posterior of a mean, the noise estimated."""
+    """The estimate has the mean and variance of a normal posterior, with estimated noise."""
     columns, data = np.ones((4000, 1)), 0.02 + np.random.default_rng(8).standard_normal(4000)
     known = 0.01
     solution = solve(Line(columns), data, Parameters.of(np.zeros(1), deviation=known), robust=False)
@@ -184,7 +184,7 @@ def test_the_ratio_of_von_neumann_has_its_probabilities() -> None:
 
 
 def test_rows_left_out_that_follow_one_another() -> None:
-    """The bound holds, and a stretch of six is no accident."""
+    """The rate of false alarms keeps its bound, and six outliers in succession are reported."""
     rng = np.random.default_rng(11)
     fractions = [
         stretch_p_value(np.where(rng.random(60) < 0.1, rng.choice([-1.0, 1.0], 60), 0.0)) < 0.05

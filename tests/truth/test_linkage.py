@@ -191,7 +191,7 @@ TABLES: list[type[GridMagnet]] = [TableMagnet, LinkageTableMagnet]
 
 @cache
 def table_of(kind: type[GridMagnet], seed: int) -> MagnetPart:
-    """A table of a circuit, with noise."""
+    """Return a table of a circuit, with noise."""
     noise = np.random.default_rng(seed).normal(0.0, 1e-2, (len(KNOTS), len(CURRENTS)))
     x, current = np.array(KNOTS)[:, None], np.array(CURRENTS)
     if kind is TableMagnet:

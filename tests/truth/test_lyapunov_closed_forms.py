@@ -67,7 +67,7 @@ def test_an_underdamped_oscillator() -> None:
 
 
 def henon(count: int, a: float = 1.4, b: float = 0.3) -> np.ndarray:
-    """Growth of two orthonormal directions under x' = 1 - a x^2 + y, y' = b x, by QR."""
+    """Return the growth of two orthonormal directions under x' = 1 - a x^2 + y, y' = b x, by QR."""
     x, y, frame = 0.1, 0.1, np.eye(2)
     logs = []
     for k in range(count + 500):

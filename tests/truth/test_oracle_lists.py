@@ -31,7 +31,7 @@ def kinds(run: Run) -> list[tuple[str, str]]:
 
 
 def balance(run: Run, v: float) -> float:
-    """Kinetic energy gained less the work of everything, as a fraction of the largest work."""
+    """Return the kinetic energy gained minus the sum of all works, as a fraction of the largest work."""
     _x, last = run.at([run.steps[-1].end])
     stops = [run.lost[stop.name] for stop in run.system.stops]
     gained = 0.5 * run.system.mass * (float(last[0]) ** 2 - v**2)

@@ -23,7 +23,7 @@ ONE = np.ones(2)
 
 
 def henon(states: np.ndarray, firings: np.ndarray) -> Images:
-    """The Hénon map x' = 1 - a x^2 + y, y' = b x, iterated, with its derivative."""
+    """Iterate the Hénon map x' = 1 - a x^2 + y, y' = b x; return images and their derivatives."""
     found = Images.empty(len(states))
     for i, (state, count) in enumerate(zip(states, firings, strict=True)):
         (x, y), matrix = state, np.eye(2)
@@ -35,7 +35,7 @@ def henon(states: np.ndarray, firings: np.ndarray) -> Images:
 
 
 def henon_cycle(period: int) -> np.ndarray:
-    """Both fixed points, or the one orbit of period 2, from quadratic equations."""
+    """Return both fixed points, or the one orbit of period 2, from quadratic equations."""
     if period == 1:
         return np.roots([A, 1.0 - B, -1.0])
     return np.roots([A * A, -A * (1.0 - B), (1.0 - B) ** 2 - A])

@@ -15,7 +15,7 @@ def shipped() -> ph.Hammer:
 
 
 def dots_of(hammer: ph.Hammer, run: ReferenceRun) -> list[tuple[float, float, float]]:
-    """Touch, s, leaving, s, and peak force [N] of each pack contact: equation (5) at the largest depth."""
+    """Return the start [s], end [s] and peak force [N] of each pack contact, by equation (5)."""
     pack = {key: hammer.constants[f"pack.{key}"].si for key in ("stiffness", "thickness", "front")}
     dots, touch, deepest = [], 0.0, 0.0
     for event in run.events:

@@ -153,7 +153,7 @@ def count_all(found: list[Recovery]) -> dict[str, int]:
 
 @pytest.mark.slow
 def test_the_recipe_of_the_page_in_a_few_laboratories() -> None:
-    """Run as printed, through files, as `docs/measure/recipe.py` does a hundred times."""
+    """The printed recipe is run through files; `docs/measure/recipe.py` runs it a hundred times."""
     path = Path(__file__).parents[2] / "docs" / "measure"
     count = 3
     with pytest.MonkeyPatch.context() as patch:

@@ -24,7 +24,7 @@ def shipped() -> ph.Hammer:
 
 
 def by_tangent_flow(hammer: ph.Hammer, rate: float) -> float:
-    """The leading multiplier of the fixed point of the strobe map nearest to a row from rest."""
+    """Return the leading multiplier of the fixed point of the strobe map nearest to a row from rest."""
     regime = Regime.of(hammer, rate=rate)
     row = ph.PulseTrain(hammer.waveform, rate=rate, pulses=DOTS)
     motion = ph.simulate(hammer, row, times=row.times[-2:], duration=DOTS / rate)

@@ -33,7 +33,7 @@ def random_curve(rng: np.random.Generator, count: int, slope: float) -> tuple[np
 
 
 def potential(x: np.ndarray, force: np.ndarray, interpolation: str, at: np.ndarray) -> np.ndarray:
-    """Potential energy at displacements, J, from the first sample, by the interpolants of SciPy."""
+    """Return the potential energy at displacements [J], from the first sample, by SciPy's interpolants."""
     if interpolation == "pchip":
         curve = PchipInterpolator(x, force)
         return -np.array([float(curve.integrate(x[0], place)) for place in at])
@@ -71,7 +71,7 @@ class Cell:
 
 
 def pieces(x: np.ndarray, force: np.ndarray, state: tuple[float, float], times: np.ndarray) -> np.ndarray:
-    """Displacements of a mass under a piecewise linear force, cell by cell."""
+    """Return the displacements of a mass under a piecewise linear force, computed cell by cell."""
     result = np.empty(times.size)
     done, t = 0, 0.0
     place, speed = state

@@ -20,17 +20,17 @@ def force(centimetres: float) -> float:
 
 
 def cycle(centimetres: float, restitution: float = RESTITUTION) -> int:
-    """Periods of the table from one take-off of the ball from rest to the next, flight by flight."""
+    """Return the periods of the table between two take-offs of the ball from rest, flight by flight."""
     height = 0.01 * centimetres
 
     def rises(t: float, t0: float, v0: float) -> float:
-        """Height above the table, from the table at t0 with the relative speed v0."""
+        """Return the height above the table of a ball that leaves it at t0 with the relative speed v0."""
         u = v0 + height * OMEGA * math.cos(OMEGA * t0)
         y = height * (math.sin(OMEGA * t0) - math.sin(OMEGA * t)) + u * (t - t0)
         return y - 0.5 * GRAVITY * (t - t0) ** 2
 
     def pushed(t: float) -> bool:
-        """Whether the ball is pressed against the table."""
+        """Return whether the ball is pressed against the table."""
         return height * OMEGA**2 * math.sin(OMEGA * t) < GRAVITY
 
     leaves = math.asin(GRAVITY / (height * OMEGA**2)) / OMEGA

@@ -28,7 +28,7 @@ def map_of(
 
 
 def agree(matrix: np.ndarray, exact: np.ndarray, units: tuple[float, ...], close: float = CLOSE) -> None:
-    """Compare in units of the given scales, relative to the norm."""
+    """Assert that two maps agree in units of the given scales, relative to the norm."""
     scale = np.array(units)
     rows, columns = exact.shape
     weights = scale[:columns] / scale[:rows, np.newaxis]

@@ -44,7 +44,7 @@ MOVING = STOP + 20e-6, -0.4
 
 @pytest.mark.parametrize("end", [0.15e-3, 0.3e-3, 0.4e-3, 0.45e-3, 0.55e-3, 0.8e-3, 1.0e-3, 1.3e-3])
 def test_a_single_pulse(end: float) -> None:
-    """In flight, in the pack on both branches, in the backstop, between rebounds."""
+    """The end lies in flight, in the pack on both branches, in the backstop, or between rebounds."""
     hammer = crude()
     assert deviation(hammer, ph.PulseTrain(hammer.waveform), 0.0, end) < WANTED
 
@@ -76,7 +76,7 @@ def test_from_contact_to_contact(start: float, branch: int, end: float, branch_a
 
 
 def test_starts_inside_contacts() -> None:
-    """Initial states behind the backstop position and beyond the pack front."""
+    """Runs start behind the backstop position and beyond the pack front."""
     hammer = crude()
     drive = ph.PulseTrain(hammer.waveform)
     rest = rest_state(hammer)
@@ -222,7 +222,7 @@ def test_many_random_hammers() -> None:
 @pytest.mark.parametrize("magnet", ["inverse-root", ""], ids=lambda name: name or "none")
 @pytest.mark.parametrize("pack", PACKS, ids=lambda name: name or "none")
 def test_combinations_of_parts(magnet: str, pack: str, tmp_path: Path) -> None:
-    """Every triple of magnet, pack and backstop, with a spring in turn."""
+    """Every triple of magnet, pack and backstop is run, with each spring in turn."""
     rng = np.random.default_rng(3)
     names, springs = list(drives("current")), list(SPRINGS)
     turn = list(PACKS).index(pack) + bool(magnet)

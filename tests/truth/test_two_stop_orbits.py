@@ -26,7 +26,7 @@ def run(name: str, exact: TwoStops, amplitude: float, phase: float, speed: float
 
 
 def stable(exact: TwoStops) -> tuple[float, float]:
-    """Phase and speed of the orbit whose multipliers are smaller."""
+    """Return phase and speed of the orbit with the smaller multipliers."""
     return min(exact.orbits(), key=lambda each: float(np.abs(exact.multipliers(*each)).max()))
 
 

@@ -77,7 +77,7 @@ def test_bouncing_to_rest_on_the_front(e: float) -> None:
 
 
 def mirrored(rng: np.random.Generator) -> tuple[ph.Hammer, ph.Hammer, dict[str, float]]:
-    """Random oscillator on one side of a stop, and its mirror image; the stops are its backstop and front."""
+    """Return a random oscillator with a backstop, and its mirror image with a front stop."""
 
     def log(low: float, high: float) -> float:
         return float(low * (high / low) ** rng.random())
@@ -108,7 +108,7 @@ def mirrored(rng: np.random.Generator) -> tuple[ph.Hammer, ph.Hammer, dict[str, 
 
 
 def events(motion: Motion, sign: float) -> list[tuple[float, float]]:
-    """Times and velocities of the impacts faster than 10 mm/s, mirrored for `sign` -1."""
+    """Return times and velocities of the impacts faster than 10 mm/s, mirrored for `sign` -1."""
     return [(each.t_in, sign * each.v_in) for each in motion.contacts if abs(each.v_in) > 1e-2]
 
 
