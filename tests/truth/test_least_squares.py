@@ -184,7 +184,7 @@ def test_the_ratio_of_von_neumann_has_its_probabilities() -> None:
 
 
 def test_rows_left_out_that_follow_one_another() -> None:
-    """The rate of false alarms keeps its bound, and six outliers in succession are reported."""
+    """The rate of false alarms keeps its bound, and six successive outliers of one sign are reported."""
     rng = np.random.default_rng(11)
     fractions = [
         stretch_p_value(np.where(rng.random(60) < 0.1, rng.choice([-1.0, 1.0], 60), 0.0)) < 0.05
