@@ -12,8 +12,9 @@ offset that the learner does not know, with a standard deviation of 25 us. It ta
 the safe rate, for ``--keep``, and writes no table.
 
 ``--units N`` sets the number of units, ``--feedback N`` the number of units on which feedback prints a
-cycle of order 6. ``--sensors`` measures other sensors instead, ``--tolerance`` other variabilities, and
-``--family`` units of two other hammers of the family. ``--picture FILE`` only draws the dots of one unit
+cycle of order 6. ``--sensors [NAME ...]`` measures other sensors instead, with names of `SENSORS` only for
+``--keep``; ``--tolerance`` measures other variabilities, and ``--family`` units of two other hammers of the
+family. ``--picture FILE`` only draws the dots of one unit
 while it learns, ``--curves FILE`` the fraction of units that print all dots, ``--tolerance-curves FILE`` the
 dots within limits against the spread of the production, ``--parts FILE`` the contributions of driver, table,
 learning and feedback.
@@ -218,24 +219,35 @@ def feedback(hammer: ph.Hammer, units: list[ph.Hammer]) -> list[list[Cell]]:
     return rows
 
 
-def sensors(hammer: ph.Hammer, units: list[ph.Hammer]) -> list[list[Cell]]:
-    """Return the results of learning with other sensors at 1.5 times the safe rate."""
-    rows = []
-    for name, sensor in SENSORS.items():
+def sensors(
+    hammer: ph.Hammer, units: list[ph.Hammer], names: list[str], folder: Path | None
+) -> list[list[Cell]]:
+    """Return the results of learning with variants of the named sensors, at 1.5 times the safe rate."""
+    rows: list[list[Cell]] = []
+    for name in names:
+        sensor = SENSORS[name]
         law, _base = law_for(hammer, ASKED * open_loop_rate(hammer), sensor=sensor)
-        for other, options in OTHERS.items():
-            shown = ImpactSensor(**{"force": sensor.force, "offset": OFFSET, **options})
-            rows.append([name, other, *learned(law, units, shown).cells(AFTER[-1])])
-            print(*rows[-1], flush=True)
+
+        def add(
+            variant: str,
+            driven: list[ph.Hammer],
+            shown: ImpactSensor,
+            name: str = name,
+            law: LearningLaw = law,
+        ) -> None:
+            seen = kept(folder, f"{name} {variant}", lambda: learned(law, driven, shown))
+            rows.append([name, variant, *seen.cells(AFTER[-1])])
+            print(*rows[-1], time.strftime("%H:%M:%S"), flush=True)
+
+        for variant, options in OTHERS.items():
+            add(variant, units, ImpactSensor(**{"force": sensor.force, "offset": OFFSET, **options}))
         for key, spread in UNKNOWN.items():
             rng = np.random.default_rng(5)
             off = 1.0 + spread * rng.standard_normal(len(units))
-            other = [
+            changed = [
                 unit.replace(key, unit.constants[key].si * by) for unit, by in zip(units, off, strict=True)
             ]
-            said = f"white noise; {key} is off by {100.0 * spread:g} % as well"
-            rows.append([name, said, *learned(law, other, sensor).cells(AFTER[-1])])
-            print(*rows[-1], flush=True)
+            add(f"white noise; {key} is off by {100.0 * spread:g} % as well", changed, sensor)
     return rows
 
 
@@ -430,7 +442,7 @@ def main() -> None:
     parser.add_argument("--units", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--feedback", type=int)
-    parser.add_argument("--sensors", action="store_true")
+    parser.add_argument("--sensors", nargs="*", choices=SENSORS)
     parser.add_argument("--tolerance", action="store_true")
     parser.add_argument("--family", action="store_true")
     parser.add_argument("--picture", type=Path)
@@ -457,9 +469,11 @@ def main() -> None:
         return
     units = Variability().draw(hammer, asked.units, asked.seed)
     settings = {"units": asked.units, "seed": asked.seed, "safe_rate": open_loop_rate(hammer)}
-    if asked.sensors:
+    if asked.sensors is not None:
         heads = [Column(name="learned from"), Column(name="sensor"), *GOOD, *FEWER]
-        write("learning-sensors", heads, sensors(hammer, units), settings, ROOMS)
+        rows = sensors(hammer, units, asked.sensors or list(SENSORS), asked.keep)
+        if not asked.sensors:
+            write("learning-sensors", heads, rows, settings, ROOMS)
     elif asked.family:
         heads = [Column(name="hammer of the family"), DRIVE, *GOOD]
         names = tuple(f"hendriks-1983-family-{number}" for number in FAMILY)

@@ -4,11 +4,16 @@ import math
 
 import numpy as np
 import pytest
-from tests.errors import refused
+from scipy.linalg import expm
+from tests.circuit_tangents import deviation as circuit_deviation
+from tests.circuit_tangents import deviations, problem_of
 from tests.oracle.den_hartog import DenHartog
 from tests.tangents import SHARP, deviation
 
 import printhammer as ph
+from printhammer.derivatives.flow import flow as constant_flow
+from printhammer.derivatives.flow import rest_columns
+from printhammer.derivatives.parameters import parameters
 from printhammer.derivatives.states import tangent_map
 
 
@@ -206,14 +211,103 @@ def test_an_edge_that_ends_a_rest_on_a_stop_takes_the_motion_along() -> None:
     assert (np.abs(moved.derivatives) <= 1e-6 * scale[:, :, np.newaxis]).all()
 
 
-def test_what_has_no_derivatives() -> None:
-    coil = ph.Hammer.build(1.0).replace(
+def coil_plunger(rng: np.random.Generator, kind: str) -> ph.Hammer:
+    """Plunger on a rail, in a tube: between rigid stops, or held by friction wherever it stops."""
+    kinetic = float(rng.uniform(0.1, 0.3))
+    rail = {"shape": "rail", "voltage": 12.0, "width": float(rng.uniform(0.8e-3, 2e-3))}
+    decay = {"decay": "zener", "decay_voltage": 24.0} if rng.random() < 0.5 else {"decay": "diode"}
+    parts: dict[str, object] = {
+        "force.guide": {
+            "law": "friction",
+            "kinetic": kinetic,
+            "static": kinetic * float(rng.choice([1.0, 1.3, 2.0])),
+        },
+        "contact.leaf": {"law": "linear", "side": "front", "position": 0.3e-3, "stiffness": 3e3},
+        "magnet": {"law": "moving-coil", "constant": float(rng.uniform(2.0, 6.0))},
+        "coil": {"resistance": float(rng.uniform(4.0, 12.0)), "inductance": float(rng.uniform(2e-3, 8e-3))},
+        "waveform": rail | decay,
+    }
+    if kind == "free":
+        parts["spring"] = {"law": "preload", "preload": 0.0, "stiffness": float(rng.uniform(500.0, 3000.0))}
+        parts["pack"] = {"law": "dashpot", "front": 0.5e-3, "stiffness": 1e6, "damping": 10.0}
+    else:
+        preload, stiffness = -float(rng.uniform(0.1, 0.5)), float(rng.uniform(100.0, 1500.0))
+        parts["spring"] = {"law": "preload", "preload": preload, "stiffness": stiffness}
+        parts["backstop"] = {"law": "rigid", "position": 0.0, "restitution": 0.3}
+        parts["pack"] = {"law": "rigid", "front": 0.5e-3, "restitution": 0.4}
+    hammer = ph.Hammer.build(1e-3).replace(parts)
+    if rng.random() < 0.5:
+        turn = {
+            "coil.turn_resistance": float(rng.uniform(3.0, 10.0)),
+            "coil.leakage": float(rng.uniform(5e-4, 2e-3)),
+        }
+        hammer = hammer.replace(turn)
+    return hammer
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["free", "stops"])
+def test_random_coils_that_release_a_held_armature(kind: str) -> None:
+    """States and every constant, through releases by the current and later stops and rests."""
+    rng = np.random.default_rng(12)
+    sticks = 0
+    for _ in range(4):
+        hammer, period = coil_plunger(rng, kind), float(rng.uniform(5e-3, 9e-3))
+        drive, end = ph.PulseTrain(hammer.waveform, period=period, pulses=2), float(rng.uniform(6e-3, 14e-3))
+        motion = ph.simulate(hammer, drive, duration=end, tolerance=SHARP)
+        sticks += len(motion.sticks)
+        # A neighbouring state of an armature on a stop lies behind the stop.
+        times = np.linspace(2e-4, 2e-3, 40)
+        moving = float(times[np.argmax(np.abs(motion.at(times)[1]) > 0.05)])
+        start = 0.0 if kind == "free" else moving
+        found = min(circuit_deviation(hammer, drive, start, end, size=size) for size in (1e-3, 1e-4, 4e-6))
+        assert found < 1e-6
+        assert max(deviations(hammer, drive, end).values()) < 1e-6
+    assert sticks > 4
+
+
+def test_a_current_that_releases_an_armature() -> None:
+    """A moving coil at rest: the release is K V/R (1 - exp(-R t/L)) = Fs, and then the motion is linear.
+
+    With z = (x, v, i) after the release at t1, dz/dV = Z_V(T - t1) - z'(T) dt1/dV, since the current at the
+    release is Fs/K for any voltage; Z_V is the response of the linear system to a voltage of 1 V.
+    """
+    mass, factor, resistance, inductance, kinetic, static = 2e-3, 4.0, 6.0, 5e-3, 0.4, 0.9
+    voltage, stiffness, end = 9.0, 100.0, 4e-3
+    hammer = ph.Hammer.build(mass).replace(
         {
-            "force.guide": {"law": "friction", "kinetic": "1 N"},
-            "magnet": {"law": "moving-coil", "constant": "5 N/A"},
-            "coil": {"law": "winding", "resistance": "5 ohm", "inductance": "1 mH"},
-            "waveform": {"shape": "rail", "voltage": "12 V", "width": "10 ms", "decay": "diode"},
+            "force.guide": {"law": "friction", "kinetic": kinetic, "static": static},
+            "magnet": {"law": "moving-coil", "constant": factor},
+            "coil": {"resistance": resistance, "inductance": inductance},
+            "spring": {"law": "preload", "preload": 0.0, "stiffness": stiffness},
+            "waveform": {"shape": "rail", "voltage": voltage, "width": 1.0, "decay": "diode"},
         }
     )
-    with refused("force.guide"):
-        ph.sensitivities(coil, ph.PulseTrain(coil.waveform, at=[0.0]), duration=0.02, state=(0.0, 0.0))
+    current = static / factor
+    release = -inductance / resistance * math.log(1.0 - current * resistance / voltage)
+    later = -static / (factor * voltage) / ((voltage - resistance * current) / inductance)
+    system = np.zeros((5, 5))
+    system[0, 1] = 1.0
+    system[1, 0], system[1, 2], system[1, 4] = -stiffness / mass, factor / mass, -kinetic / mass
+    system[2, 1:4] = -factor / inductance, -resistance / inductance, 1.0 / inductance
+    flow = expm(system * (end - release))
+    state = flow @ np.array([0.0, 0.0, current, voltage, 1.0])
+    expected = flow[:3, 3] - (system @ state)[:3] * later
+
+    drive = ph.PulseTrain(hammer.waveform, at=[0.0])
+    problem = problem_of(hammer, drive, (0.0, 0.0))
+    record = problem.run(end)
+    wanted = parameters(hammer, drive, ["waveform.voltage", "force.guide.static"])
+    found = constant_flow(problem, record, wanted, np.array([0.0, end]), rest_columns(problem, wanted))
+    assert found.smooth
+    held = ph.simulate(hammer, drive, state=(0.0, 0.0), duration=end).sticks[0]
+    assert held.t_out == pytest.approx(release, rel=1e-10)
+    # The flux linkage of a moving coil is L i + K x.
+    by_voltage = np.array([*expected[:2], inductance * expected[2] + factor * expected[0]])
+    own = found.changes[1][[0, 1, 8]] / np.array([parameter.scale for parameter in wanted])
+    np.testing.assert_allclose(own[:, 0], by_voltage, rtol=1e-9)
+    # A change of the static friction changes the current at the release, and the time of the release.
+    later = inductance / (factor * (voltage - resistance * current))
+    by_static = flow[:3, 2] / factor - (system @ state)[:3] * later
+    by_static[2] = inductance * by_static[2] + factor * by_static[0]
+    np.testing.assert_allclose(own[:, 1], by_static, rtol=1e-9)

@@ -17,7 +17,6 @@ from typing import Any, Final
 import numpy as np
 
 from printhammer.derivatives.parameters import Parameter, as_arrays, rest_changes
-from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.kernel.compile.specialise import variational
 from printhammer.kernel.model import modes as M
@@ -40,7 +39,6 @@ from printhammer.kernel.model.modes import PAUSED, STATUS_NAMES
 from printhammer.kernel.variational import layout as V
 from printhammer.kernel.variational.layout import SPACING
 from printhammer.parts.friction import DryFriction
-from printhammer.parts.spring.terms import Friction
 from printhammer.results import Declared, part
 from printhammer.run.problem import Problem, Record, Stretch
 from printhammer.support.arrays import FloatArray
@@ -109,14 +107,6 @@ def carry_columns(
     renormalise : bool, optional
         Whether to orthonormalise the columns at each step and record the growth.
     """
-    dry = isinstance(problem.hammer.damping, DryFriction)
-    if dry and problem.laws.circuit:
-        key = next(key for key, law in problem.hammer.laws.items() if law == Friction.law)
-        raise InputError(
-            f"{key}: derivatives under dry friction do not include a coil circuit",
-            key=key,
-            expected="no dry friction, or a current or force as drive",
-        )
     forced, circuit, count = forcing is not None, problem.laws.circuit, initial.shape[1]
     rows = V.row_count(forced, circuit)
     if circuit and len(initial) == V.ENERGY:

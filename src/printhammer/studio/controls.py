@@ -12,7 +12,6 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import Range
 from printhammer.parts.base import PARTS, Part
 from printhammer.parts.coil import Winding
-from printhammer.parts.friction import DryFriction
 from printhammer.parts.spring.terms import Term
 from printhammer.studio.coil import open_constants, rail_of, span_of
 from printhammer.studio.terms import contacts_of, frictions_of
@@ -127,9 +126,8 @@ def describe(hammer: Hammer) -> dict[str, Any]:
         (controls that change several constants), `waveform` (shape and constants, or None), `start` (entries
         of the initial state that differ from the default), `places` (positions), `contacts` (name, side and
         position), `frictions` (keys of kinetic and static friction where both are stated), `sprung`
-        (whether a spring, force or contact acts), `rigid` and `rigid_front` (whether backstop and front are
-        rigid), and `dry` (whether dry friction acts and the
-        hammer has a magnet: a voltage may then drive the coil, without exponents).
+        (whether a spring, force or contact acts), and `rigid` and `rigid_front` (whether backstop and front
+        are rigid).
     """
     spans = [(constant, span_of(hammer, constant)) for constant in hammer.constants.values()]
     return {
@@ -152,7 +150,6 @@ def describe(hammer: Hammer) -> dict[str, Any]:
         "sprung": hammer.spring is not None,
         "rigid": hammer.backstop is not None and hammer.backstop.rigid,
         "rigid_front": hammer.pack is not None and hammer.pack.rigid,
-        "dry": isinstance(hammer.damping, DryFriction) and hammer.magnet is not None,
     }
 
 

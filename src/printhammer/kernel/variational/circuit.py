@@ -86,6 +86,12 @@ def main_linkage(electric: Electric, hammer: Hammer) -> float:
 
 
 @inlined
+def main_row(hammer: Hammer) -> int:
+    """Return the row of a tangent column that holds the main flux linkage, without leakage."""
+    return int(ELECTRIC_ROW + int(hammer[TURN_RESISTANCE] > 0.0))
+
+
+@inlined
 def couples(hammer: Hammer, live: Any) -> bool:
     """Whether the flux linkage can drive a current, in the coil or in a shorted turn."""
     return path_of(live) != BLOCKED or hammer[TURN_RESISTANCE] > 0.0

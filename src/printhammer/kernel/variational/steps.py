@@ -15,7 +15,6 @@ from printhammer.kernel.model.layout import (
     FRONT,
     INVERSE_MASS,
     POSITION,
-    TURN_RESISTANCE,
 )
 from printhammer.kernel.variational.layout import BACKSTOP_LOSS, ELECTRICS, MEMORIES, PEAK, START, TIME
 
@@ -42,6 +41,7 @@ if TYPE_CHECKING:
         electric_at_node,
         electric_in,
         hold_linkage,
+        main_row,
     )
     from printhammer.kernel.variational.columns import (
         bring_back,
@@ -129,9 +129,8 @@ def place_of_rest(t: float, node: Any, k: int, columns: Any, setting: Setting) -
     with_x += field_slope(x, 0.0, value, scales, bounds, hammer)
     if HAS_CIRCUIT:
         current_x, by_linkage, force = current_slopes(x, electric_at_node(node), hammer, live)
-        main = ELECTRIC_ROW + int(hammer[TURN_RESISTANCE] > 0.0)
         with_x += force * current_x
-        change += force * by_linkage * columns[main, k]
+        change += force * by_linkage * columns[main_row(hammer), k]
     return float(-change / with_x)
 
 

@@ -35,7 +35,7 @@ from printhammer.kernel.variational.slopes import CENTRAL, OFFSETS, WEIGHTS
 
 if TYPE_CHECKING:
     from printhammer.kernel.methods.quadrature import powers
-    from printhammer.kernel.model.circuit import driven
+    from printhammer.kernel.model.circuit import driven, electric_rates
     from printhammer.kernel.model.forces import (
         Hammer,
         acceleration,
@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     )
     from printhammer.kernel.model.pulses import Drive, drive_value, piece_value
     from printhammer.kernel.single.resample import branch_of, is_held, memory_of
-    from printhammer.kernel.variational.circuit import electric_at_node
+    from printhammer.kernel.variational.circuit import current_slopes, electric_at_node, main_row
     from printhammer.kernel.variational.forcing import (
         field_changes,
         force_with_value,
@@ -78,8 +78,8 @@ NEAR = 1e-9
 reversal is differentiable."""
 
 RELEASED = 1e-9
-"""Largest relative difference of force and static friction at a release not caused by an edge of the
-drive."""
+"""Largest relative difference of force and static friction at a release; at an edge of the drive, and at the
+end of a run, the difference is larger."""
 RELEASE_SPACING = 1e-3
 """Step size of the time for the rate of the force at a release, as a fraction of the rest."""
 
@@ -208,6 +208,23 @@ def pass_level(
 
 
 @compiled
+def rate_at_release(node: Any, after: Any, mode: int, memory: float, setting: Setting) -> float:
+    """Return the time derivative of the acceleration [m/s^3] of an armature at rest, at the end of a rest."""
+    hammer, live, electric = setting.hammer, setting.drive, electric_at_node(after)
+    t, x = after[0], after[1]
+    if HAS_CIRCUIT:
+        _by_x, by_linkage, force = current_slopes(x, electric, hammer, live)
+        linkage_rate = electric_rates(t, x, 0.0, electric, hammer, live)[main_row(hammer) - ELECTRIC_ROW]
+        return float(force * by_linkage * linkage_rate * hammer[INVERSE_MASS])
+    spacing = RELEASE_SPACING * min(t - node[0], setting.scales[0] / setting.scales[1])
+    rate = 0.0
+    for i in range(4):
+        at = t + OFFSETS[CENTRAL, i] * spacing
+        rate += WEIGHTS[CENTRAL, i] * acceleration(at, x, 0.0, mode, memory, hammer, live)
+    return rate / spacing
+
+
+@compiled
 def pass_release(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
     """Propagate the columns through the end of a rest under dry friction; return whether differentiable.
 
@@ -215,22 +232,21 @@ def pass_release(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
     the drive, see `leave_at_edge`.
     """
     hammer, drive = setting.hammer, driven(setting.drive, electric_at_node(after))
-    mode, t = int(node[3]), after[0]
-    limit = hold_limit(hammer)
+    mode, memory = int(node[3]), memory_of(int(node[3]), node[4], setting.hammer)
     held = acceleration_at(after, mode, node[4], 0.0, hammer, drive)
-    if abs(held) < (1.0 - RELEASED) * limit:
+    if abs(held) < (1.0 - RELEASED) * hold_limit(hammer):
         return True
-    spacing = RELEASE_SPACING * min(t - node[0], setting.scales[0] / setting.scales[1])
-    rate = 0.0
-    memory = memory_of(mode, node[4], hammer)
-    for i in range(4):
-        at = t + OFFSETS[CENTRAL, i] * spacing
-        rate += WEIGHTS[CENTRAL, i] * acceleration(at, after[1], 0.0, mode, memory, hammer, drive)
-    rate /= spacing
+    rate = rate_at_release(node, after, mode, memory, setting)
     if rate * held <= 0.0:
         return False
-    value = value_at(t, after[1], hammer, drive)
+    t, value = after[0], value_at(after[0], after[1], hammer, drive)
     by_x = field_slope(after[1], 0.0, value, setting.scales, setting.bounds, hammer)
+    by_linkage = 0.0
+    if HAS_CIRCUIT:
+        current_x, current_linkage, force = current_slopes(
+            after[1], electric_at_node(after), hammer, setting.drive
+        )
+        by_x, by_linkage = by_x + force * current_x, force * current_linkage
     by_front = 0.0
     if HAS_PACK and mode == M.HELD_LOADING:
         by_front = -pack_slopes(after[1], 0.0, M.LOADING, memory, node[4], setting.scales, hammer)[0]
@@ -238,6 +254,8 @@ def pass_release(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
     behind = acceleration_at(after, branch_of(int(after[3])), after[4], 0.0, hammer, drive)
     for k in range(columns.shape[1]):
         change = by_x * columns[0, k]
+        if HAS_CIRCUIT:
+            change += by_linkage * columns[main_row(hammer), k]
         if FORCED:
             forcing = setting.forcing
             with_value = force_with_value(after[1], value, hammer, drive, forcing)
@@ -270,7 +288,8 @@ def pass_friction(node: Any, after: Any, columns: Any, setting: Setting) -> tupl
         for k in range(columns.shape[1]):
             columns[1, k] = 0.0
         return True, True
-    if is_held(mode) or (FORCED and mode >= M.RESTING > following):
+    # Without forcing and circuit, all motions leave a rigid stop at the same time.
+    if is_held(mode) or ((FORCED or HAS_CIRCUIT) and mode >= M.RESTING > following):
         return True, pass_release(node, after, columns, setting)
     if mode == following and node[4] * after[4] < 0.0 and after[2] == 0.0:
         return True, pass_reversal(node, after, mode, following, columns, setting)

@@ -31,11 +31,11 @@ export function titleOf(name, described, short = false) {
   return (short ? SHORT : TITLES)[name];
 }
 
-/** Return the views that apply to a device, those that its file lists: without a pack, or at a rigid front, nothing is printed; a rigid stop has no loop, and exponents under dry friction lack the coil circuit. */
+/** Return the views that apply to a device, those that its file lists: without a pack, or at a rigid front, nothing is printed; and a rigid stop has no loop. */
 export function viewsOf(described) {
   if (!described) return VIEWS;
-  const { places: { front, backstop }, rigid, rigid_front: hard, dry, views } = described;
-  const lacks = { line: front === null || hard, energy: front === null || hard, loops: (front === null || hard) && (backstop === null || rigid), strobe: dry };
+  const { places: { front, backstop }, rigid, rigid_front: hard, views } = described;
+  const lacks = { line: front === null || hard, energy: front === null || hard, loops: (front === null || hard) && (backstop === null || rigid) };
   const possible = (name) => !lacks[name];
   return views?.some(possible) ? views.filter(possible) : VIEWS.filter(possible);
 }
