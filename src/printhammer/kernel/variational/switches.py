@@ -221,7 +221,7 @@ def rate_at_release(node: Any, after: Any, mode: int, memory: float, setting: Se
     for i in range(4):
         at = t + OFFSETS[CENTRAL, i] * spacing
         rate += WEIGHTS[CENTRAL, i] * acceleration(at, x, 0.0, mode, memory, hammer, live)
-    return rate / spacing
+    return float(rate / spacing)
 
 
 @compiled
