@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from printhammer.chaos.orbits.newton import Guess
+from printhammer.chaos.orbits.newton import CLOSED, FastMaps, Guess
 from printhammer.chaos.strobe.map import WITH_MEMORY, front_with_memory, state_later
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
@@ -41,6 +41,13 @@ _ROOM: Final = 1.2
 # Extent of the initial states without a bound: a ball with one bounce per period rises to 5 half-widths;
 # arbitrary
 _SCALES: Final = 6.0
+_NEAR: Final = 64  # Number of guesses near each known orbit of a period whose index sum is not 1; arbitrary
+_SIZES: Final = (-6.0, -1.5)
+"""Range of decimal logarithms of the displacements of known orbits, in half-widths of the strobe window.
+
+Near chatter, orbits that differ by one bounce lie close together. Tuned on the ball of Tufillaro at 60 Hz."""
+_NEARBY: Final = (-1.5, -0.5)  # Arbitrary
+"""Range of decimal logarithms of the distances between known orbits and starts, in half-widths."""
 _PLASTIC: Final = 1.324717957244746
 """Real root of x^3 = x + 1, whose inverse powers spread points evenly over a square."""
 
@@ -224,6 +231,39 @@ def joined(
             guess = Guess(np.concatenate(states), np.concatenate(firings))
             guesses.append((float(gaps[here, there]), guess))
     return [guess for _gap, guess in sorted(guesses, key=lambda pair: pair[0])[:most]]
+
+
+def moves_near(rng: np.random.Generator, count: int) -> FloatArray:
+    """Draw `count` displacements of states, in half-widths of the strobe window, shape (count, 2)."""
+    sizes, angles = 10.0 ** rng.uniform(*_NEARBY, count), rng.uniform(0.0, 2.0 * np.pi, count)
+    return np.asarray(sizes[:, np.newaxis] * np.column_stack([np.cos(angles), np.sin(angles)]))
+
+
+def motions(maps: FastMaps, starts: FloatArray, period: int) -> list[Guess]:
+    """Simulate motions over `period` firings, which need not return, as guesses; omit motions that fail.
+
+    Newton's method often leads from such a guess to an orbit to which no recorded motion closely returns.
+    """
+    table = starts[:, np.newaxis]
+    for _ in range(period - 1):
+        images = maps(table[:, -1], np.ones(len(table), np.int64))
+        kept = images.reasons == CLOSED
+        table = np.concatenate([table[kept], images.states[kept, np.newaxis]], axis=1)
+    return [Guess(cycle, np.ones(period, np.int64)) for cycle in table]
+
+
+def displaced(
+    orbits: Sequence[Guess], period: int, rng: np.random.Generator, scales: FloatArray, lowest: FloatArray
+) -> list[Guess]:
+    """Displace the states of orbits of a period by random amounts of several magnitudes, above a bound."""
+    # The same displacements for every orbit, so that a larger search includes those of a smaller search.
+    sizes = 10.0 ** rng.uniform(*_SIZES, (_NEAR, 1, 1))
+    moves = sizes * scales * rng.uniform(-1.0, 1.0, (_NEAR, period, 2))
+    return [
+        Guess(np.maximum(orbit.states + move[: len(orbit.states)], lowest), orbit.firings)
+        for orbit in orbits
+        for move in moves
+    ]
 
 
 def _is_new(cycle: FloatArray, kept: FloatArray, apart: float) -> bool:

@@ -23,9 +23,12 @@ from printhammer.chaos.orbits.guesses import (
     PHASES,
     Records,
     close_returns,
+    displaced,
     firings_for,
     first_state,
     joined,
+    motions,
+    moves_near,
     record,
     spread,
     touches,
@@ -87,12 +90,8 @@ _COMPLETED: Final = 6  # Arbitrary
 """Largest period, in firings, that is searched again if its fixed-point indices do not sum to 1."""
 _MORE: Final = 512
 """Number of additional guesses for a period whose fixed-point indices do not sum to 1; arbitrary."""
-_NEAR: Final = 64  # Number of guesses near each known orbit of a period whose index sum is not 1; arbitrary
-_ROUNDS: Final = 3  # Largest number of rounds of further guesses; arbitrary
-_SIZES: Final = (-6.0, -1.5)
-"""Range of decimal logarithms of the displacements of further guesses, in half-widths of the strobe window.
-
-Near chatter, orbits that differ by one bounce lie close together. Tuned on the ball of Tufillaro at 60 Hz."""
+_ROUNDS: Final = 8
+"""Largest number of rounds of guesses near the states of all known orbits; arbitrary."""
 _SAME: Final = 1e-6
 """Distance, in half-widths of the strobe window, below which two orbits share a state; arbitrary."""
 _FAST: Final[dict[str, Any]] = {"goal": 1e-9, "enough": 1e-7, "iterations": 30}
@@ -257,33 +256,53 @@ class Search:
     def _complete(self, fast: FastMaps, different: list[_Known], records: Records) -> None:
         """Try more guesses for every period whose fixed-point indices do not sum to 1.
 
-        The guesses are close returns, and then states near known orbits.
+        The guesses are close returns, then motions that start near states of known orbits, and, with a rigid
+        backstop, displaced orbits of the period. Mirror images of known orbits come first, since the sums
+        include the images.
         """
         stage = len(self.blocks) - 1, len(self.batches) - 1
+        reflected = self._reflect(fast, different, 0)
         for period in range(1, min(self.longest, _COMPLETED) + 1):
             if _index_sum(different, period) == 1:
                 continue
             returns = close_returns(records, period, _MORE, self.scales, firings_for(period))
             self._try(fast, different, [guess for both in returns for guess in both], stage)
+            reflected = self._reflect(fast, different, reflected)
             rng = np.random.default_rng(period)
-            for _ in range(_ROUNDS):
-                if _index_sum(different, period) != 1:
-                    self._try(fast, different, self._displaced(different, period, rng), stage)
+            # The same displacements for every orbit, so that a larger search includes a smaller search.
+            for move in moves_near(rng, _ROUNDS) * self.scales:
+                if _index_sum(different, period) == 1:
+                    break
+                own = [known.closing for known in different if known.closing.firings.sum() <= period]
+                if not own:
+                    break
+                starts = np.concatenate([closing.states for closing in own]) + move
+                started = motions(fast, np.maximum(starts, self._lowest()), period)
+                self._try(fast, different, started, stage)
+                reflected = self._reflect(fast, different, reflected)
+            if np.isfinite(self._lowest()).any() and _index_sum(different, period) != 1:
+                own = [known.closing for known in different if known.closing.firings.sum() == period]
+                self._try(fast, different, displaced(own, period, rng, self.scales, self._lowest()), stage)
+                reflected = self._reflect(fast, different, reflected)
 
-    def _displaced(self, different: list[_Known], period: int, rng: np.random.Generator) -> list[Guess]:
-        """Displace the states of known orbits of a period by random amounts of several magnitudes."""
-        backstop, lowest = self.regime.hammer.backstop, np.full(2, -np.inf)
-        if backstop is not None and backstop.law == "rigid":
-            lowest[0] = self.regime.hammer.position
-        # The same displacements for every orbit, so that a larger search includes those of a smaller search.
-        sizes = 10.0 ** rng.uniform(*_SIZES, (_NEAR, 1, 1))
-        moves = sizes * self.scales * rng.uniform(-1.0, 1.0, (_NEAR, period, 2))
-        own = [known.closing for known in different if known.closing.firings.sum() == period]
-        return [
-            Guess(np.maximum(closing.states + move[: len(closing.states)], lowest), closing.firings)
-            for closing in own
-            for move in moves
-        ]
+    def _lowest(self) -> FloatArray:
+        """Return the lower bounds of displacement and velocity, which a rigid backstop sets."""
+        backstop = self.regime.hammer.backstop
+        rigid = backstop is not None and backstop.law == "rigid"
+        return np.array([self.regime.hammer.position if rigid else -np.inf, -np.inf])
+
+    def _reflect(self, fast: FastMaps, different: list[_Known], begin: int) -> int:
+        """Try the mirror images of the known orbits from `begin` on; return the number of known orbits."""
+        images = []
+        for known in different[begin:]:
+            states = [
+                mirror_image(fast.regime, state, self.effort.tolerance) for state in known.closing.states
+            ]
+            if any(state is None or not np.isfinite(state).all() for state in states):
+                continue
+            images.append(Guess(np.array(states), known.closing.firings))
+        self._try(fast, different, images, (len(self.blocks) - 1, len(self.batches) - 1))
+        return len(different)
 
     def _batch(self, guesses: list[Guess], batch: int, period: int) -> list[Guess]:
         """Select the guesses that a batch adds to the preceding batches."""
