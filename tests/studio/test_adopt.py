@@ -39,6 +39,8 @@ def test_a_hammer_file_gives_the_numbers_of_python(ask: Any, name: str) -> None:
     for control, other in zip(expected["constants"], described["constants"], strict=True):
         for entry in ("value", "low", "high"):
             assert other[entry] == pytest.approx(control[entry], rel=1e-9), control["key"]
+    if hammer.waveform is not None:
+        assert described["start"] == describe(hammer)["start"]
     assert described["places"] == pytest.approx(expected["places"])
     for contact, other in zip(expected["contacts"], described["contacts"], strict=True):
         assert other == {**contact, "position": pytest.approx(contact["position"])}

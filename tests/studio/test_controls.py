@@ -32,13 +32,12 @@ def test_every_constant_has_a_control_whose_range_holds_it(name: str) -> None:
         assert constant["low"] > 0.0 or not constant["log"]
 
 
-def test_contacts_of_the_file_have_name_side_and_position() -> None:
-    relay = load("relay-5v")
-    assert [tuple(contact.values()) for contact in controls.describe(relay)["contacts"]] == [
-        ("make", "front", relay.constants["contact.make.position"].si),
-        ("break", "back", relay.constants["contact.break.position"].si),
-    ]
-    assert controls.describe(load(CRUDE))["contacts"] == []
+def test_a_slow_device_of_ones_own_opens_without_overlapping_pulses() -> None:
+    slow, fast = (load(name).replace("name", "mine") for name in ("relay-5v", "hendriks-1983"))
+    assert slow.waveform is not None
+    start = controls.describe(slow)["start"]
+    assert start["low"] < start["rate"] < start["high"] < 1.0 / slow.waveform.width
+    assert controls.describe(fast)["start"] == {}
 
 
 @pytest.mark.parametrize("name", HAMMERS)

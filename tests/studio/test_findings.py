@@ -184,20 +184,24 @@ def test_contacts_of_a_relay_open_and_close_at_their_positions(opened: Page) -> 
     relay = ph.load("relay-5v")
     opened.run("window.studio.studio.store.set({ hammer: 'relay-5v', rate: 20, pulses: 3 })")
     opened.wait("!window.studio.studio.busy && window.studio.studio.loaded === 'relay-5v'")
-    motion = ph.simulate(relay, ph.PulseTrain(relay.waveform, rate=20.0, pulses=3))
-    make, separation = (relay.constants[f"contact.{name}.position"].si for name in ("make", "break"))
     seen = set()
-    for time in (0.0, 4e-3, 5e-3, 15e-3, 40e-3, 60e-3):
-        x = float(motion.at([time])[0][0])
-        states = [
-            f"make {'closed' if x > make else 'open'}",
-            f"break {'closed' if x < separation else 'open'}",
-        ]
-        assert set(states) <= set(sketched(opened, time))
-        opened.run(f"window.studio.studio.setCursor({time})")
-        scrub = "document.querySelector('.view-sketch .scrub').getAttribute('aria-valuetext')"
-        opened.wait(f"{scrub}.endsWith('{', '.join(states)}')")
-        seen |= set(states)
+    for moved in ({}, {"contact.make.position": 0.3e-3, "contact.break.position": 0.1e-3}):
+        opened.run(f"window.studio.studio.store.set({{ constants: {moved} }})")
+        opened.wait("!window.studio.studio.busy && !window.studio.studio.stale")
+        device = relay.replace(moved) if moved else relay
+        motion = ph.simulate(device, ph.PulseTrain(device.waveform, rate=20.0, pulses=3))
+        make, separation = (device.constants[f"contact.{name}.position"].si for name in ("make", "break"))
+        for time in (0.0, 4e-3, 5e-3, 15e-3, 40e-3, 60e-3):
+            x = float(motion.at([time])[0][0])
+            states = [
+                f"make {'closed' if x > make else 'open'}",
+                f"break {'closed' if x < separation else 'open'}",
+            ]
+            assert set(states) <= set(sketched(opened, time))
+            opened.run(f"window.studio.studio.setCursor({time})")
+            scrub = "document.querySelector('.view-sketch .scrub').getAttribute('aria-valuetext')"
+            opened.wait(f"{scrub}.endsWith('{', '.join(states)}')")
+            seen |= set(states)
     assert len(seen) == 4
 
 
