@@ -61,13 +61,13 @@ def close(table: Any, rows: int, end: float) -> int:
 
 
 def half_sine(fields: Any, table: Any) -> int:
-    """Write the table of a half sine: fields amplitude, width; return the number of rows."""
+    """Write the segments of a half-sine pulse with the fields amplitude, width; return the row count."""
     rows = put(table, 0, 0.0, SINE, 0.0, fields[0], math.pi / fields[1], 0.0)
     return close(table, rows, fields[1])
 
 
 def sine(fields: Any, table: Any) -> int:
-    """Write the table of an endless sine: fields amplitude, frequency, phase; return the number of rows."""
+    """Write the segment of an endless sine (amplitude, frequency, phase); return the row count."""
     rows = put(table, 0, 0.0, SINE, 0.0, fields[0], 2.0 * math.pi * fields[1], fields[2])
     return close(table, rows, math.inf)
 
@@ -78,7 +78,10 @@ def rate_of(time_constant: float) -> float:
 
 
 def rectangle(fields: Any, table: Any) -> int:
-    """Write the table of a rectangle: fields amplitude, width, rise, decay; return the number of rows."""
+    """Write the segments of a rectangular pulse with the fields amplitude, width, rise, decay.
+
+    Return the number of rows. `rise` and `decay` are time constants, s.
+    """
     amplitude, width = fields[0], fields[1]
     up, down = rate_of(fields[2]), rate_of(fields[3])
     if math.isinf(up):
@@ -94,7 +97,10 @@ def rectangle(fields: Any, table: Any) -> int:
 
 
 def trapezoid(fields: Any, table: Any) -> int:
-    """Write the table of a trapezoid: fields amplitude, rise, width, fall; return the number of rows."""
+    """Write the segments of a trapezoidal pulse with the fields amplitude, rise, width, fall.
+
+    Return the number of rows. `rise` and `fall` are durations, s.
+    """
     amplitude, width = fields[0], fields[2]
     up, down = rate_of(fields[1]), rate_of(fields[3])
     rows = 0
@@ -110,7 +116,7 @@ def trapezoid(fields: Any, table: Any) -> int:
 
 
 def sampled(fields: Any, table: Any) -> int:
-    """Write the table of a sampled record, interpolated by shape-preserving cubics; return the row count.
+    """Write the segments of a sampled waveform, shape-preserving cubics; return the row count.
 
     `fields` contains the n times and then the n values; the table has room for n + 1 rows. The slopes are
     those of `scipy.interpolate.PchipInterpolator`.
@@ -150,12 +156,12 @@ def put_off(fields: Any, table: Any, row: int, at: float) -> int:
 
 
 def rail(fields: Any, table: Any) -> int:
-    """Write the table of a rail driver: supply on, supply off; return the number of rows."""
+    """Write the segments of a pulse from a voltage rail: supply on, supply off; return the row count."""
     return put_off(fields, table, put_on(fields, table, 0, 0.0, math.inf, 0.0), fields[_WIDTH])
 
 
 def chopper(fields: Any, table: Any) -> int:
-    """Write the table of a chopper, with its thresholds or its off-time; return the number of rows."""
+    """Write the segments of a chopped pulse, by thresholds or off-time; return the row count."""
     upper, lower, off_time = fields[_OWN], fields[_OWN + 1], fields[_OWN + 2]
     if math.isnan(lower):
         lower = -off_time
@@ -163,27 +169,30 @@ def chopper(fields: Any, table: Any) -> int:
 
 
 def peak_and_hold(fields: Any, table: Any) -> int:
-    """Write the table of a peak-and-hold driver: supply on, then chopping; return the number of rows."""
+    """Write the segments of a peak-and-hold pulse: supply on, chopping, supply off; return the row count."""
     rows = put_on(fields, table, 0, 0.0, math.inf, 0.0)
     rows = put_on(fields, table, rows, fields[_OWN], fields[_OWN + 1], fields[_OWN + 2])
     return put_off(fields, table, rows, fields[_WIDTH])
 
 
 def capacitor(fields: Any, table: Any) -> int:
-    """Write the table of a capacitor driver: capacitor connected, supply off; return the number of rows."""
+    """Write the segments of a capacitor pulse: capacitor connected, supply off; return the row count."""
     rows = put(table, 0, 0.0, RESERVOIR, fields[_VOLTAGE], series_of(fields), 0.0, 0.0)
     return put_off(fields, table, rows, fields[_WIDTH])
 
 
 def bridge(fields: Any, table: Any) -> int:
-    """Write the table of an H-bridge: supply on, supply reversed, supply off; return the number of rows."""
+    """Write the segments of an H-bridge pulse: supply on, reversed, off; return the row count."""
     rows = put_on(fields, table, 0, 0.0, math.inf, 0.0)
     rows = put(table, rows, fields[_WIDTH], SWITCHED, -fields[_VOLTAGE], series_of(fields), math.inf, 0.0)
     return put_off(fields, table, rows, fields[_WIDTH] + fields[_OWN])
 
 
 def fill_supply(fields: Any, reservoir: bool, supply: Any, at: int) -> None:
-    """Write the supply of a driver to an array, from index `at`: fields of `drive.waveforms.base.Supply`."""
+    """Write the supply of a driver (a `Supply`) to the array `supply`, starting at index `at`.
+
+    `fields` are the fields of the waveform; `reservoir` is true if a capacitor supplies the coil.
+    """
     supply[at], supply[at + 1] = fields[_DIODE_VOLTAGE], 0.0
     supply[at + 2] = fields[_OWN] if reservoir else 0.0
     supply[at + 3] = fields[_OWN + 1] if reservoir else 0.0

@@ -390,7 +390,7 @@ class Hammer:
 
     @property
     def files(self) -> dict[str, str]:
-        """Names of the tables to which the hammer file refers, relative to its folder, by part or entry."""
+        """Paths of the table files, relative to the folder of the hammer file, by role, entry or term."""
         models = {"magnet": self.magnet, "waveform": self.waveform, **self.terms}
         names = {key: getattr(model, "file", None) for key, model in models.items()}
         return {key: name for key, name in names.items() if name}

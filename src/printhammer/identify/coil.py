@@ -247,7 +247,7 @@ class CurrentLaw:
     def missing(self, p: FloatArray) -> dict[str, FloatArray]:
         """Return the derivatives of the currents with respect to undeclared probe errors.
 
-        The keys are the texts of `SIGNS`, which advise to state or fit the error.
+        The keys are the texts of `SIGNS`, which suggest stating or fitting the error.
         """
         short = _SHORT * self.step
         steps = {"offset": 1.0, "gain": 1.0, "delay": short, "time constant": short}

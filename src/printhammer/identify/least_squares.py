@@ -196,7 +196,7 @@ def _finite_solution(
 
 
 def _at_bound(solution: Solution) -> BoolArray:
-    """Mask of the parameters that ended at a bound, shape (n,)."""
+    """Return the mask, shape (n,), of the parameters that ended at a bound."""
     space, p = solution.parameters, solution.p
     room = np.minimum(p - space.low, space.high - p)
     at_bound: BoolArray = room <= _AT_BOUND * np.maximum(np.abs(p), np.abs(space.start))
@@ -484,7 +484,7 @@ def _is_exact(data: FloatArray, residuals: FloatArray) -> bool:
 
 
 def _inside(jacobian: FloatArray, residuals: FloatArray, variance: FloatArray, used: BoolArray) -> BoolArray:
-    """Mask of the rows whose residuals are consistent with the noise."""
+    """Return the mask of the rows whose residuals are consistent with the noise."""
     from scipy.special import ndtri
 
     root = np.sqrt(variance)

@@ -43,14 +43,17 @@ def running_median(values: FloatArray, width: int) -> FloatArray:
 
 
 def spikes_of(values: FloatArray, noise: float) -> BoolArray:
-    """Mask of the samples that differ from their neighbours by more than noise and slope can explain."""
+    """Return the mask of samples that differ from their neighbours by more than noise and slope explain."""
     middle = running_median(values, 5)
     padded = np.pad(middle, 2, mode="edge")
     return np.abs(values - middle) > _SPIKE * noise + np.abs(padded[4:] - padded[:-4])
 
 
 def outliers_of(residuals: FloatArray, floor: float) -> BoolArray:
-    """Mask of the outliers: residuals above the threshold times the robust scale (at least `floor`)."""
+    """Return the mask of the outliers: absolute residuals above `_FAR` times the robust scale.
+
+    The scale is at least `floor`, in the unit of the residuals.
+    """
     return np.abs(residuals) > _FAR * max(robust_scale(residuals), floor)
 
 
@@ -94,8 +97,8 @@ def variance_of(
 
     The iteration multiplies each component by the square root of the ratio of its observed to its expected
     score; superfluous components tend to zero. `spread`, shape (m, q), contains the coefficients of the
-    components; only the used rows count, with a correction for the fitted `parameters`. With `clipped`, large
-    residuals are clipped, for use while the outliers are unknown.
+    components. The estimate is from the rows in the mask `used`, with a correction for the number of fitted
+    `parameters`. With `clipped`, large residuals are clipped, for use while the outliers are unknown.
     """
     from scipy.special import chdtr, chdtrc
 

@@ -74,7 +74,7 @@ class Part(BaseModel):
 
     @classmethod
     def names(cls) -> tuple[str, ...]:
-        """Names of the fields in `numbers`: physical constants, then options, in order of declaration."""
+        """Return the names of the fields in `numbers`: physical constants, then options, as declared."""
         further = (name for name, kind in options(cls).items() if kind is bool or get_origin(kind) is Literal)
         return (*quantities(cls), *further)
 

@@ -178,12 +178,16 @@ def scales_of(
 
 
 def control_of(scales: tuple[float, float], tolerance: float) -> tuple[float, float, float, float]:
-    """Return the step-size control of the kernel: scales, and tolerances of the two error estimates."""
+    """Return the kernel's step-size control: `scales` (m, m/s), and tolerances of the two error estimates."""
     return (*scales, *allowances(tolerance))
 
 
 def bounds_of(hammer: Hammer, scales: tuple[float, float]) -> tuple[float, float, float, float]:
-    """Return the displacement range of the force law, the origin, and the runaway distance, all in m."""
+    """Return (lowest, highest, origin, farthest) for the kernel's checks of the displacement, all in m.
+
+    The laws of magnet and spring are valid from `lowest` to `highest`. Beyond `farthest` from the origin, the
+    position of the backstop or 0, the run ends as a runaway. `scales` are from `scales_of`.
+    """
     low, high = hammer.domain
     return (low, high, hammer.origin, FAR * scales[0])
 

@@ -244,7 +244,8 @@ def is_held(mode: float) -> bool:
 def is_settled(window: Window, x: float, v: float, rest: float, front: float) -> bool:
     """Whether an armature at x [m] with the velocity v [m/s] is at rest, by the thresholds of `is_enough`.
 
-    `front` is the front of the pack, m, or the rest position plus the reach of the motion.
+    `front` is the position [m] of the front of the pack or, for a hammer that does not rest clear of a pack,
+    the rest position plus the largest distance of the motion from rest.
     """
     span = window.wait if math.isnan(window.flight) else FLIGHTS * window.flight
     return is_window(True, math.nan, x, v, rest, front, span)

@@ -74,7 +74,7 @@ class Cloud(NamedTuple):
         return cls(cKDTree(points), float(np.quantile(apart, REACH)))
 
     def holds(self, points: FloatArray) -> BoolArray:
-        """Mask, shape (...), of the trains whose points, shape (..., n, 2), lie on the attractor."""
+        """Return the mask, shape (...), of trains whose points, shape (..., n, 2), lie on the attractor."""
         apart, _ = self.tree.query(points, distance_upper_bound=self.reach)
         return np.asarray(np.isfinite(apart).mean(axis=-1) >= INSIDE)
 
@@ -239,7 +239,7 @@ class Attractors:
 
 
 def _agree(orbits: FloatArray, known: FloatArray) -> BoolArray:
-    """Mask of the orbits, shape (n, q, 2), that equal a known orbit, shape (q, 2), up to a cyclic shift."""
+    """Return the mask of orbits, shape (n, q, 2), that equal a known orbit up to a cyclic shift."""
     count = len(known)
     # The point nearest to the first point gives the shift.
     shift = np.abs(known - orbits[:, :1]).max(axis=2).argmin(axis=1)

@@ -278,7 +278,7 @@ class Bifurcation(Result, rows="direction column"):
         ]
 
     def _sensitive(self) -> list[str]:
-        """State the number of periods that change at finer tolerances; an empty list if no period changes."""
+        """Report the number of periods that change at finer tolerances; an empty list if none changes."""
         count = int(self.sensitive.sum())
         whose = "1 period changes" if count == 1 else f"{count} periods change"
         return [f"{whose} at a finer tolerance: rounding decides the length of long cycles."] if count else []
@@ -392,7 +392,7 @@ class Bifurcation(Result, rows="direction column"):
 
 
 def hysteresis(diagram: Bifurcation) -> BoolArray:
-    """Mask of the parameter values at which rising and falling parameters lead to different attractors.
+    """Return the mask of parameter values whose attractors, for rising and falling parameter, differ.
 
     Periodic trains differ if their periods differ or their orbits are farther apart than
     `printhammer.chaos.bifurcation.builder.SAME`; an aperiodic train differs from every periodic train and

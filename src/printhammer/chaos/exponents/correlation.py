@@ -202,7 +202,10 @@ def _slope(radius: FloatArray, sums: FloatArray) -> float:
 
 
 def _plateau(slopes: FloatArray, tolerance: float) -> tuple[int, int] | None:
-    """Find the longest run of slopes within a tolerance, the flattest of equal length; return end indices."""
+    """Return the first and last index of the longest run of slopes whose range is at most the tolerance.
+
+    Of runs of equal length, the run with the smallest range is returned; None if all runs are too short.
+    """
     best: tuple[int, float, int] | None = None
     for first in range(len(slopes)):
         least, most = math.inf, -math.inf

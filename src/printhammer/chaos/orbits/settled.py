@@ -67,9 +67,9 @@ class Settled(Declared):
 
 
 def shown(points: FloatArray, period: int) -> BoolArray:
-    """Mask of the motions whose states alone prove the period `period`, without a Newton test.
+    """Return the mask of motions whose states alone prove the period `period`, without a Newton test.
 
-    Points, shape (n, m, k), are the states at m successive firings, divided by the scales.
+    `points`, shape (n, m, k), are the states at m successive firings, divided by the scales.
     """
     _early, late = _apart(points, period, period)
     clear = np.asarray(late <= AGREES)

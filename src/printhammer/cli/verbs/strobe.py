@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     "printhammer strobe hendriks-1983 --period '1.15 ms' --points 200 --out points.csv",
     {
         **opt.FIRED_TRAIN,
-        "points": opt.whole("Number of points (firings recorded).", default=200),
-        "transient": opt.whole("Number of firings to discard before the first point.", default=0),
+        "points": opt.whole("Number of strobe points, one per recorded firing.", default=200),
+        "transient": opt.whole("Number of firings to discard before the first strobe point.", default=0),
         "phase": opt.number("Sampling phase after each firing, as a fraction of the period.", metavar="P"),
         "tolerance": opt.TOLERANCE,
         "verdict": opt.switch("Classify the motion from firings 1001 to 2000.", default=True),
     },
-    out=opt.results("the points"),
+    out=opt.results("the strobe points"),
 )
 def strobe(job: Job, hammer: Hammer = opt.HAMMER, units: Units = opt.UNITS, **passed: Any) -> Answer:
     """Sample the state at each firing of a periodic drive; classify the motion as periodic or chaotic.

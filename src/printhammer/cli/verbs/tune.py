@@ -86,7 +86,7 @@ _MOST_RATES: Final = 2000  # Largest number of rates of a table; arbitrary
         ),
         "driver": opt.choice(
             "own|switch",
-            "Driver of the coil: the hammer's pulse (own) or a fast unipolar driver (switch).",
+            "Driver of the coil: as in the hammer file (own), or a fast unipolar driver (switch).",
             default="own",
         ),
         "largest_current": opt.text(
@@ -199,8 +199,8 @@ _PANEL: Final = "The sensor"
         ),
         "driver": opt.choice(
             "own|switch",
-            "Driver of the coil: the hammer's pulse (own) or a fast unipolar driver (switch); default:"
-            " own if the hammer has a voltage driver, else switch.",
+            "Driver of the coil: as in the hammer file (own), or a fast unipolar driver (switch);"
+            " default: own if the hammer has a voltage driver, else switch.",
         ),
         "history": opt.whole("Number of preceding gaps that select a table entry, 1 to 4.", default=2),
         "reach": opt.whole(

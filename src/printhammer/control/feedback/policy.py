@@ -40,7 +40,7 @@ from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.threads import Progress
 
 OFFSETS: Final = (-0.07, 0.0, 0.07)  # Arbitrary
-"""Distances of the pack beyond nominal, one for each map, as fractions of the stroke; evenly spaced."""
+"""Displacements of the pack from its nominal position, one per map, in strokes; evenly spaced."""
 
 STEPS: Final = 100
 """Number of steps of the progress bar for each distance of the pack; arbitrary."""
@@ -53,7 +53,7 @@ MIDDLE: Final = 1  # Index of the nominal distance
 
 @dataclass(frozen=True)
 class Fronts:
-    """Impact maps and soft landings for packs at several distances."""
+    """Impact maps and brake pulses for soft landings, for several distances of the pack from the backstop."""
 
     # One impact map for each of `OFFSETS`, with the same touches and the same actions
     maps: tuple[ImpactMap, ...]
@@ -69,12 +69,12 @@ class Fronts:
 
     @property
     def landing(self) -> Landing:
-        """Soft landings for the nominal distance of the pack."""
+        """Brake pulses for soft landings with the pack at its nominal distance."""
         return self.landings[MIDDLE]
 
 
 def fronts(plant: Plant, forces: ForceMap, start: Launch, progress: Progress | None = None) -> Fronts:
-    """Compute impact maps and soft landings for every distance of the pack.
+    """Compute impact maps and brake pulses for soft landings, for the pack distances of `OFFSETS`.
 
     `progress(done, total)` is called after each step; there are `STEPS` steps per distance.
     """

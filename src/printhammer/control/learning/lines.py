@@ -272,7 +272,7 @@ class Press:
         return np.asarray(np.fmax.reduce(np.abs(growth).reshape(len(_STEPS), count)))
 
     def order_ladder(self, rungs: Sequence[Rung]) -> Printing[tuple[FloatArray, FloatArray]]:
-        """Coroutine form of `ladder`: yield the print job, receive its result, and compute the readings."""
+        """Compute the readings of `ladder` in a coroutine: yield the print job and receive its result."""
         task, count = self.task, len(self.hammers)
         drives = []
         for rung in rungs:
@@ -298,7 +298,7 @@ class Press:
         slots: Sequence[int] = LINE,
         pulses: Sequence[Waveform] | None = None,
     ) -> Printing[tuple[DotTable, Judgement]]:
-        """Coroutine form of `line`: yield the print job, receive its result, and compute the dots."""
+        """Compute the dots of `line` in a coroutine: yield the print job and receive its result."""
         task, due = self.task, slot_times(slots, self.rate)
         fired = [task.pulse] * len(settings) if pulses is None else pulses
         known: dict[int, dict[tuple[float, float, float], Waveform]] = {id(pulse): {} for pulse in fired}

@@ -131,7 +131,7 @@ def sobol(dimensions: int, count: int) -> FloatArray:
 
 
 PRINTING_SHARES, LANDING_SHARES = 5, 4  # Number of parameters of a profile, each in [0, 1]; arbitrary
-_SPREAD: Final = 512  # Number of Sobol profiles; arbitrary
+_SPREAD: Final = 512  # Number of profiles at Sobol points; arbitrary
 _KEPT: Final = 16  # Number of profiles refined; arbitrary
 _CLOUD: Final = 32  # Number of trial points of the local search (the cloud); arbitrary
 _MOVES: Final = 8  # Number of steps of the local search; arbitrary
@@ -144,7 +144,7 @@ def printing_profile(
 ) -> FloatArray:
     """Return currents [A], shape (n, nodes), that brake, hold and throw the armature.
 
-    `shares`, shape (n, `PRINTING_SHARES`), in [0, 1], are three current levels and two switching times.
+    `shares`, shape (n, `PRINTING_SHARES`), in [0, 1], set three current levels and two switching times.
     `largest` is the current limit, A; the slot lasts `duration`, and its dot is due at `arrival`, both in s.
     """
     low, high = np.array([0.0, 0.0, 0.3]), np.array([1.0, 0.6, 1.0])
@@ -157,8 +157,8 @@ def printing_profile(
 def landing_profile(shares: FloatArray, largest: float, duration: float, nodes: int) -> FloatArray:
     """Return currents [A], shape (n, nodes - 1), that brake the armature and lower it onto the backstop.
 
-    The arguments are as for `printing_profile`, with shares of shape (n, `LANDING_SHARES`); the last node,
-    where the current is zero, is omitted.
+    The arguments are as for `printing_profile`, but `shares` has the shape (n, `LANDING_SHARES`) and sets two
+    current levels and two switching times. The last node, where the current is zero, is omitted.
     """
     caught = 0.7 * duration * shares[:, 2]
     landed = caught + shares[:, 3] * (duration - caught)
@@ -171,9 +171,10 @@ def refined(
     badness: Callable[[FloatArray], FloatArray],
     count: int,
 ) -> tuple[FloatArray, FloatArray]:
-    """Evaluate Sobol profiles and refine the best; return currents, shape (n, nodes), and objectives.
+    """Evaluate profiles at Sobol points and refine the best; return the currents and objectives of the best.
 
-    `profile` maps shares, shape (n, `count`), to currents, `badness` maps currents to the objective.
+    `profile` maps points of the unit cube, shape (n, `count`), to currents [A], shape (n, nodes); `badness`
+    maps the currents to the objectives, shape (n,).
     """
     places = sobol(count, _SPREAD)
     bad = badness(profile(places))

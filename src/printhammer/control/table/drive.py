@@ -8,7 +8,7 @@ Histories are numbered as n digits to the base G + 1 with the latest gap as the 
 is the index that the firmware computes. Numbers with a nonzero digit after a rest are aliases of the number
 with rest in all later digits.
 
-Drivers of the coil: the hammer's own pulse, a fast switch on a higher rail, or an H-bridge.
+Drivers of the coil: the driver of the hammer file, a fast switch on a higher rail, or an H-bridge.
 """
 
 from __future__ import annotations
@@ -223,7 +223,7 @@ def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
 
 
 def fading(hammer: Hammer, pulse: Waveform, share: float) -> float:
-    """Return the time [s] from the end of a pulse until the current stays below `share` times its peak.
+    """Return the time [s] from the end of a pulse until its current stays below `share` times its peak.
 
     For a driver this is the first time at which the current has decayed; later induced currents are ignored.
     """
@@ -238,8 +238,9 @@ def fading(hammer: Hammer, pulse: Waveform, share: float) -> float:
 def clearance(hammer: Hammer, pulse: Waveform, width: float, largest: float) -> float:
     """Return the time [s] from the end of a brake pulse to the earliest start of the next pulse.
 
-    By then the brake pulse has decayed so far that two consecutive pulses of the largest width stay within
-    the current limit, A.
+    The brake pulse has the width `width` [s]. For a current, the next pulse may have the same width: the sum
+    of both pulses stays within the current limit `largest` [A]. For a driver, the wait lasts until the
+    current has decayed to `MARGIN` times its peak.
     """
     wide = of_width(pulse, width)
     if pulse.quantity == "voltage":
@@ -305,9 +306,9 @@ def sequence(
 
 Driver = Literal["own", "switch", "bridge"]
 DRIVERS: Final = get_args(Driver)
-"""Drivers: the hammer's own pulse, with the rise of its supply; a fast unipolar switch, whose current rises
-as fast as the current of the hammer's own pulse falls; an H-bridge, which switches off against the reversed
-rail."""
+"""Drivers: the driver of the hammer file, with the rise of its supply; a fast unipolar switch, whose current
+rises as fast as the current of the hammer's own pulse falls; an H-bridge, which switches off against the
+reversed rail."""
 
 # Decay time constant against the reversed rail over that of the rise: the current falls as 2 exp(-t) - 1 and
 # is zero at ln 2; an exponential decay with this constant carries the same charge.

@@ -182,8 +182,8 @@ def tune(
         Whether width and advance are fitted by least squares to the perturbed hammers too, instead of to
         `hammer` alone.
     driver : str, optional
-        Driver of the coil, one of `DRIVERS` in `printhammer.control.table.drive`: "own", the pulse of the
-        hammer or the driver of its coil; "switch", a fast unipolar switch; or "bridge", an H-bridge. A
+        Driver of the coil, one of `DRIVERS` in `printhammer.control.table.drive`: "own", the driver
+        of the hammer file; "switch", a fast unipolar switch; or "bridge", an H-bridge. A
         switch or bridge replaces a current; its dot from rest has the force of the hammer's own pulse,
         and is fired later, to arrive at the same time.
     variability : Variability, optional

@@ -129,8 +129,8 @@ def find_touches(
 
     A contact lasts from the crossing of the surface by the smoothed record to the crossing back; excursions
     within the threshold, to either side, are ignored. A hard pack may yield by less than `_CLEAR` of the
-    stroke: if no contact with the pack exceeds the threshold, contacts count that are deeper than the noise
-    and than half of the largest depth (arbitrary).
+    stroke: if no contact with the pack is deeper than the threshold, the threshold for the pack is lowered to
+    the noise or to half of the largest depth (arbitrary), whichever is larger.
     """
     stroke = stroke_of(hammer, x)
     wanted = (noise / (0.25 * _CLEAR * stroke)) ** 2
@@ -151,7 +151,7 @@ def find_touches(
 
 
 def _visits(surface: Surface, depth: FloatArray, clear: float) -> list[Touch]:
-    """Find the sample intervals beyond a surface; crossings within the noise do not end an interval."""
+    """Find the sample intervals beyond a surface; crossings within `clear` [m] do not end an interval."""
     touches: list[Touch] = []
     inside, outside = np.flatnonzero(depth > clear), np.flatnonzero(depth < -clear)
     row = 0

@@ -61,7 +61,7 @@ def cycles_of(table: Readings) -> Cycles:
 
 
 def _by_sense(depth: FloatArray) -> BoolArray:
-    """Mask of the unloading rows: between a local maximum of the indentation and the next minimum."""
+    """Return the mask of the unloading rows, between a maximum of the indentation and the next minimum."""
     unloading = np.zeros(len(depth), dtype=bool)
     least = _TURN * float(np.ptp(depth))
     extreme, falling = 0, False

@@ -158,7 +158,7 @@ def note_samples(
     x: Any,
     b: float,
 ) -> None:
-    """Store the samples in a lane's latest step before time `until` [s], or up to `until` if `last`.
+    """Store the samples of a lane's latest step that are due before time `until` [s]; at `until`, if `last`.
 
     With `fine`, an additional force evaluation raises the order of the interpolation by one.
     """
@@ -188,7 +188,7 @@ def note_strobes(
     train: Train,
     hammer: Hammer,
 ) -> None:
-    """Store the strobes in a lane's latest step before time `until` [s], or up to `until` if `last`.
+    """Store the strobes of a lane's latest step that are due before time `until` [s]; at `until`, if `last`.
 
     A strobe at the end of a step is stored with the next step, which determines its mode.
     """

@@ -30,8 +30,8 @@ LONGEST_STEP, LEAST_SHARE = 1.0, 2.0**-7
 """Longest Newton step, in half-widths of the window, and smallest damping factor; as in
 `printhammer.chaos.orbits.newton`."""
 NEAR, LIES_ON = 0.1, 1e-6
-"""Distances from an orbit, in half-widths, within which the orbit is sought, and within which a state lies on
-the orbit; as in `printhammer.chaos.orbits.settled`."""
+"""Distances from an orbit, in half-widths of the strobe window, within which the orbit is sought, and within
+which a state lies on the orbit; as in `printhammer.chaos.orbits.settled`."""
 STILL_COIL = 1e-9
 """Current, relative to a typical current, below which the coil is treated as currentless; as in
 `printhammer.chaos.strobe.map`."""
@@ -250,7 +250,7 @@ def has_settled(states: Any, scales: Any, orbit: Any, search: Any, outcome: int,
     states : float64 array, shape (n, any)
         States at successive firings: displacement [m], velocity [m/s] and more columns, which are ignored.
     scales : float64 array
-        Half-widths of the window, m and m/s, first.
+        Half-widths of the strobe window, m and m/s, in the first two elements.
     orbit : float64 array, shape (m, 10)
         See `ORBIT`.
     search : float64 array, shape (4,)
@@ -276,7 +276,7 @@ def has_settled(states: Any, scales: Any, orbit: Any, search: Any, outcome: int,
 def gap_at(states: Any, scales: Any, orbit: Any, block: int, shift: int) -> float:
     """Return the largest distance of one period of states from an orbit, shifted by `shift` firings.
 
-    Arrays as for `has_settled`; the distance is divided by the half-widths.
+    Arrays as for `has_settled`; differences are divided by `scales`, the half-widths of the strobe window.
     """
     count = orbit.shape[0]
     begin = states.shape[0] % count + block * count
@@ -291,7 +291,8 @@ def gap_at(states: Any, scales: Any, orbit: Any, block: int, shift: int) -> floa
 def is_approaching(states: Any, scales: Any, orbit: Any, lies_on: float) -> bool:
     """Whether states lie on an orbit or approach it; see `printhammer.chaos.orbits.settled`.
 
-    Arrays as for `has_settled`; `lies_on`, in half-widths, is the distance of states that lie on the orbit.
+    Arrays as for `has_settled`. States lie on the orbit if their distance, in half-widths of the strobe
+    window, is at most `lies_on`.
     """
     count = orbit.shape[0]
     blocks = states.shape[0] // count

@@ -93,7 +93,7 @@ def sensible_step(h: float, x: float, v: float, a: float, mode: int, hammer: Ham
 
 @compiled
 def out_of_bounds(x: float, bounds: Any) -> int:
-    """Return OK, RANGE_LEFT or RUNAWAY for a displacement; `bounds` is (lowest, highest, origin, far)."""
+    """Return OK, RANGE_LEFT or RUNAWAY for a displacement; `bounds` as from `run.problem.bounds_of`, m."""
     if not (bounds[0] <= x <= bounds[1]):
         return M.RANGE_LEFT
     if abs(x - bounds[2]) > bounds[3]:

@@ -126,7 +126,7 @@ def read_table(
         Columns whose empty cells become NaN.
     columns : str, optional
         Declaration of the columns; by default the file beside the table, or else its heading.
-        Without this argument, messages advise a file beside the table instead of ``--columns``.
+        If this argument is omitted, error messages suggest such a file instead of the option ``--columns``.
     what : str, optional
         Name of the file in error messages.
 
@@ -163,7 +163,8 @@ def readings_of(
 ) -> Readings:
     """Convert a table to quantities; arguments and errors as for `read_table`.
 
-    Messages advise the option ``--columns`` if the caller has that `option`, else a file beside the table.
+    Error messages suggest the option ``--columns`` if `option` is true, else a file of columns beside the
+    table.
     """
     numbers = {**required, **optional}
     wanted = _wanted(required, optional, text)
