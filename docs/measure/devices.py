@@ -55,7 +55,6 @@ VERBS = {
     "basins --quench": "basins {device} --quench --gaps {gaps} --widths {widths}",
     "sweep": "sweep spec.toml --out members.csv",
     "tune": "tune {device} --rate {fast} --history 1 --reach 1 --no-brake --out table.csv",
-    "learn": "learn {device} --history 1 --reach 1 --members 100 --out learned.csv",
     "dead-time": "dead-time {device} --voltage {voltage} --temperature '20 degC, 20 degC, 1'",
     "measure all": "measure all {device} --out bench",
 }
@@ -78,11 +77,10 @@ scalars = ["lost_dots"]
 """Spec of the sweep: two rates and two masses."""
 
 LIMIT = 60  # Processor time limit of a cell, s.
-LIMITS = {"learn": 600}  # Limit of verbs that simulate many hammers, s.
 
 
 class TooLongError(Exception):
-    """Raised if a cell takes longer than its time limit."""
+    """Raised if a cell takes longer than `LIMIT`."""
 
 
 def late(*_: object) -> NoReturn:
@@ -117,7 +115,7 @@ def tried(verb: str, device: str) -> tuple[int | None, str]:
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         Path("spec.toml").write_text(SPEC.format(device=device, **texts), encoding="utf-8")
-        signal.setitimer(signal.ITIMER_PROF, LIMITS.get(verb, LIMIT))
+        signal.setitimer(signal.ITIMER_PROF, LIMIT)
         try:
             with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
                 program(arguments)
@@ -138,7 +136,7 @@ def tried(verb: str, device: str) -> tuple[int | None, str]:
     return status, sentence
 
 
-WORDS = {0: "yes", 1: "in part", 2: "no", None: "too long"}
+WORDS = {0: "yes", 1: "in part", 2: "no", None: f"over {LIMIT} s"}
 """Text of a cell for each exit status."""
 
 
