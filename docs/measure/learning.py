@@ -13,24 +13,21 @@ the safe rate, for ``--keep``, and writes no table.
 
 ``--units N`` sets the number of units, ``--feedback N`` the number of units on which feedback prints a
 cycle of order 6. ``--sensors [NAME ...]`` measures other sensors instead, with names of `SENSORS` only for
-``--keep``; ``--tolerance`` measures other variabilities, and ``--family`` units of two other hammers of the
-family. ``--picture FILE`` only draws the dots of one unit
-while it learns, ``--curves FILE`` the fraction of units that print all dots, ``--tolerance-curves FILE`` the
-dots within limits against the spread of the production, ``--parts FILE`` the contributions of driver, table,
-learning and feedback.
+``--keep``; ``--safe-rate`` measures learning at the safe rate itself, ``--tolerance`` other variabilities,
+and ``--family`` units of two other hammers of the family. ``--picture FILE`` only draws the dots of one unit
+while it learns; ``drawings.py`` draws the tables.
 """
 
 import argparse
 import json
 import time
 from collections.abc import Callable
-from importlib import import_module
 from io import BytesIO
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from measured import MOTION, Cell, Column, Measured, open_loop_rate, read, write
+from measured import MOTION, Cell, Column, open_loop_rate, write
 
 import printhammer as ph
 from printhammer.control.feedback.closed_loop import FeedbackStrategy
@@ -273,6 +270,24 @@ def family(count: int, seed: int) -> list[list[Cell]]:
     return rows
 
 
+def at_safe_rate(hammer: ph.Hammer, units: list[ph.Hammer], folder: Path | None) -> list[list[Cell]]:
+    """Return the results in open loop and of learning from times, at the open-loop safe rate itself."""
+    rows, rate = [], open_loop_rate(hammer)
+    for driver in ("own", "switch"):
+        driven = driven_by(hammer, driver, 2.0)
+        fired = [with_pulse(unit, driven.waveform) for unit in units]
+        good = shares(fired, nominal(driven, tolerance=DISPLAY_TOLERANCE), rate, open_loop)
+        rows.append([f"open loop, {driver}", *cells(good), None, None])
+        print(*rows[-1], flush=True)
+    driver, name = USUAL
+    seen = kept(
+        folder,
+        "safe rate",
+        lambda: learned(law_for(hammer, rate, driver=driver, sensor=SENSORS[name])[0], units, SENSORS[name]),
+    )
+    return rows + [[f"learned from {name}, {driver}, {dots} dots", *seen.cells(dots)] for dots in AFTER]
+
+
 def looped(controller: Controller, units: list[ph.Hammer], rate: float) -> np.ndarray:
     """Return the fraction of dots within limits with feedback, for each unit, for a cycle of order 6."""
     trial = attempt(
@@ -283,128 +298,6 @@ def looped(controller: Controller, units: list[ph.Hammer], rate: float) -> np.nd
         tolerance=DISPLAY_TOLERANCE,
     )
     return trial.judgement.good.mean(axis=1)
-
-
-def at_asked(table: Measured) -> str:
-    """Format the rate of a table for the caption of a picture."""
-    return f"{ASKED * table.settings['safe_rate']:,.0f} Hz"
-
-
-def tolerance_curves(path: Path) -> None:
-    """Draw the measured fraction of dots within limits against the spread of the production."""
-    style = import_module("printhammer.figures.elements.style")
-    looks = {
-        "open loop, own": (style.MUTED, "-", "o"),
-        "open loop, switch": (style.MUTED, "--", "o"),
-        "table, switch": (style.YELLOW, "-", "s"),
-        "robust table, switch": (style.ORANGE, "--", "^"),
-        "learned from time, switch": (style.BLUE, "--", "D"),
-        "learned from time and force, switch": (style.BLUE, "-", "D"),
-    }
-    table = read("learning-tolerance")
-    looks |= {row[1]: (style.GREEN, "-", "v") for row in table.rows if str(row[1]).startswith("feedback")}
-    with style.in_style():
-        figure = style.new_figure(3.4)
-        ax = figure.subplots()
-        for way, (colour, line, mark) in looks.items():
-            points = [(row[0], row[2]) for row in table.rows if row[1] == way]
-            ax.plot(
-                *zip(*points, strict=True),
-                color=colour,
-                linestyle=line,
-                marker=mark,
-                markersize=4,
-                label=way,
-            )
-        ax.set_ylim(-3.0, 103.0)
-        ax.margins(x=0.05)
-        ax.set_xlabel("Standard deviations of the production / stated ones")
-        ax.set_ylabel("Dots within limits  [%]")
-        ax.legend(fontsize=style.SMALL, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
-        style.foot(figure, " · ".join([*table.hammers, at_asked(table), f"{table.settings['units']} units"]))
-        drawn = BytesIO()
-        figure.savefig(drawn, dpi=110)
-    path.write_bytes(drawn.getvalue())
-
-
-def parts(path: Path) -> None:
-    """Draw the measured contributions of driver, table, learning and feedback at 1.5 times the safe rate."""
-    style = import_module("printhammer.figures.elements.style")
-    looks = {
-        "open loop, own": style.MUTED,
-        "open loop, switch": style.MUTED,
-        "robust table, switch": style.ORANGE,
-        "learned from time, switch, 1000 dots": style.BLUE,
-        "learned from time and force, switch, 1000 dots": style.BLUE,
-        "feedback, sensor blinded": style.GREEN,
-        "feedback": style.GREEN,
-    }
-    learned, seen = read("learning"), read("learning-feedback")
-    shares = {str(row[1]): float(str(row[3])) for row in learned.rows if row[0] == ASKED}
-    shares |= {str(row[1]): float(str(row[2])) for row in seen.rows if row[0] == ASKED}
-    with style.in_style():
-        figure = style.new_figure(2.8)
-        ax = figure.subplots()
-        ways = list(looks)[::-1]
-        ax.barh(ways, [shares[way] for way in ways], color=[looks[way] for way in ways])
-        for place, way in enumerate(ways):
-            ax.annotate(
-                f"{shares[way]:.0f} %",
-                (shares[way], place),
-                xytext=(-4, 0),
-                textcoords="offset points",
-                ha="right",
-                va="center",
-                color="white",
-            )
-        ax.set_xlim(0.0, 100.0)
-        ax.set_xlabel("Dots within limits at 1.5 times the open-loop safe rate  [%]")
-        counts = f"{learned.settings['units']} units, feedback {seen.settings['units']}"
-        style.foot(figure, " · ".join([*learned.hammers, at_asked(learned), counts]))
-        drawn = BytesIO()
-        figure.savefig(drawn, dpi=110)
-    path.write_bytes(drawn.getvalue())
-
-
-def curves(path: Path) -> None:
-    """Draw the measured fraction of units that print all dots, against rate, for each strategy."""
-    style = import_module("printhammer.figures.elements.style")
-    looks = {
-        "open loop, own": (style.MUTED, "-", "o"),
-        "table, own": (style.YELLOW, "--", "s"),
-        "table, switch": (style.YELLOW, "-", "s"),
-        "robust table, switch": (style.ORANGE, "-", "^"),
-        "learned from time, switch, 1000 dots": (style.BLUE, "--", "D"),
-        "learned from time and force, switch, 1000 dots": (style.BLUE, "-", "D"),
-        "feedback, sensor blinded": (style.GREEN, "--", "v"),
-        "feedback": (style.GREEN, "-", "v"),
-    }
-    learned, seen = read("learning"), read("learning-feedback")
-    points = [(row[0], row[1], 100.0 * row[4] / row[2]) for row in learned.rows]
-    points += [(row[0], row[1], 100.0 * row[3] / seen.settings["units"]) for row in seen.rows]
-    with style.in_style():
-        figure = style.new_figure(3.6)
-        ax = figure.subplots()
-        for way, (colour, line, mark) in looks.items():
-            ax.plot(
-                *zip(*((x, y) for x, name, y in points if name == way), strict=True),
-                color=colour,
-                linestyle=line,
-                marker=mark,
-                markersize=4,
-                label=way,
-            )
-        ax.set_ylim(-3.0, 103.0)
-        ax.margins(x=0.05)
-        ax.set_xticks(SHARES)
-        ax.set_xlabel("Rate / open-loop safe rate of the nominal hammer")
-        ax.set_ylabel("Units that print all dots  [%]")
-        ax.legend(fontsize=style.SMALL, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
-        sizes = f"{learned.settings['units']} units, {min(row[2] for row in learned.rows)} of some strategies"
-        style.foot(figure, f"{', '.join(learned.hammers)} · {sizes}, feedback {seen.settings['units']}")
-        drawn = BytesIO()
-        figure.savefig(drawn, dpi=110)
-    path.write_bytes(drawn.getvalue())
 
 
 def tolerance(hammer: ph.Hammer, count: int, seed: int) -> list[list[Cell]]:
@@ -443,21 +336,14 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--feedback", type=int)
     parser.add_argument("--sensors", nargs="*", choices=SENSORS)
+    parser.add_argument("--safe-rate", action="store_true")
     parser.add_argument("--tolerance", action="store_true")
     parser.add_argument("--family", action="store_true")
     parser.add_argument("--picture", type=Path)
-    parser.add_argument("--curves", type=Path)
-    parser.add_argument("--tolerance-curves", type=Path)
-    parser.add_argument("--parts", type=Path)
     parser.add_argument("--keep", type=Path)
     parser.add_argument("--at", type=float, nargs="+", choices=SHARES)
     asked = parser.parse_args()
     hammer = ph.load("hendriks-1983")
-    drawings = ((asked.curves, curves), (asked.tolerance_curves, tolerance_curves), (asked.parts, parts))
-    for path, draw in drawings:
-        if path is not None:
-            draw(path)
-            return
     if asked.picture is not None:
         drawn = BytesIO()
         unit = Variability().draw(hammer, asked.units, asked.seed)[SHOWN]
@@ -474,6 +360,9 @@ def main() -> None:
         rows = sensors(hammer, units, asked.sensors or list(SENSORS), asked.keep)
         if not asked.sensors:
             write("learning-sensors", heads, rows, settings, ROOMS)
+    elif asked.safe_rate:
+        rows = at_safe_rate(hammer, units, asked.keep)
+        write("learning-safe-rate", [DRIVE, *GOOD, *FEWER], rows, settings, ROOMS)
     elif asked.family:
         heads = [Column(name="hammer of the family"), DRIVE, *GOOD]
         names = tuple(f"hendriks-1983-family-{number}" for number in FAMILY)
