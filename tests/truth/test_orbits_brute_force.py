@@ -88,6 +88,10 @@ def test_a_brute_force_finds_no_further_orbit(orbits: Orbits, firings: int, leas
 def test_the_indices_of_the_listed_orbits_add_up_to_one(orbits: Orbits) -> None:
     """The list includes two mirror pairs of saddles, with multipliers of 719 and 2131, whose index is -1."""
     assert orbits.indices == {1: 1, 2: 1, 3: 1}
+    assert len(orbits) == 57
+    # Mirror images are not independent guesses, on which the estimate of the coverage rests.
+    assert 0 in orbits.hits
+    assert sum(orbits.hits) <= len(orbits) + orbits.repeats
     assert orbits.incomplete == ()
     multipliers = [own.multipliers[0].real for own in orbits]
     for expected in (718.8952, 2130.9476):

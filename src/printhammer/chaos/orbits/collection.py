@@ -95,7 +95,9 @@ class Orbits(Result):
     repeats: int = scalar(
         "1", "number of guesses that led to an already known orbit, or to an orbit of fewer firings"
     )
-    hits: tuple[int, ...] = scalar("1", "number of guesses that led to each orbit")
+    hits: tuple[int, ...] = scalar(
+        "1", "number of guesses that led to each orbit, without guesses near known orbits and mirror images"
+    )
     failures: Mapping[str, int] = part("number of guesses that failed, by reason")
     tolerance: float = part("tolerance of the integration")
 
@@ -151,18 +153,20 @@ class Orbits(Result):
         The Good-Turing estimate is 1 minus the fraction of guesses that converge to an orbit reached by no
         other guess (I. J. Good, Biometrika 40 (1953) 237).
         """
-        return 1.0 - self.hits.count(1) / sum(self.hits) if self.hits else math.nan
+        return 1.0 - self.hits.count(1) / sum(self.hits) if sum(self.hits) else math.nan
 
     @property
     def unseen(self) -> float:
         """Estimated lower bound on the number of orbits that the search missed.
 
         The larger of two bounds: f1 (f1 - 1) / (2 (f2 + 1)), with f1 and f2 the numbers of orbits reached
-        from exactly one and exactly two guesses (A. Chao, Scand. J. Statist. 11 (1984) 265); and the smallest
-        number of missing orbits implied by the fixed-point indices; see `fewest_missing`.
+        from exactly one and exactly two guesses (A. Chao, Scand. J. Statist. 11 (1984) 265), less the orbits
+        found only as mirror images or from guesses near known orbits; and the smallest number of missing
+        orbits implied by the fixed-point indices; see `fewest_missing`.
         """
         once, twice = self.hits.count(1), self.hits.count(2)
-        return max(0.5 * once * max(once - 1, 0) / (twice + 1), float(fewest_missing(self.indices)))
+        bound = 0.5 * once * max(once - 1, 0) / (twice + 1) - self.hits.count(0)
+        return max(bound, float(fewest_missing(self.indices)))
 
     @property
     def indices(self) -> dict[int, int]:

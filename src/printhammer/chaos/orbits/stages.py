@@ -133,7 +133,8 @@ class Search:
     """Search for periodic orbits, run in stages.
 
     Starts are divided into blocks, guesses into batches. The result of a stage depends only on stages with no
-    more starts and no more guesses, so that a larger search never loses an orbit of a smaller search.
+    more starts and no more guesses, so that a larger search never loses an orbit of a smaller search; only
+    the guesses of `_complete`, which end once the indices add up, may differ.
     """
 
     regime: Regime
@@ -144,6 +145,9 @@ class Search:
 
     def __post_init__(self) -> None:
         self.scales = self.regime.window.half_widths
+        backstop = self.regime.hammer.backstop
+        self.is_rigid = backstop is not None and backstop.law == "rigid"
+        self.lowest = np.array([self.regime.hammer.position if self.is_rigid else -np.inf, -np.inf])
         self.failures: Counter[str] = Counter()
         self.tried = [0] * self.longest
         self.repeats = 0
@@ -156,8 +160,7 @@ class Search:
         self.all = 3 + 2 * self.longest * len(self.blocks) * len(self.batches)
         (settling, *_others) = record(self.regime, rest, 1, _LONG, self.effort.threads)
         begun = np.vstack([rest, spread(self.regime, self.blocks[-1], settling.states[0])])
-        backstop = self.regime.hammer.backstop
-        if backstop is not None and backstop.law == "rigid":
+        if self.is_rigid:
             begun = np.vstack([begun, touches(self.regime, self.blocks[-1] // _TOUCHES)])
         records = record(self.regime, begun, firings_for(self.longest), _LONG, self.effort.threads)
         self._tell(1)
@@ -269,27 +272,19 @@ class Search:
             self._try(fast, different, [guess for both in returns for guess in both], stage)
             reflected = self._reflect(fast, different, reflected)
             rng = np.random.default_rng(period)
-            # The same displacements for every orbit, so that a larger search includes a smaller search.
             for move in moves_near(rng, _ROUNDS) * self.scales:
-                if _index_sum(different, period) == 1:
-                    break
                 own = [known.closing for known in different if known.closing.firings.sum() <= period]
-                if not own:
+                if not own or _index_sum(different, period) == 1:
                     break
                 starts = np.concatenate([closing.states for closing in own]) + move
-                started = motions(fast, np.maximum(starts, self._lowest()), period)
-                self._try(fast, different, started, stage)
+                started = motions(fast, np.maximum(starts, self.lowest), period)
+                self._try(fast, different, started, stage, hits=0)
                 reflected = self._reflect(fast, different, reflected)
-            if np.isfinite(self._lowest()).any() and _index_sum(different, period) != 1:
+            if self.is_rigid and _index_sum(different, period) != 1:
                 own = [known.closing for known in different if known.closing.firings.sum() == period]
-                self._try(fast, different, displaced(own, period, rng, self.scales, self._lowest()), stage)
+                moved = displaced(own, period, rng, self.scales, self.lowest)
+                self._try(fast, different, moved, stage, hits=0)
                 reflected = self._reflect(fast, different, reflected)
-
-    def _lowest(self) -> FloatArray:
-        """Return the lower bounds of displacement and velocity, which a rigid backstop sets."""
-        backstop = self.regime.hammer.backstop
-        rigid = backstop is not None and backstop.law == "rigid"
-        return np.array([self.regime.hammer.position if rigid else -np.inf, -np.inf])
 
     def _reflect(self, fast: FastMaps, different: list[_Known], begin: int) -> int:
         """Try the mirror images of the known orbits from `begin` on; return the number of known orbits."""
@@ -301,7 +296,7 @@ class Search:
             if any(state is None or not np.isfinite(state).all() for state in states):
                 continue
             images.append(Guess(np.array(states), known.closing.firings))
-        self._try(fast, different, images, (len(self.blocks) - 1, len(self.batches) - 1))
+        self._try(fast, different, images, (len(self.blocks) - 1, len(self.batches) - 1), hits=0)
         return len(different)
 
     def _batch(self, guesses: list[Guess], batch: int, period: int) -> list[Guess]:
@@ -321,14 +316,22 @@ class Search:
         return joined([orbit.closing for orbit in seen], period, _JOINED, self.scales, known)
 
     def _try(
-        self, maps: ExactMaps | FastMaps, different: list[_Known], tried: list[Guess], stage: tuple[int, int]
+        self,
+        maps: ExactMaps | FastMaps,
+        different: list[_Known],
+        tried: list[Guess],
+        stage: tuple[int, int],
+        hits: int = 1,
     ) -> None:
-        """Converge guesses by Newton's method; append new orbits, and count the hits of known orbits."""
+        """Converge guesses by Newton's method; append new orbits, and add `hits` to the hits of known orbits.
+
+        Guesses derived from known orbits have no hits, since `Orbits.coverage` assumes independent guesses.
+        """
         options = _FAST if isinstance(maps, FastMaps) else LONE
         for guess in tried:
             self.tried[int(guess.firings.sum()) - 1] += 1
         for closing in _converge(maps, tried, self.scales, options):
-            self._add(different, _Known(closing, [stage]))
+            self._add(different, _Known(closing, [stage], hits))
 
     def _refine(self, regime: Regime, different: list[_Known]) -> list[_Known]:
         """Converge the orbits of a search again at the requested tolerance."""
@@ -419,7 +422,7 @@ class Search:
 
         If the other forces are not odd, Newton's method finds no orbit, or a different orbit.
         """
-        for orbit, hits in list(described):
+        for orbit, _hits in list(described):
             regime = orbit.regime
             image = mirror_image(regime, orbit.section, self.effort.tolerance)
             if image is None or not np.isfinite(image).all():
@@ -428,7 +431,7 @@ class Search:
             guess = _guess(replace(orbit, section=image), exact)
             for closing in _converge(exact, [guess], self.scales, LONE):
                 if closing.closed:
-                    self._describe(described, [(regime, _Known(closing, [], hits))])
+                    self._describe(described, [(regime, _Known(closing, [], 0))])
 
     def _is_same(self, orbit: Orbit, other: Orbit) -> bool:
         if orbit.firings != other.firings:
