@@ -78,8 +78,8 @@ NEAR = 1e-9
 reversal is differentiable."""
 
 RELEASED = 1e-9
-"""Largest relative difference of force and static friction at a release; at an edge of the drive, and at the
-end of a run, the difference is larger."""
+"""Relative tolerance of force and static friction within which the force ended a rest; otherwise an edge of
+the drive or the end of the run ended it."""
 RELEASE_SPACING = 1e-3
 """Step size of the time for the rate of the force at a release, as a fraction of the rest."""
 
@@ -288,7 +288,7 @@ def pass_friction(node: Any, after: Any, columns: Any, setting: Setting) -> tupl
         for k in range(columns.shape[1]):
             columns[1, k] = 0.0
         return True, True
-    # Without forcing and circuit, all motions leave a rigid stop at the same time.
+    # Without forcing and circuit, the columns are zero on a rigid stop.
     if is_held(mode) or ((FORCED or HAS_CIRCUIT) and mode >= M.RESTING > following):
         return True, pass_release(node, after, columns, setting)
     if mode == following and node[4] * after[4] < 0.0 and after[2] == 0.0:

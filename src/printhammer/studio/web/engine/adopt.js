@@ -111,7 +111,7 @@ function entryOf(text, shelf, templates) {
   const { waveform: _own, ...rates } = described.start;
   const made = {
     ...described, name: "dropped file", title: "", note: "", ...words, views: shelf.readers.views(document.views ?? []), constants, combined: combinedOf(described.combined, values), waveform: waveform && shelf.readers.waveform(waveform),
-    start: waveform ? rates : described.start.waveform ? described.start : { waveform: described.waveform }, places: { backstop: place("backstop.position", described.places.backstop), front: place("pack.front", described.places.front), platen: place("platen", described.places.platen) },
+    start: waveform ? rates : described.start.waveform ? described.start : { ...rates, waveform: described.waveform }, places: { backstop: place("backstop.position", described.places.backstop), front: place("pack.front", described.places.front), platen: place("platen", described.places.platen) },
   };
   const value = valuesOf(described, values);
   checkFrictions(described, value);
