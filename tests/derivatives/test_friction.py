@@ -220,7 +220,7 @@ def coil_plunger(rng: np.random.Generator, kind: str) -> ph.Hammer:
         "force.guide": {
             "law": "friction",
             "kinetic": kinetic,
-            "static": kinetic * float(rng.choice([1.0, 1.3, 2.0])),
+            "static": kinetic * float(rng.choice([1.2, 1.5, 2.0])),
         },
         "contact.leaf": {"law": "linear", "side": "front", "position": 0.3e-3, "stiffness": 3e3},
         "magnet": {"law": "moving-coil", "constant": float(rng.uniform(2.0, 6.0))},
@@ -249,19 +249,17 @@ def coil_plunger(rng: np.random.Generator, kind: str) -> ph.Hammer:
 @pytest.mark.parametrize("kind", ["free", "stops"])
 def test_random_coils_that_release_a_held_armature(kind: str) -> None:
     """States and every constant, through releases by the current and later stops and rests."""
-    rng = np.random.default_rng(12)
+    rng = np.random.default_rng(3)
     sticks = 0
     for _ in range(4):
         hammer, period = coil_plunger(rng, kind), float(rng.uniform(5e-3, 9e-3))
         drive, end = ph.PulseTrain(hammer.waveform, period=period, pulses=2), float(rng.uniform(6e-3, 14e-3))
         motion = ph.simulate(hammer, drive, duration=end, tolerance=SHARP)
         sticks += len(motion.sticks)
-        # A neighbouring state of an armature on a stop lies behind the stop.
+        # At rest, friction stops a neighbouring velocity, and a neighbouring position lies behind the stop.
         times = np.linspace(2e-4, 2e-3, 40)
-        moving = float(times[np.argmax(np.abs(motion.at(times)[1]) > 0.05)])
-        start = 0.0 if kind == "free" else moving
-        found = min(circuit_deviation(hammer, drive, start, end, size=size) for size in (1e-3, 1e-4, 4e-6))
-        assert found < 1e-6
+        start = float(times[np.argmax(np.abs(motion.at(times)[1]) > 0.05)])
+        assert circuit_deviation(hammer, drive, start, end, size=1e-4) < 1e-6
         moved = deviations(hammer, drive, end)
         assert {"force.guide.static", "magnet.constant", "coil.resistance"} <= set(moved)
         assert all(change < 1e-6 for change in moved.values()), moved
