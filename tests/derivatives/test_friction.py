@@ -15,6 +15,7 @@ from printhammer.derivatives.flow import flow as constant_flow
 from printhammer.derivatives.flow import rest_columns
 from printhammer.derivatives.parameters import parameters
 from printhammer.derivatives.states import tangent_map
+from printhammer.drive.waveforms.drivers import Chopper
 
 
 def oscillator(kinetic: float, static: float | None = None) -> ph.Hammer:
@@ -264,6 +265,20 @@ def test_random_coils_that_release_a_held_armature(kind: str) -> None:
         assert {"force.guide.static", "magnet.constant", "coil.resistance"} <= set(moved)
         assert all(change < 1e-6 for change in moved.values()), moved
     assert sticks > 4
+
+
+@pytest.mark.slow
+def test_releases_by_a_saturating_magnet_behind_a_chopper() -> None:
+    """The release is located less exactly than with a moving coil; every release has a derivative."""
+    base = ph.load("dot-peen").replace("force.guide", {"law": "friction", "kinetic": 0.5, "static": 0.75})
+    chopper = Chopper(voltage=28.0, width=4e-3, upper=2.5, lower=2.0, decay="zener", decay_voltage=30.0)
+    drive = ph.PulseTrain(chopper, period=12e-3, pulses=2)
+    for factor in np.linspace(0.8, 1.2, 9):
+        flux = base.constants["magnet.saturation_flux"].si * float(factor)
+        hammer = base.replace("magnet.saturation_flux", flux)
+        moved = deviations(hammer, drive, 5e-3, ["mass", "coil.resistance", "force.guide.static"])
+        assert len(moved) == 3
+        assert all(change < 1e-6 for change in moved.values()), moved
 
 
 def test_a_current_that_releases_an_armature() -> None:

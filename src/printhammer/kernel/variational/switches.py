@@ -77,9 +77,9 @@ NEAR = 1e-9
 """Smallest distance of a reversal from the old local maximum, as a fraction of the indentation, at which the
 reversal is differentiable."""
 
-RELEASED = 1e-9
+RELEASED = 1e-6
 """Relative tolerance of force and static friction within which the force ended a rest; otherwise an edge of
-the drive or the end of the run ended it."""
+the drive or the end of the run ended it. Behind a circuit, releases are located to 2e-8."""
 RELEASE_SPACING = 1e-3
 """Step size of the time for the rate of the force at a release, as a fraction of the rest."""
 
