@@ -9,6 +9,7 @@ import argparse
 from importlib import import_module
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 from learning import ASKED, SHARES
 from measured import Measured, read
@@ -17,6 +18,23 @@ from measured import Measured, read
 def at_asked(table: Measured) -> str:
     """Format the rate of a table for the caption of a picture."""
     return f"{ASKED * table.settings['safe_rate']:,.0f} Hz"
+
+
+def draw_ways(ax: Any, looks: dict[str, tuple[str, str, str]], points: list[tuple[Any, ...]]) -> None:
+    """Draw one line per strategy, with colour, line and marker of `looks`, from (x, strategy, %) tuples."""
+    for way, (colour, line, mark) in looks.items():
+        ax.plot(
+            *zip(*((x, y) for x, name, y in points if name == way), strict=True),
+            color=colour,
+            linestyle=line,
+            marker=mark,
+            markersize=4,
+            label=way,
+        )
+    ax.set_ylim(-3.0, 103.0)
+    ax.margins(x=0.05)
+    small = import_module("printhammer.figures.elements.style").SMALL
+    ax.legend(fontsize=small, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
 def tolerance_curves(path: Path) -> None:
@@ -35,21 +53,9 @@ def tolerance_curves(path: Path) -> None:
     with style.in_style():
         figure = style.new_figure(3.4)
         ax = figure.subplots()
-        for way, (colour, line, mark) in looks.items():
-            points = [(row[0], row[2]) for row in table.rows if row[1] == way]
-            ax.plot(
-                *zip(*points, strict=True),
-                color=colour,
-                linestyle=line,
-                marker=mark,
-                markersize=4,
-                label=way,
-            )
-        ax.set_ylim(-3.0, 103.0)
-        ax.margins(x=0.05)
+        draw_ways(ax, looks, [(row[0], row[1], row[2]) for row in table.rows])
         ax.set_xlabel("Standard deviations of the production / stated ones")
         ax.set_ylabel("Dots within limits  [%]")
-        ax.legend(fontsize=style.SMALL, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
         style.foot(figure, " · ".join([*table.hammers, at_asked(table), f"{table.settings['units']} units"]))
         drawn = BytesIO()
         figure.savefig(drawn, dpi=110)
@@ -114,21 +120,10 @@ def curves(path: Path) -> None:
     with style.in_style():
         figure = style.new_figure(3.6)
         ax = figure.subplots()
-        for way, (colour, line, mark) in looks.items():
-            ax.plot(
-                *zip(*((x, y) for x, name, y in points if name == way), strict=True),
-                color=colour,
-                linestyle=line,
-                marker=mark,
-                markersize=4,
-                label=way,
-            )
-        ax.set_ylim(-3.0, 103.0)
-        ax.margins(x=0.05)
+        draw_ways(ax, looks, points)
         ax.set_xticks(SHARES)
         ax.set_xlabel("Rate / open-loop safe rate of the nominal hammer")
         ax.set_ylabel("Units that print all dots  [%]")
-        ax.legend(fontsize=style.SMALL, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
         sizes = f"{learned.settings['units']} units, {min(row[2] for row in learned.rows)} of some strategies"
         style.foot(figure, f"{', '.join(learned.hammers)} · {sizes}, feedback {seen.settings['units']}")
         drawn = BytesIO()

@@ -127,6 +127,22 @@ STEPS = ((1, 8.0), (-1, -8.0), (2, -1.0), (-2, 1.0))
 """Offsets and weights, times 12, of central differences: Abramowitz and Stegun (1964), table 25.2."""
 
 
+def stops_of(rng: np.random.Generator, kind: str) -> dict[str, object]:
+    """Return a spring with two rigid stops or, for the kind "free", with a pack and without a backstop."""
+    if kind == "free":
+        # Without a preload, friction holds the plunger somewhere on its way back.
+        return {
+            "spring": {"law": "preload", "preload": 0.0, "stiffness": float(rng.uniform(500.0, 3000.0))},
+            "pack": {"law": "dashpot", "front": 0.5e-3, "stiffness": 1e6, "damping": 10.0},
+        }
+    preload, stiffness = -float(rng.uniform(0.1, 0.5)), float(rng.uniform(100.0, 1500.0))
+    return {
+        "spring": {"law": "preload", "preload": preload, "stiffness": stiffness},
+        "backstop": {"law": "rigid", "position": 0.0, "restitution": 0.3},
+        "pack": {"law": "rigid", "front": 0.5e-3, "restitution": 0.4},
+    }
+
+
 def plunger(rng: np.random.Generator, kind: str) -> tuple[ph.Hammer, float]:
     """A plunger in a tube, and the time between its pulses: between stops, or without a backstop."""
     kinetic = float(rng.uniform(0.05, 0.2))
@@ -138,15 +154,7 @@ def plunger(rng: np.random.Generator, kind: str) -> tuple[ph.Hammer, float]:
         "damping": {"law": "viscous", "coefficient": float(rng.uniform(0.02, 0.06))},
         "waveform": {"shape": "half-sine", "amplitude": "3 N", "width": 1.5e-3},
     }
-    if kind == "free":
-        # Without a preload, friction holds the plunger somewhere on its way back.
-        parts["spring"] = {"law": "preload", "preload": 0.0, "stiffness": float(rng.uniform(500.0, 3000.0))}
-        parts["pack"] = {"law": "dashpot", "front": 0.5e-3, "stiffness": 1e6, "damping": 10.0}
-    else:
-        preload, stiffness = -float(rng.uniform(0.1, 0.5)), float(rng.uniform(100.0, 1500.0))
-        parts["spring"] = {"law": "preload", "preload": preload, "stiffness": stiffness}
-        parts["backstop"] = {"law": "rigid", "position": 0.0, "restitution": 0.3}
-        parts["pack"] = {"law": "rigid", "front": 0.5e-3, "restitution": 0.4}
+    parts |= stops_of(rng, kind)
     if kind == "sharp":
         sharp = {"shape": "rectangle", "amplitude": "3 N", "width": 0.5e-3, "rise": 0.0, "decay": 0.0}
         parts["waveform"] = sharp
@@ -228,14 +236,7 @@ def coil_plunger(rng: np.random.Generator, kind: str) -> ph.Hammer:
         "coil": {"resistance": float(rng.uniform(4.0, 12.0)), "inductance": float(rng.uniform(2e-3, 8e-3))},
         "waveform": rail | decay,
     }
-    if kind == "free":
-        parts["spring"] = {"law": "preload", "preload": 0.0, "stiffness": float(rng.uniform(500.0, 3000.0))}
-        parts["pack"] = {"law": "dashpot", "front": 0.5e-3, "stiffness": 1e6, "damping": 10.0}
-    else:
-        preload, stiffness = -float(rng.uniform(0.1, 0.5)), float(rng.uniform(100.0, 1500.0))
-        parts["spring"] = {"law": "preload", "preload": preload, "stiffness": stiffness}
-        parts["backstop"] = {"law": "rigid", "position": 0.0, "restitution": 0.3}
-        parts["pack"] = {"law": "rigid", "front": 0.5e-3, "restitution": 0.4}
+    parts |= stops_of(rng, kind)
     hammer = ph.Hammer.build(1e-3).replace(parts)
     if rng.random() < 0.5:
         turn = {
