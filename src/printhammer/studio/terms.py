@@ -69,7 +69,7 @@ def _numbers_of_rows(hammer: Hammer) -> Iterator[tuple[int, list[Product]]]:
 
 
 def _product(hammer: Hammer, entry: str, template: _Template) -> Product | None:
-    """Return a product with the keys of an entry; None if the file has none of the constants."""
+    """Return a product with the keys of an entry; None if a constant besides `acceleration` is missing."""
     factor, *roles = template
     keys: list[list[str]] = []
     for names in roles:
