@@ -5,9 +5,11 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+import typer
 from matplotlib.figure import Figure
 from tests.errors import refused
 
+from printhammer.cli.main import run_program
 from printhammer.cli.options import Units, files
 from printhammer.cli.runner import PICTURES, Answer, Content, Job, check_endings
 from printhammer.cli.screen import Column, table
@@ -51,6 +53,32 @@ def test_a_complaint_is_status_1_and_ctrl_c_is_130(capsys: pytest.CaptureFixture
     assert capsys.readouterr() == ("shown\n", "printhammer: it ended early\n")
     assert Job({}, {}).end(Answer(failed=True)) == 1
     assert Job({}, {}).end(Answer(interrupted=True)) == 130
+
+
+def lock_that_is_interrupted() -> None:
+    try:
+        raise KeyboardInterrupt
+    finally:
+        raise RuntimeError("cannot release un-acquired lock")
+
+
+def test_ctrl_c_inside_a_lock_is_130_too(capsys: pytest.CaptureFixture[str]) -> None:
+    program = typer.Typer()
+    program.command()(lock_that_is_interrupted)
+    with pytest.raises(SystemExit) as ended:
+        run_program(program, "printhammer", [])
+    assert ended.value.code == 130
+    assert capsys.readouterr().err == "printhammer: interrupted\n"
+
+
+def test_other_runtime_errors_are_not_taken_for_ctrl_c() -> None:
+    def failing() -> None:
+        raise RuntimeError("a fault of the program")
+
+    program = typer.Typer()
+    program.command()(failing)
+    with pytest.raises(RuntimeError, match="a fault"):
+        run_program(program, "printhammer", [])
 
 
 COLUMNS = (

@@ -171,6 +171,13 @@ def _advice(message: str, error: Exception) -> str:
     return "; --hammer selects the hammer" if "unexpected extra" in message and "--hammer" in flags else ""
 
 
+def _is_interrupted(error: BaseException | None) -> bool:
+    """Whether Ctrl-C caused an error; inside a lock, CPython's KeyboardInterrupt becomes a RuntimeError."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
+
+
 def run_program(program: typer.Typer, name: str, arguments: Sequence[str] | None = None) -> NoReturn:
     """Run a command-line program on arguments, by default sys.argv[1:]; exit with the program's status."""
     allow_any_text()
@@ -195,7 +202,9 @@ def run_program(program: typer.Typer, name: str, arguments: Sequence[str] | None
             with suppress(OSError, ValueError), Path(os.devnull).open("wb") as nowhere:
                 os.dup2(nowhere.fileno(), sys.stdout.fileno())
         sys.exit(BAD_INPUT)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, RuntimeError) as error:
+        if not _is_interrupted(error):
+            raise
         status = INTERRUPTED
     if status == INTERRUPTED:
         complain("interrupted")
