@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -44,6 +45,7 @@ RESERVOIR: Final = 6
 """Kind of a driver's segment in which a reservoir feeds the coil."""
 COLUMNS: Final = 6  # Number of columns of a table
 
+_KEPT: Final = 1024  # Number of cached segment tables; arbitrary
 _CHUNK: Final = 1024  # Number of intervals evaluated at once, which bounds the memory; arbitrary
 _REFINED: Final = 16  # Number of intervals with the largest samples, which are refined; arbitrary
 _ROUNDS: Final = 9  # Rounds of refinement, so that a maximum is located to 1e-9 of the interval
@@ -115,7 +117,8 @@ def evaluate(segments: FloatArray, t: npt.ArrayLike, fired: npt.ArrayLike = 0.0)
     return np.where(np.isnan(tau), np.nan, value)
 
 
-def filled(shape: int, fields: Sequence[float]) -> FloatArray:
+@lru_cache(maxsize=_KEPT)
+def filled(shape: int, fields: tuple[float, ...]) -> FloatArray:
     """Build the segment table of a shape, read-only; `shape` is a code of `printhammer.drive.tables`."""
     rows = np.empty((ROWS, COLUMNS))
     result = rows[: fill_table(shape, fields, rows)].copy()

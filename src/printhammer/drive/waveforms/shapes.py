@@ -73,13 +73,13 @@ class Chain(Waveform):
 
     def segments(self) -> FloatArray:
         """Return the segment tables of the waveforms in sequence, with zeros in between."""
-        rows: list[tuple[float, ...]] = []
+        rows: list[list[float]] = []
         for offset, part in self.parts:
-            own = [tuple(float(number) for number in row) for row in part.segments()]
+            own = part.segments().tolist()
             while rows and offset <= rows[-1][0]:
                 # The remainder of the preceding waveform is cut off here.
                 rows.pop()
-            rows += [(offset + start, *rest) for start, *rest in own]
+            rows += [[offset + start, *rest] for start, *rest in own]
         return table(rows[:-1], rows[-1][0])
 
     def scaled(self, factor: float) -> Self:

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import called, compiled, inlined
-from printhammer.kernel.methods.hermite import position_root, rises_through
+from printhammer.kernel.methods.hermite import position_root, rises_through, velocity_root
 from printhammer.kernel.methods.landing import FAILED, step_factor
 from printhammer.kernel.model import modes as M
 from printhammer.kernel.model.layout import BACKSTOP_PART, INVERSE_MASS, MAGNET, POSITION, Control
@@ -293,6 +293,9 @@ def advance_contact(
                 h *= 0.5
                 continue
             if code == M.REACHED_FRONT:
-                t1, w1, v1, kv1, electric = land_on_gap_in_contact(start, span, hammer, drive)
+                guess = velocity_root(g0, d0, g1, d1, 1.0)
+                t1, w1, v1, kv1, electric = land_on_gap_in_contact(
+                    start, end, electric, span, guess, hammer, drive
+                )
                 switch, end = M.CIRCUIT, (t1, w1, v1, kv1)
         return switch, end, following, electric

@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import called, compiled, inlined
+from printhammer.kernel.methods.hermite import velocity_root
 from printhammer.kernel.model import modes as M
 from printhammer.kernel.model.layout import POSITION, Control, ForceLaw
 
@@ -37,6 +38,9 @@ BEGUN = 1e-9
 
 SHARE = 1e-5
 """Finite-difference step for the time derivative of an event function, as a fraction of the step."""
+
+NARROW = 1e-15
+"""Width of a bracket, as a fraction of a backstop step, at which the location of an event ends."""
 
 PATH_GAP, REST_GAP = 0, 1
 """Codes of the event functions: change of the current path, and end of a rest of the armature."""
@@ -123,9 +127,11 @@ def gap_and_change(
 
 @called
 def land_on_gap(
-    which: int, start: Any, h: float, upper: float, law: ForceLaw, control: Control
+    which: int, start: Any, end: Any, electric: Electric, guess: float, law: ForceLaw, control: Control
 ) -> tuple[float, float, float, float, Electric]:
-    """Locate the root of an event function in a step `h`, up to the fraction `upper`.
+    """Locate the root of an event function in a step from `start` to `end`; `guess` is a fraction of it.
+
+    Newton's method, with a bisection where a correction is not half the one before or leaves the bracket.
 
     Returns
     -------
@@ -133,36 +139,30 @@ def land_on_gap(
         Time, displacement, velocity, acceleration and electric state at the root.
     """
     t, x, v, a = start
-    live = law.drive[0]
-    low, high = 0.0, upper
-    low_gap = gap_at(which, t, x, v, law.drive[1], law, live, control)
-    x1, v1, a1, _ex, _ev, e1, _ee = whole_time_step(t, x, v, a, high * h, law)
-    high_gap = gap_at(which, t + high * h, x1, v1, e1, law, live, control)
-    side = 0
+    h = end[0] - t
+    low, high, at, ahead = 0.0, 1.0, guess, 2.0
+    x1, v1, a1, e1 = end[1], end[2], end[3], electric
+    negligible = 1e-15 * control[0] / control[1] / h
     for _ in range(100):
-        if (high - low) * h <= 1e-15 * control[0] / control[1] or high_gap >= 0.0 >= low_gap:
+        if not (low < at < high):
+            at = 0.5 * (low + high)
+        if high - low <= negligible or not (low < at < high):
             break
-        middle = (low * high_gap - high * low_gap) / (high_gap - low_gap)
-        if not (low < middle < high):
-            middle = 0.5 * (low + high)
-            if not (low < middle < high):
-                break
-        x1, v1, a1, _ex, _ev, e1, _ee = whole_time_step(t, x, v, a, middle * h, law)
-        gap = gap_at(which, t + middle * h, x1, v1, e1, law, live, control)
+        x2, v2, a2, _ex, _ev, e2, _ee = whole_time_step(t, x, v, a, at * h, law)
+        gap, change = gap_and_change(which, t + at * h, x2, v2, a2, e2, h, law, law.drive[0], control)
+        before, ahead = ahead, -gap / change if change < 0.0 else 2.0
+        near = abs(gap) <= 1e-15 or abs(ahead) <= negligible
         # A rest ends where a force drives the armature off, not where the force is zero.
-        if gap > 0.0 or (which == REST_GAP and gap == 0.0):
-            low, low_gap = middle, gap
-            # Illinois rule: halve the function value at an end that is retained twice.
-            high_gap *= 0.5 if side == 1 else 1.0
-            side = 1
+        if gap < 0.0 or (which == PATH_GAP and (gap == 0.0 or near)):
+            high, x1, v1, a1, e1 = at, x2, v2, a2, e2
+            if near:
+                break
         else:
-            high, high_gap = middle, gap
-            low_gap *= 0.5 if side == -1 else 1.0
-            side = -1
-        if abs(gap) <= 1e-15 and (which == PATH_GAP or gap < 0.0):
-            high = middle
-            break
-    x1, v1, a1, _ex, _ev, e1, _ee = whole_time_step(t, x, v, a, high * h, law)
+            low = at
+            if near:
+                negligible *= 2.0
+                ahead = 0.5 * negligible
+        at = at + ahead if abs(ahead) <= 0.5 * abs(before) else high
     return t + high * h, x1, v1, a1, e1
 
 
@@ -177,7 +177,6 @@ def circuit_switch(
     tuple
         CIRCUIT, REST_ENDED, NO_SWITCH or UNRESOLVED, and the state and electric state at the event.
     """
-    h = end[0] - start[0]
     live = law.drive[0]
     result = M.NO_SWITCH
     resting = law.mode >= M.RESTING
@@ -193,7 +192,8 @@ def circuit_switch(
         if code == M.UNRESOLVED:
             return code, end, electric
         if code == M.REACHED_FRONT:
-            t, x, v, a, electric = land_on_gap(which, start, h, min(1.0, span / h), law, control)
+            guess = velocity_root(g0, d0, g1, d1, 1.0)
+            t, x, v, a, electric = land_on_gap(which, start, end, electric, guess, law, control)
             end = (t, x, v, a)
             result = M.CIRCUIT if which == PATH_GAP else M.REST_ENDED
     return result, end, electric
@@ -220,9 +220,11 @@ def contact_gap_and_change(
 
 @called
 def land_on_gap_in_contact(
-    start: Any, h: float, hammer: Hammer, drive: Drive
+    start: Any, end: Any, electric: Electric, h: float, guess: float, hammer: Hammer, drive: Drive
 ) -> tuple[float, float, float, float, Electric]:
     """Locate a change of the coil's current path in a backstop step `h` of the regularised variable s.
+
+    The method and `guess` are those of `land_on_gap`.
 
     Returns
     -------
@@ -230,30 +232,22 @@ def land_on_gap_in_contact(
         Time, w, velocity, dv/ds and electric state at the change.
     """
     t, w, v, kv = start
-    live = drive[0]
-    low, high = 0.0, 1.0
-    low_gap = contact_gap(w, v, drive[1], hammer, live)
-    t1, w1, v1, kv1, _error, e1 = whole_contact_step(t, w, v, kv, h, hammer, drive, M.ANY_SCALES)
-    high_gap = contact_gap(w1, v1, e1, hammer, live)
-    side = 0
+    low, high, at, ahead = 0.0, 1.0, guess, 2.0
+    t1, w1, v1, kv1, e1 = end[0], end[1], end[2], end[3], electric
     for _ in range(100):
-        middle = (low * high_gap - high * low_gap) / (high_gap - low_gap)
-        if not (low < middle < high):
-            middle = 0.5 * (low + high)
-            if not (low < middle < high):
-                break
-        t1, w1, v1, kv1, _error, e1 = whole_contact_step(t, w, v, kv, middle * h, hammer, drive, M.ANY_SCALES)
-        gap = contact_gap(w1, v1, e1, hammer, live)
-        if gap > 0.0:
-            low, low_gap = middle, gap
-            high_gap *= 0.5 if side == 1 else 1.0
-            side = 1
-        else:
-            high, high_gap = middle, gap
-            low_gap *= 0.5 if side == -1 else 1.0
-            side = -1
-        if abs(gap) <= 1e-15 or high - low <= 1e-15:
-            high = middle if abs(gap) <= 1e-15 else high
+        if not (low < at < high):
+            at = 0.5 * (low + high)
+        if high - low <= NARROW or not (low < at < high):
             break
-    t1, w1, v1, kv1, _error, e1 = whole_contact_step(t, w, v, kv, high * h, hammer, drive, M.ANY_SCALES)
+        t2, w2, v2, kv2, _error, e2 = whole_contact_step(t, w, v, kv, at * h, hammer, drive, M.ANY_SCALES)
+        gap, change = contact_gap_and_change(t2, w2, v2, kv2, e2, h, hammer, drive[0])
+        before, ahead = ahead, -gap / change if change < 0.0 else 2.0
+        near = abs(gap) <= 1e-15 or abs(ahead) <= NARROW
+        if gap <= 0.0 or near:
+            high, t1, w1, v1, kv1, e1 = at, t2, w2, v2, kv2, e2
+            if near:
+                break
+        else:
+            low = at
+        at = at + ahead if abs(ahead) <= 0.5 * abs(before) else high
     return t1, w1, v1, kv1, e1

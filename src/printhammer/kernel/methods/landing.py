@@ -225,29 +225,46 @@ def is_cut(v0: float, v1: float, hammer: Hammer) -> bool:
     return spring_switch(hammer[SPRING:PACK], v0) * spring_switch(hammer[SPRING:PACK], v1) < 0.0
 
 
-@called
-def land_on_push(start: State, h: float, upper: float, cut: bool, law: ForceLaw, control: Control) -> State:
-    """Return the state in which a contact starts or ceases to push in a step `h`, up to fraction `upper`.
+@compiled
+def push_gap(cut: bool, start: State, x: float, v: float, law: ForceLaw) -> float:
+    """Evaluate the event function of `land_on_push` at a state: positive until the event."""
+    if VISCOUS and cut:
+        c = law.hammer[SPRING:PACK]
+        return spring_switch(c, start[2]) * spring_switch(c, v)
+    number = pushes(x, v, law.mode, law.hammer)
+    return -number if law.mode in (M.PACK_RELEASED, M.BACKSTOP_RELEASED) else number
 
-    The state is located by bisection. With `cut`, the contact belongs to the spring law, otherwise to the
-    pack or the backstop.
+
+@called
+def land_on_push(start: State, end: State, cut: bool, law: ForceLaw, control: Control) -> State:
+    """Return the state in which a contact starts or ceases to push in a step from `start` to `end`.
+
+    The Illinois rule, with a bisection at every fourth estimate. With `cut`, the contact belongs to the
+    spring law, otherwise to the pack or the backstop.
     """
     t, x, v, a = start
-    low, high = 0.0, upper
+    h = end[0] - t
+    low, high = 0.0, 1.0
+    low_gap, high_gap = push_gap(cut, start, x, v, law), push_gap(cut, start, end[1], end[2], law)
+    x1, v1, a1 = end[1], end[2], end[3]
+    number, side = 0, 0
     while (high - low) * h > 1e-15 * control[0] / control[1]:
-        middle = 0.5 * (low + high)
-        if not (low < middle < high):
-            break
-        x1, v1, _a1, _ex, _ev = plain_step(t, x, v, a, middle * h, law)
-        if VISCOUS and cut:
-            passed = is_cut(v, v1, law.hammer)
+        at = (low * high_gap - high * low_gap) / (high_gap - low_gap) if high_gap < low_gap else low
+        if not (low < at < high) or number % 4 == 3:
+            at = 0.5 * (low + high)
+            if not (low < at < high):
+                break
+        x2, v2, a2, _ex, _ev = plain_step(t, x, v, a, at * h, law)
+        gap = push_gap(cut, start, x2, v2, law)
+        if gap < 0.0:
+            high, high_gap, x1, v1, a1 = at, gap, x2, v2, a2
+            low_gap *= 0.5 if side == -1 else 1.0
+            side = -1
         else:
-            passed = lets_go_or_takes_hold(x1, v1, law.mode, law.hammer)
-        if passed:
-            high = middle
-        else:
-            low = middle
-    x1, v1, a1, _ex, _ev = plain_step(t, x, v, a, high * h, law)
+            low, low_gap = at, gap
+            high_gap *= 0.5 if side == 1 else 1.0
+            side = 1
+        number += 1
     return t + high * h, x1, v1, a1
 
 
@@ -403,7 +420,7 @@ def advance(
         else:
             end = land_on_level(start, h, fraction, upper, level, sign, law, control)
         if VISCOUS and end[0] > t and is_cut(v, end[2], law.hammer):
-            end = land_on_push(start, h, min(1.0, (end[0] - t) / h), True, law, control)
+            end = land_on_push(start, end, True, law, control)
             switch = M.REACHED_LEVEL
         if LEVELS and h > shortest and end[0] > t and is_near_level(x, end[1], law.hammer):
             # Near a kink, a law may be a fractional power of the distance: the error of the step is then as
@@ -416,7 +433,7 @@ def advance(
         may_let_go = HAS_PACK and not PACK_PULLS and mode in (M.LOADING, M.PACK_RELEASED)
         may_let_go = may_let_go or (not BACKSTOP_PULLS and mode == M.BACKSTOP_RELEASED)
         if may_let_go and end[0] > t and lets_go_or_takes_hold(end[1], end[2], mode, law.hammer):
-            end = land_on_push(start, h, min(1.0, (end[0] - t) / h), False, law, control)
+            end = land_on_push(start, end, False, law, control)
             switch = M.PUSH_BEGAN if mode in (M.PACK_RELEASED, M.BACKSTOP_RELEASED) else M.PUSH_ENDED
         if HAS_CIRCUIT:
             if switch not in (M.NO_SWITCH, M.EDGE):

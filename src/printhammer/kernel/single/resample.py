@@ -62,7 +62,9 @@ if TYPE_CHECKING:
     )
     from printhammer.kernel.model.pulses import Drive, edges_at, pass_edges
 
-GOLDEN = 0.3819660112501051
+GOLDEN = 0.3819660112501051  # Square of the inverse golden ratio
+NEAR = 1e-6  # Width of a bracket relative to the first one, at which a search ends; its square is negligible
+ASIDE = 1e-6  # Distance from the edge of a contact at which the slope is tested, of a sample; arbitrary
 SAMPLES = 4
 """Number of samples per step in the search for the largest depth and force of a contact; arbitrary."""
 
@@ -237,24 +239,80 @@ def depth_and_force(t: float, node: Any, surface: int, hammer: Hammer, live: Any
 
 
 @compiled
+def sample_time(place: int, nodes: Any) -> float:
+    """Return the time [s] of a sample, numbered from the first node on, `SAMPLES` to a step."""
+    k, j = place // SAMPLES, place % SAMPLES
+    return nodes[k, 0] + ((nodes[k + 1, 0] - nodes[k, 0]) * j / SAMPLES if j else 0.0)
+
+
+@compiled
+def value_of(
+    which: int, t: float, first: int, last: int, surface: int, nodes: Any, train: Train, hammer: Hammer
+) -> float:
+    """Return the depth (`which` 0) or force (`which` 1) at time `t` [s], in the step `first` or `last`."""
+    k = last if t >= nodes[last, 0] else first
+    edges_at(nodes[k, 0], train)
+    return depth_and_force(t, nodes[k], surface, hammer, train.live)[which]
+
+
+@compiled
 def refined(
-    which: int, low: float, high: float, node: Any, surface: int, hammer: Hammer, live: Any
+    which: int,
+    place: int,
+    value: float,
+    begin: int,
+    end: int,
+    surface: int,
+    nodes: Any,
+    train: Train,
+    hammer: Hammer,
 ) -> tuple[float, float]:
-    """Return time [s] and value of the largest depth (`which` 0) or force (`which` 1) between two times."""
-    t1 = low + GOLDEN * (high - low)
-    t2 = high - GOLDEN * (high - low)
-    f1 = depth_and_force(t1, node, surface, hammer, live)[which]
-    f2 = depth_and_force(t2, node, surface, hammer, live)[which]
-    for _ in range(36):
-        if f1 > f2:
-            high, t2, f2 = t2, t1, f1
-            t1 = low + GOLDEN * (high - low)
-            f1 = depth_and_force(t1, node, surface, hammer, live)[which]
+    """Return time [s] and value of the largest depth (`which` 0) or force (`which` 1) beside a sample.
+
+    Brent's method (*Algorithms for Minimization Without Derivatives*, 1973, chapter 5) between the two
+    neighbours of the largest sample, which has the number `place` and the value `value`.
+    """
+    left, right = max(place - 1, begin * SAMPLES), min(place + 1, end * SAMPLES)
+    low, high, x, fx = sample_time(left, nodes), sample_time(right, nodes), sample_time(place, nodes), value
+    first, last = left // SAMPLES, max(right - 1, left) // SAMPLES
+    if place in (left, right):
+        # At the edge of the contact, the sample is the largest value unless the values rise from it inwards.
+        inward = ASIDE * (high - low) * (1.0 if place == left else -1.0)
+        if value_of(which, x + inward, first, last, surface, nodes, train, hammer) <= value:
+            return x, value
+        x = low + GOLDEN * (high - low)
+        fx = value_of(which, x, first, last, surface, nodes, train, hammer)
+    v, fv = low, value_of(which, low, first, last, surface, nodes, train, hammer)
+    w, fw = high, value_of(which, high, first, last, surface, nodes, train, hammer)
+    step = before = high - low
+    close = NEAR * (high - low) + 2.0**-52 * high
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if abs(x - middle) <= 2.0 * close - 0.5 * (high - low):
+            break
+        r, q = (x - w) * (fx - fv), (x - v) * (fx - fw)
+        p, q = (x - v) * q - (x - w) * r, 2.0 * (q - r)
+        p = -p if q > 0.0 else p
+        q = abs(q)
+        if abs(p) < abs(0.5 * q * before) and q * (low - x) < p < q * (high - x):
+            before, step = step, p / q
+            if min(x + step - low, high - x - step) < 2.0 * close:
+                step = math.copysign(close, middle - x)
         else:
-            low, t1, f1 = t1, t2, f2
-            t2 = high - GOLDEN * (high - low)
-            f2 = depth_and_force(t2, node, surface, hammer, live)[which]
-    return (t1, f1) if f1 > f2 else (t2, f2)
+            before = (high if x < middle else low) - x
+            step = GOLDEN * before
+        u = x + (step if abs(step) >= close else math.copysign(close, step))
+        fu = value_of(which, u, first, last, surface, nodes, train, hammer)
+        if fu >= fx:
+            low, high = (x, high) if u >= x else (low, x)
+            v, fv, w, fw, x, fx = w, fw, x, fx, u, fu
+        else:
+            low, high = (low, u) if u >= x else (u, high)
+            if fu >= fw or w == x:
+                v, fv, w, fw = w, fw, u, fu
+            elif fu >= fv or v in (x, w):
+                v, fv = u, fu
+    return x, fx
 
 
 @compiled
@@ -270,45 +328,28 @@ def peaks_of(
         return contact[1], 0.0, math.nan
     begin = int(contact[5])
     end = begin
-    best = (begin, 0)
-    strongest = (begin, 0)
-    deepest_value = 0.0
-    strongest_value = 0.0
+    deepest = strongest = begin * SAMPLES
+    deepest_value = strongest_value = 0.0
     first, last, _edge = edges_at(nodes[begin, 0], train)
     while end + 1 < nodes.shape[0] and not (nodes[end, 0] >= contact[3]):
         node = nodes[end]
         first, last, _edge = pass_edges(node[0], train, first, last)
-        for j in range(SAMPLES + 1):
+        is_last = not (end + 2 < nodes.shape[0] and not (nodes[end + 1, 0] >= contact[3]))
+        for j in range(SAMPLES + 1 if is_last else SAMPLES):
             t = node[0] + (nodes[end + 1, 0] - node[0]) * j / SAMPLES
             depth, force = depth_and_force(t, node, surface, hammer, train.live)
             if depth > deepest_value:
-                best, deepest_value = (end, j), depth
+                deepest, deepest_value = end * SAMPLES + j, depth
             if force > strongest_value:
-                strongest, strongest_value = (end, j), force
+                strongest, strongest_value = end * SAMPLES + j, force
         end += 1
-    peak_time = nodes[best[0], 0]
-    if end > best[0]:
-        peak_time += (nodes[best[0] + 1, 0] - nodes[best[0], 0]) * best[1] / SAMPLES
-    for which in range(2):
-        i, j = best if which == 0 else strongest
-        # The extremum lies near the best sample, possibly in an adjacent step.
-        for beside in range(-1, 2):
-            k = i + beside
-            if k < begin or k >= end or (beside < 0 and j > 0) or (beside > 0 and j < SAMPLES):
-                continue
-            part = (nodes[k + 1, 0] - nodes[k, 0]) / SAMPLES
-            lowest = j - 1 if beside == 0 else (SAMPLES - 1 if beside < 0 else 0)
-            highest = j + 1 if beside == 0 else (SAMPLES if beside < 0 else 1)
-            low = nodes[k, 0] + part * max(lowest, 0)
-            high = nodes[k, 0] + part * min(highest, SAMPLES)
-            if not high > low:
-                continue
-            edges_at(nodes[k, 0], train)
-            t, value = refined(which, low, high, nodes[k], surface, hammer, train.live)
-            if which == 0 and value > deepest_value:
-                peak_time, deepest_value = t, value
-            elif which == 1 and value > strongest_value:
-                strongest_value = value
+    peak_time = sample_time(deepest, nodes)
+    if end > begin:
+        t, value = refined(0, deepest, deepest_value, begin, end, surface, nodes, train, hammer)
+        if value > deepest_value:
+            peak_time, deepest_value = t, value
+        value = refined(1, strongest, strongest_value, begin, end, surface, nodes, train, hammer)[1]
+        strongest_value = max(value, strongest_value)
     return peak_time, deepest_value, strongest_value
 
 
