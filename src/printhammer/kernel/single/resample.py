@@ -242,7 +242,8 @@ def depth_and_force(t: float, node: Any, surface: int, hammer: Hammer, live: Any
 def sample_time(place: int, nodes: Any) -> float:
     """Return the time [s] of a sample, numbered from the first node on, `SAMPLES` to a step."""
     k, j = place // SAMPLES, place % SAMPLES
-    return nodes[k, 0] + ((nodes[k + 1, 0] - nodes[k, 0]) * j / SAMPLES if j else 0.0)
+    t: float = nodes[k, 0]
+    return t + (nodes[k + 1, 0] - t) * j / SAMPLES if j else t
 
 
 @compiled
