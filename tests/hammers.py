@@ -6,6 +6,7 @@ Helpers only; assertions are in the tests that use them.
 import dataclasses
 import functools
 import math
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
@@ -38,6 +39,8 @@ STOP = 50.8e-6
 FRONT = 203.2e-6
 STROKE = FRONT - STOP
 THICKNESS = 177.8e-6
+DRAWS = int(os.environ.get("PRINTHAMMER_DRAWS", "1"))
+"""Factor of the number of random devices in slow tests; 4 for the numbers of the decision notes."""
 TRUTH = 1e-14
 """Tolerance of a reference that is taken for the truth."""
 SLOW = 1e-4

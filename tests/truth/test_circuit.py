@@ -10,7 +10,7 @@ import pytest
 from scipy.linalg import expm
 from tests.circuits import Device, Phase, Run, integrate
 from tests.errors import refused
-from tests.hammers import interpreted
+from tests.hammers import DRAWS, interpreted
 
 import printhammer as ph
 from printhammer.drive.waveforms.drivers import Bridge, Capacitor, Chopper, PeakAndHold, Rail
@@ -284,8 +284,8 @@ def test_random_coils_against_an_independent_integration(seed: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("block", range(3))
 def test_no_switching_of_many_runs_is_lost(block: int) -> None:
-    """Ten blocks, a thousand runs, have passed; three blocks suffice to detect a regression."""
-    for seed in range(100 * block, 100 * block + 100):
+    """Ten blocks of 100 runs have passed; `PRINTHAMMER_DRAWS=4` repeats three of them."""
+    for seed in range(100 * block, 100 * block + 25 * DRAWS):
         motion, run = compare(1000 + seed, 1e-11)
         assert motion.ok
         agrees(motion, run, 1e-8)

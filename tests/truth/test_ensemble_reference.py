@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from tests.hammers import TRUTH, Draw
+from tests.hammers import DRAWS, TRUTH, Draw
 from tests.oracle.integrator import ReferenceRun, reference
 
 import printhammer as ph
@@ -152,8 +152,8 @@ def test_peak_forces_are_those_of_the_reference() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("pulses", [1, 3, 6])
-@pytest.mark.parametrize("seed", [100, 101, 102, 103])
-def test_hundreds_of_members(seed: int, pulses: int) -> None:
+@pytest.mark.parametrize("seed", range(100, 100 + DRAWS))
+def test_many_members(seed: int, pulses: int) -> None:
     check(truth_of(seed, 25, pulses), TOLERANCE)
 
 

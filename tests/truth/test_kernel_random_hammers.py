@@ -7,7 +7,7 @@ counted. Default tolerance throughout.
 import numpy as np
 import pytest
 from tests import hammers
-from tests.hammers import Draw, compare
+from tests.hammers import DRAWS, Draw, compare
 
 import printhammer as ph
 
@@ -73,14 +73,14 @@ def test_three_pulses(seed: int, request: pytest.FixtureRequest) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(100, 108))
-def test_two_hundred_single_pulses(seed: int, request: pytest.FixtureRequest) -> None:
+@pytest.mark.parametrize("seed", range(100, 100 + 2 * DRAWS))
+def test_many_single_pulses(seed: int, request: pytest.FixtureRequest) -> None:
     check_single_pulses(seed, 25, request)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(100, 108))
-def test_two_hundred_trains(seed: int, request: pytest.FixtureRequest) -> None:
+@pytest.mark.parametrize("seed", range(100, 100 + 2 * DRAWS))
+def test_many_trains(seed: int, request: pytest.FixtureRequest) -> None:
     check_trains(seed, 25, request)
 
 

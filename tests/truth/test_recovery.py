@@ -14,6 +14,7 @@ import pytest
 from scipy.stats import binom, chi2
 from studies.recovery import Recovery, measured_stiffness, recover, true_value
 from tests import hammers
+from tests.hammers import DRAWS
 
 import printhammer as ph
 from printhammer.identify.result import Fit
@@ -155,7 +156,7 @@ def count_all(found: list[Recovery]) -> dict[str, int]:
 def test_the_recipe_of_the_page_in_a_few_laboratories() -> None:
     """The printed recipe is run through files; `docs/measure/recipe.py` runs it a hundred times."""
     path = Path(__file__).parents[2] / "docs" / "measure"
-    count = 3
+    count = 2
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(path))
         script = importlib.import_module("recipe")
@@ -163,18 +164,18 @@ def test_the_recipe_of_the_page_in_a_few_laboratories() -> None:
         rows = script.table([script.laboratory(truth, seed, script.recipe()) for seed in range(count)], truth)
     counts = {row[0]: int(row[1].split()[0]) for row in rows[:-1]}
     assert {"`mass`", "`magnet.Am`", "`magnet.Bm`", "`pack.stiffness`"} <= set(counts)
-    allowed = binom.isf(CHANCE, count, 0.05)
-    assert {key: held for key, held in counts.items() if count - held > allowed} == {}
+    # A correct interval misses both laboratories once in 400 repetitions.
+    assert [key for key, held in counts.items() if held == 0] == []
 
 
 @pytest.mark.slow
-def test_sixteen_laboratories() -> None:
+def test_several_laboratories() -> None:
     """Intervals are neither too narrow nor too wide; `docs/measure/recovery.py` counts 100 laboratories.
 
     No constant misses its 95 % interval more often than chance allows. All 17 together hold it in 92 to 98 %:
-    of 272 independent intervals, 95 % ± 1.3 % do.
+    of 136 independent intervals, 95 % ± 1.9 % do, and of 272 (`PRINTHAMMER_DRAWS=4`), 95 % ± 1.3 %.
     """
-    labs = 16
+    labs = 8 if DRAWS == 1 else 16
     counts = count_all([laboratory(seed) for seed in range(labs)])
     allowed = binom.isf(CHANCE, labs, 0.05)
     assert {key: n for key, n in counts.items() if labs - n > allowed} == {}
@@ -184,7 +185,7 @@ def test_sixteen_laboratories() -> None:
 @pytest.mark.slow
 def test_laboratories_with_hammers_of_their_own() -> None:
     """The same holds for other printing hammers, with constants up to 20 % from the shipped hammer."""
-    labs = 8
+    labs = 5 if DRAWS == 1 else 8
     found = [recover(hammer, seed) for seed, hammer in enumerate(printing_hammers(labs))]
     counts = count_all(found)
     allowed = binom.isf(CHANCE, labs, 0.05)

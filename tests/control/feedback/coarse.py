@@ -1,6 +1,7 @@
-"""A controller with coarse tables, which are computed in half a second. Helpers only.
+"""Controllers with coarse tables. Helpers only.
 
-The controller prints poorly, but its tables must agree with runs, and it must respect its limits.
+The tables of `grids` are computed in half a second. Their controller prints poorly, but its tables must agree
+with runs, and it must respect its limits. The controller of `halved` prints as well as the default requires.
 """
 
 import functools
@@ -37,6 +38,18 @@ def grids() -> Iterator[None]:
         patch.setattr(soft_landing, "_STARTS", STARTS)
         patch.setattr(soft_landing, "_WIDTHS", WIDTHS)
         patch.setattr(soft_landing, "_NEAR", NEAR)
+        yield
+
+
+@contextmanager
+def halved() -> Iterator[None]:
+    """Halve the numbers of throws and of brake pulses; `docs/measure/feedback.py` measures the defaults."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(impact_map, "_EARLY", np.linspace(0.14, 1.07, 19))
+        patch.setattr(impact_map, "_LATE", np.linspace(1.1, 2.9, 24))
+        patch.setattr(soft_landing, "_STARTS", np.linspace(0.85, 1.75, 14))
+        patch.setattr(soft_landing, "_WIDTHS", np.linspace(0.1, 0.75, 10))
+        patch.setattr(soft_landing, "_FINER", (0.07, 0.023, 0.0077))
         yield
 
 

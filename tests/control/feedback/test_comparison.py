@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from tests import hammers
+from tests.control.feedback.coarse import halved
 from tests.errors import refused
 
 import printhammer as ph
@@ -35,13 +36,15 @@ PERFECT = PositionSensor(noise=0.0, step=0.0)
 @pytest.fixture(scope="module")
 def controller() -> Controller:
     hammer = ph.load(HAMMER)
-    return Controller(hammer, driver_of(hammer, CURRENT))
+    with halved():
+        return Controller(hammer, driver_of(hammer, CURRENT))
 
 
 @pytest.fixture(scope="module")
 def shipped() -> Controller:
     hammer = ph.load("hendriks-1983")
-    return Controller(hammer, driver_of(hammer))
+    with halved():
+        return Controller(hammer, driver_of(hammer))
 
 
 @pytest.mark.slow

@@ -21,6 +21,7 @@ from printhammer.support.threads import Progress
 
 if TYPE_CHECKING:
     from printhammer.control.feedback.plant import Driver, Plant
+    from printhammer.drive.base import Drive
     from printhammer.drive.waveforms.shapes import Switched
 
 AHEAD: Final = 1e-6  # Time before the touch at which the simulations of a map begin, s; arbitrary
@@ -159,12 +160,18 @@ def impact_map(
     possible = (fire > every + 2.0 * AHEAD) & ((width == ALWAYS) | (fire > _EARLY[-1] * scale))
     rows, ways = np.nonzero(possible)
     pushes = {number: driver.push(number) for number in widths.tolist()}
-    drives, firsts = [], {}
+    drives: list[Drive] = []
+    firsts: dict[tuple[int, float, float, float], Switched] = {}
+    # Touches that need no push share their drives.
+    made: dict[tuple[int, float, float, float, float], Drive] = {}
     for row, way in zip(rows.tolist(), ways.tolist(), strict=True):
-        key = row, float(every[row, way]), float(back[way]), float(fire[way])
-        if key not in firsts:
-            firsts[key] = first_pulse(int(forces.kind[row]), *key[1:], driver)
-        drives.append(driver.drive([firsts[key], pushes[float(width[way])]], [0.0, key[3] + AHEAD]))
+        first = int(forces.kind[row]), float(every[row, way]), float(back[way]), float(fire[way])
+        key = *first, float(width[way])
+        if key not in made:
+            if first not in firsts:
+                firsts[first] = first_pulse(*first, driver)
+            made[key] = driver.drive([firsts[first], pushes[key[4]]], [0.0, first[3] + AHEAD])
+        drives.append(made[key])
     speed = forces.speed[rows]
     states = np.stack([forces.front - AHEAD * speed, speed], axis=1)
     ok, dots, _ = plant.run(drives, fire[ways] + _WAIT * scale, states, progress=progress)
