@@ -56,11 +56,10 @@ def lowpass_motion(times: FloatArray, x: FloatArray, v: FloatArray, tau: float) 
     third = 6.0 * (v[:-1] + v[1:] - 2.0 * rise) / (h * h)
     at_start = x[:-1] - tau * (v[:-1] - tau * (second - tau * third))
     at_end = x[1:] - tau * (v[1:] - tau * (second + third * h - tau * third))
-    kept = np.exp(-h / tau)
+    kept = np.exp(-h[:, 0] / tau).tolist()
     result = np.empty_like(x)
-    result[0] = x[0]
-    for k in range(len(h)):
-        result[k + 1] = at_end[k] + (result[k] - at_start[k]) * kept[k]
+    for column, (start, end) in enumerate(zip(at_start.T.tolist(), at_end.T.tolist(), strict=True)):
+        result[:, column] = _joined(float(x[0, column]), start, end, kept)
     return result
 
 
@@ -74,10 +73,21 @@ def lowpass_lines(times: FloatArray, values: FloatArray, tau: float) -> FloatArr
     h = np.diff(times)
     lag = tau * np.diff(values) / h
     at_start, at_end = (values[:-1] - lag).tolist(), (values[1:] - lag).tolist()
-    result = [float(values[0])]
-    for kept, start, end in zip(np.exp(-h / tau).tolist(), at_start, at_end, strict=True):
-        result.append(end + (result[-1] - start) * kept)
-    return np.array(result)
+    return np.array(_joined(float(values[0]), at_start, at_end, np.exp(-h / tau).tolist()))
+
+
+def _joined(first: float, at_start: list[float], at_end: list[float], kept: list[float]) -> list[float]:
+    """Return the output at the ends of all pieces, from the first output on.
+
+    `at_start` and `at_end` are the particular solution at the ends of each piece; `kept` is the fraction of the
+    transient that is left at its end. A loop over floats is several times faster than one over short rows.
+    """
+    result = [first]
+    value = first
+    for start, end, fraction in zip(at_start, at_end, kept, strict=True):
+        value = end + (value - start) * fraction
+        result.append(value)
+    return result
 
 
 def lowpass_waveform(segments: FloatArray, t: npt.ArrayLike, tau: float) -> FloatArray:
