@@ -55,26 +55,27 @@ def test_updates_do_not_lead_apart(learned: tuple[list[Learner], list[Progress]]
     assert sum(RUNS) * (DOTS + len(LINE)) == 1000
 
 
+@pytest.mark.usefixtures("brief")
 def test_learning_depends_on_readings_and_on_nothing_else_of_the_unit(
-    law: LearningLaw, monkeypatch: pytest.MonkeyPatch
+    small: LearningLaw, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Two different units with equal sensor readings, after one stage."""
     monkeypatch.setattr("printhammer.control.learning.learn.RUNS", RUNS[:1])
-    press, single = law.production.press([law.production.nominal]), law.entries.task.single.nominal
-    (time,), (force,) = press.ladder(law.rungs)
-    line = press.line([law.entries.open_loop])[0]
+    press, single = small.production.press([small.production.nominal]), small.entries.task.single.nominal
+    (time,), (force,) = press.ladder(small.rungs)
+    line = press.line([small.entries.open_loop])[0]
     shown = {
         len(time): Readings(time, force),
         len(LINE): Readings(line.flight_time[0], line.peak_force[0] / single.force),
     }
-    longer = press.line([law.entries.open_loop], COMPARED)[0]
+    longer = press.line([small.entries.open_loop], COMPARED)[0]
     shown[len(COMPARED)] = Readings(longer.flight_time[0], longer.peak_force[0] / single.force)
 
     class Deaf(ImpactSensor):
         def read(self, flight: np.ndarray, force: np.ndarray, unit: int, run: int) -> Readings:
             return shown[len(flight)]
 
-    one, two = calibrate(law, Variability().draw(nominal(), 2, 8), Deaf(force=0.03))[0]
+    one, two = calibrate(small, Variability().draw(nominal(), 2, 8), Deaf(force=0.03))[0]
     assert (one.corrections == two.corrections).all()
     assert one.corrections.any()
     assert set(vars(one)) == {
@@ -153,23 +154,24 @@ class Odd(ImpactSensor):
         return Readings(time + 60e-6 * (-1.0) ** np.arange(len(time)), None)
 
 
+@pytest.mark.usefixtures("brief")
 def test_no_table_is_handed_out_if_the_readings_are_not_explained(
-    by_time: LearningLaw, monkeypatch: pytest.MonkeyPatch
+    small_by_time: LearningLaw, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """After one stage, the result is the better open loop of the production."""
     monkeypatch.setattr("printhammer.control.learning.learn.RUNS", RUNS[:1])
-    learners, stages = calibrate(by_time, Variability().draw(nominal(), 1, 5), Odd())
+    learners, stages = calibrate(small_by_time, Variability().draw(nominal(), 1, 5), Odd())
     assert learners[0].misfit > MISFIT
     assert not stages[-1].learned.any()
     assert np.isnan(stages[-1].expected).all()
-    assert (learners[0].printed == by_time.first.settings).all()
+    assert (learners[0].printed == small_by_time.first.settings).all()
 
 
-def test_the_open_loop_of_the_own_pulse_arrives_when_that_of_the_switch_does(law: LearningLaw) -> None:
-    own, press = law.entries.own, law.production.press([law.production.nominal])
+def test_the_open_loop_of_the_own_pulse_arrives_when_that_of_the_switch_does(small: LearningLaw) -> None:
+    own, press = small.entries.own, small.production.press([small.production.nominal])
     assert own is not None
     assert own.pulse == nominal().waveform
-    for loop in law.entries.loops:
+    for loop in small.entries.loops:
         alone = press.line([loop.settings], (0,), [loop.pulse])[1]
         assert alone.arrival_deviation[0, 0] == pytest.approx(0.0, abs=1e-7)
         assert alone.force_deviation[0, 0] == pytest.approx(0.0, abs=1e-3)
