@@ -245,7 +245,9 @@ def test_an_offset_is_noticed(tmp_path: Path) -> None:
     path = shots.write(tmp_path / "shot.csv", HAMMER, offset=3e-6, bandwidth=None)
     fit = fit_motion([path], HAMMER)
     assert any("rests" in note and "offset of the sensor" in note for note in fit.remarks)
-    assert not any("rests" in note for note in fit_motion([shots.write(path, HAMMER, bandwidth=None)], HAMMER).remarks)
+    assert not any(
+        "rests" in note for note in fit_motion([shots.write(path, HAMMER, bandwidth=None)], HAMMER).remarks
+    )
 
 
 BAD: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {

@@ -147,7 +147,7 @@ def test_every_law(magnet: str, backstop: str) -> None:
     drives = hammers.drives("current" if magnet else "force")
     state = (STOP if backstop else 120e-6, 0.0)
     with hammers.interpreted():
-        check(Ensemble(every, drives["train"], 1.3e-3, states=state), points=40)
+        check(Ensemble(every, drives["train"], 1.3e-3, states=state, tolerance=1e-6), points=40)
 
 
 def test_force_drives() -> None:

@@ -79,8 +79,8 @@ def lowpass_lines(times: FloatArray, values: FloatArray, tau: float) -> FloatArr
 def _joined(first: float, at_start: list[float], at_end: list[float], kept: list[float]) -> list[float]:
     """Return the output at the ends of all pieces, from the first output on.
 
-    `at_start` and `at_end` are the particular solution at the ends of each piece; `kept` is the fraction of the
-    transient that is left at its end. A loop over floats is several times faster than one over short rows.
+    `at_start` and `at_end` are the particular solution at the ends of each piece; `kept` is the fraction of
+    the transient that is left at its end. A loop over floats is several times faster than over short rows.
     """
     result = [first]
     value = first

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Mapping
+from functools import cache
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -83,9 +84,8 @@ class Part(BaseModel):
 
         A missing constant is NaN, an option 0 or 1 or the index of its choice.
         """
-        kinds = options(type(self))
-        values = ((getattr(self, name), kinds.get(name)) for name in self.names())
-        return (*(_number(value, kind) for value, kind in values), float(self.variant))
+        fields = _fields(type(self))
+        return (*[_number(getattr(self, name), choices) for name, choices in fields], float(self.variant))
 
     def content(self) -> Mapping[str, Any]:
         """Return the numbers read from an additional file, such as a table, for the digest of the hammer."""
@@ -235,8 +235,16 @@ def laws(role: str) -> tuple[str, ...]:
     return tuple(sorted(law for known, law in PARTS if known == role))
 
 
-def _number(value: Any, kind: Any) -> float:
-    """Return a field as a number; `kind` is the annotation of an option."""
-    if get_origin(kind) is Literal:
-        return float(get_args(kind).index(value))
+@cache
+def _fields(part: type[Part]) -> tuple[tuple[str, tuple[Any, ...] | None], ...]:
+    """List the fields in `Part.numbers`: names, and the choices of an option of a few words, else None."""
+    kinds = options(part)
+    words = {name: get_args(kind) for name, kind in kinds.items() if get_origin(kind) is Literal}
+    return tuple((name, words.get(name)) for name in part.names())
+
+
+def _number(value: Any, choices: tuple[Any, ...] | None) -> float:
+    """Return a field as a number: of an option with `choices`, the index of its choice."""
+    if choices is not None:
+        return float(choices.index(value))
     return math.nan if value is None else float(value)

@@ -10,11 +10,12 @@ from printhammer.control.learning.law import RUNS
 
 
 def test_a_unit_learns_its_table(cli: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two stages only; control/learning/test_units.py runs all stages for two units."""
-    monkeypatch.setattr("printhammer.control.learning.learn.RUNS", RUNS[:2])
+    """One stage only; control/learning/test_units.py runs all stages for two units."""
+    monkeypatch.setattr("printhammer.control.learning.learn.RUNS", RUNS[:1])
     unit, table, picture = tmp_path / "unit.toml", tmp_path / "learned.csv", tmp_path / "lines.png"
     ph.load("hendriks-1983-1").replace("magnet.Am", 0.282).save(unit)
-    words = ("--rate", "1.275kHz", "--force-noise", 0.03, "--members", 100, "--serial", "A17", "--unit", unit)
+    words = ("--rate", "1.275kHz", "--force-noise", 0.03, "--members", 100, "--history", 1)
+    words += ("--serial", "A17", "--unit", unit)
     done = cli("learn", "hendriks-1983-1", *words, "--table", table, "--out", picture)
     assert done.status in (0, 1)
     assert "Unit A17 of hendriks-1983-1 at 1275 Hz" in done.out

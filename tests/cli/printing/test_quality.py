@@ -119,7 +119,7 @@ def test_a_compensation_table_drives_instead(cli: Callable, tmp_path: Path) -> N
     quick, table = tmp_path / "quick.toml", tmp_path / "table.csv"
     hammer = ph.load(CRUDE).replace({"waveform.amplitude": 1.3, "waveform.width": 200e-6})
     hammer.save(quick)
-    ph.tune(hammer, rate=1850.0, history=1, reach=1).save(table)
+    ph.tune(hammer, rate=1850.0, history=1, reach=1, brake=False).save(table)
     done = cli("quality", quick, "--rate", "1850 Hz", "--pattern", "1111", "--table", table)
     assert done.status == 0
     assert "1850 Hz, table" in done.out

@@ -23,7 +23,7 @@ def quick(tmp_path: Path) -> Path:
 def test_tables_and_pictures(cli: Callable, quick: Path, tmp_path: Path) -> None:
     names = [tmp_path / f"table.{kind}" for kind in ("csv", "json", "h", "nc", "png")]
     out = [word for name in names for word in ("--out", name)]
-    done = cli("tune", quick, "--rate", "1.85kHz", "--history", 1, "--no-judge", *out)
+    done = cli("tune", quick, "--rate", "1.85kHz", "--history", 1, "--no-brake", "--no-judge", *out)
     assert done.status == 0
     assert "Table for 1850 Hz" in done.out
     assert ph.load_table(names[0]).fingerprint == ph.load(quick).fingerprint
@@ -35,7 +35,7 @@ def test_tables_and_pictures(cli: Callable, quick: Path, tmp_path: Path) -> None
 def test_tables_along_the_gap(cli: Callable, quick: Path, tmp_path: Path) -> None:
     names = [tmp_path / f"table.{kind}" for kind in ("csv", "json", "h", "nc")]
     out = [word for name in names for word in ("--out", name)]
-    words = ("--rate", "1.85kHz", "--history", 1, "--reach", 1, "--along", "gap -2 um, 2 um, 2")
+    words = ("--rate", "1.85kHz", "--history", 1, "--reach", 1, "--no-brake", "--along", "gap -2 um, 2 um, 2")
     done = cli("tune", quick, *words, "--tick", "1 us", "--budget", 60, *out)
     assert done.status == 0
     assert "Tables along the gap at 1850 Hz" in done.out

@@ -96,8 +96,8 @@ def test_a_rate_that_eight_dots_bear_and_a_row_does_not_is_not_safe() -> None:
 
 
 def test_slow_enough_everything_passes(hammer: "ph.Hammer") -> None:
-    found = safe_rate(hammer, first=40.0, last=60.0, step=10.0)
-    assert found.passed.tolist() == [True] * 3
+    found = safe_rate(hammer, first=50.0, last=60.0, step=10.0)
+    assert found.passed.tolist() == [True] * 2
     assert found.long_run.all()
     assert found.at_least
     assert found.rate == 60.0
@@ -140,11 +140,11 @@ def test_a_strategy_may_fire_ahead(hammer: "ph.Hammer") -> None:
     def ahead(driven: "ph.Hammer", patterns: Sequence[tuple[int, ...]], rate: float) -> list[Drive]:
         return [drive.with_times(drive.times - 40e-6) for drive in open_loop(driven, patterns, rate)]
 
-    found = safe_rate(hammer, ahead, first=40.0, last=40.0)
+    found = safe_rate(hammer, ahead, first=60.0, last=60.0)
     assert found.strategy == "ahead"
     assert found.arrival_low[0] == pytest.approx(-40e-6, abs=1e-9)
     assert found.arrival_high[0] == pytest.approx(-40e-6, abs=1e-9)
-    assert safe_rate(hammer, ahead, limits=Limits(arrival=39e-6), first=40.0, last=40.0).failure is not None
+    assert safe_rate(hammer, ahead, limits=Limits(arrival=39e-6), first=60.0, last=60.0).failure is not None
 
 
 def test_a_strategy_whose_drives_do_not_fit_is_refused(hammer: "ph.Hammer") -> None:
@@ -155,10 +155,9 @@ def test_a_strategy_whose_drives_do_not_fit_is_refused(hammer: "ph.Hammer") -> N
         safe_rate(hammer, lambda _h, patterns, _r: [one] * len(patterns), first=100.0, last=100.0)
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-def test_the_result_does_not_depend_on_threads(hammer: "ph.Hammer", threads: int) -> None:
-    few = {"first": 600.0, "last": 800.0, "step": 100.0, "stop": False}
-    one, other = safe_rate(hammer, **few), safe_rate(hammer, threads=threads, **few)
+def test_the_result_does_not_depend_on_threads(hammer: "ph.Hammer") -> None:
+    few = {"first": 700.0, "last": 800.0, "step": 100.0, "stop": False}
+    one, other = (safe_rate(hammer, threads=threads, **few) for threads in (1, 2))
     for name in ("force_low", "force_high", "arrival_low", "arrival_high", "passed"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 

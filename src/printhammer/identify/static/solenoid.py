@@ -18,7 +18,13 @@ from printhammer.errors import InputError
 from printhammer.identify.least_squares import Parameters
 from printhammer.identify.result import Fit
 from printhammer.identify.static.assemble import Data, assemble, check_rows, solved
-from printhammer.parts.magnet.reluctance import MU0, ReluctanceMagnet, magnet_force, magnet_linkage
+from printhammer.parts.magnet.reluctance import (
+    MU0,
+    ReluctanceMagnet,
+    magnet_force,
+    magnet_linkage,
+    magnet_packed,
+)
 from printhammer.support.arrays import FloatArray
 from printhammer.support.tables.readings import read_table
 
@@ -172,15 +178,24 @@ class CircuitLaw:
     """Logarithms of force and linkage at m gaps and currents (SI), shape (2 m,); p contains `CONSTANTS`."""
 
     def __init__(self, gap: FloatArray, current: FloatArray, turns: float) -> None:
+        magnet = ReluctanceMagnet(turns=turns, pole_area=1.0, closed_at=0.0)
         self.turns = turns
+        self.numbers = list(magnet.numbers())
+        self.places = [magnet.names().index(name) for name in CONSTANTS]
         self.widest = float(gap.max())
         self.rows = list(zip(gap.tolist(), current.tolist(), strict=True))
 
     def value(self, p: FloatArray) -> FloatArray:
         """Compute the logarithms of the forces [N] and flux linkages [Wb] at the measured points."""
-        constants = dict(zip(CONSTANTS, p.tolist(), strict=True))
-        constants["leakage_reach"] = max(constants["leakage_reach"], (1.0 + 1e-9) * self.widest)
-        c = ReluctanceMagnet(turns=self.turns, closed_at=0.0, **constants).packed(0.0)
+        # The constants are positive; building a magnet, to validate them, would take a third of the fit.
+        *constants, reach = p.tolist()
+        numbers = self.numbers.copy()
+        for place, value in zip(
+            self.places, [*constants, max(reach, (1.0 + 1e-9) * self.widest)], strict=True
+        ):
+            numbers[place] = value
+        c = [0.0] * len(numbers)
+        magnet_packed(numbers, 0.0, c)
         forces = [magnet_force(c, -gap, current) for gap, current in self.rows]
         linkages = [magnet_linkage(c, -gap, current) for gap, current in self.rows]
         logarithms: FloatArray = np.log(forces + linkages)
