@@ -32,7 +32,7 @@ def branch() -> Branch:
     return ph.continuation(
         ball,
         "drive.amplitude",
-        (0.9 * WEIGHT, 1.7 * WEIGHT),
+        (1.0 * WEIGHT, 1.55 * WEIGHT),
         drive=ph.SineForce(GAMMA * WEIGHT, FREQUENCY),
         state=state,
         phase=0.5,
@@ -112,7 +112,9 @@ def test_ends_before_the_bounds_are_told(branch: Branch) -> None:
 
 
 def test_a_chart_is_drawn(branch: Branch) -> None:
-    chart: StabilityChart = ph.stability_chart(branch, "backstop.restitution", (0.48, 0.52), grid=(4, 3))
+    chart: StabilityChart = ph.stability_chart(
+        branch, "backstop.restitution", (0.48, 0.52), grid=(2, 2), most=8
+    )
     figure = chart.plot()
     for kind in ("fold", "period doubling"):
         (curve,) = [curve for curve in chart.curves if curve.kind == kind]
@@ -126,7 +128,7 @@ def test_a_chart_is_drawn(branch: Branch) -> None:
 
 def test_a_curve_is_drawn_with_and_without_attractors(branch: Branch) -> None:
     curve = ph.bifurcation_curve(
-        branch, "backstop.restitution", (0.48, 0.52), event="period doubling", grid=(4, 3)
+        branch, "backstop.restitution", (0.48, 0.52), event="period doubling", grid=(2, 2), most=8
     )
     figure = curve.plot()
     (line,) = lines(figure, "period doubling")

@@ -71,9 +71,26 @@ def at_rest(omega: float, force: float) -> Branch:
 
 
 @pytest.fixture(scope="module")
-def doubling() -> BifurcationCurve:
+def counted() -> tuple[BifurcationCurve, int]:
+    """The doubling curve, and the number of evaluations of the map that it took."""
+    calls = 0
+    evaluate = ImpactSystem.__call__
+
+    def evaluated(system: ImpactSystem, whole: Array, other: float) -> MapValue:
+        nonlocal calls
+        calls += 1
+        return evaluate(system, whole, other)
+
     branch = branch_of(0.85, 0.325, (3.19, 0.34), 0.02, 10)
-    return ph.bifurcation_curve(branch, "rate", BOUNDS, event="period doubling", first=FORCES)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ImpactSystem, "__call__", evaluated)
+        curve = ph.bifurcation_curve(branch, "rate", BOUNDS, event="period doubling", first=FORCES)
+    return curve, calls
+
+
+@pytest.fixture(scope="module")
+def doubling(counted: tuple[BifurcationCurve, int]) -> BifurcationCurve:
+    return counted[0]
 
 
 @pytest.fixture(scope="module")
@@ -244,20 +261,10 @@ def test_bad_input_is_refused_in_one_sentence(tmp_path: Path) -> None:
         ph.bifurcation_curve(tmp_path / "branch.nc", "rate", BOUNDS, regime=other)
 
 
-def test_what_a_point_of_a_curve_costs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_a_point_of_a_curve_costs(counted: tuple[BifurcationCurve, int]) -> None:
     """The cost is counted in evaluations of the map, which do not depend on the machine."""
-    calls = 0
-    evaluate = ImpactSystem.__call__
-
-    def counted(system: ImpactSystem, whole: Array, other: float) -> MapValue:
-        nonlocal calls
-        calls += 1
-        return evaluate(system, whole, other)
-
-    monkeypatch.setattr(ImpactSystem, "__call__", counted)
-    branch = branch_of.__wrapped__(0.85, 0.325, (3.19, 0.34), 0.02, 10)
-    curve = ph.bifurcation_curve(branch, "rate", BOUNDS, event="period doubling", first=FORCES)
-    assert calls < 8 * len(curve)
+    curve, calls = counted
+    assert len(curve) < calls < 8 * len(curve)
 
 
 @pytest.mark.slow

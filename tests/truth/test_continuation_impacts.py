@@ -355,21 +355,6 @@ def test_an_oscillation_goes_on_where_it_grazes_a_pack() -> None:
     assert [event.kind for event in branch.events if event.contacts == ("", "")] == []
 
 
-def test_chart_of_the_bouncing_ball() -> None:
-    case = BouncingBall(GRAVITY, 0.8, FREQUENCY)
-    weight = MASS * GRAVITY
-    branch = bounces(case, 0.8, (0.05, 2.0))
-    chart = stability_chart(branch, "backstop.restitution", (0.5, 0.9), grid=(0, 0))
-    assert chart.refused == ()
-    assert sorted(curve.kind for curve in chart.curves) == ["fold", "period doubling"]
-    for curve in chart.curves:
-        assert curve.limits.all()
-        assert (curve.second.min(), curve.second.max()) == (0.5, 0.9)
-        exact = [BouncingBall(GRAVITY, e, FREQUENCY) for e in curve.second]
-        limits = [one.fold if curve.kind == "fold" else one.doubling for one in exact]
-        np.testing.assert_allclose(curve.first / weight, limits, rtol=1e-6)
-
-
 @pytest.mark.slow
 def test_a_chart_has_a_limit_that_its_branch_does_not_meet() -> None:
     # At e = 0.8 the doubling lies at 1.0708, above the range; at e = 0.9 at 1.0163, within it.

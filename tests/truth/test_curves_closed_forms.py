@@ -123,7 +123,11 @@ def test_the_chart_of_the_ball() -> None:
         progress=lambda *step: steps.append(step),
     )
     assert isinstance(chart, StabilityChart)
+    assert chart.refused == ()
     assert [curve.kind for curve in chart.curves] == ["fold", "period doubling"]
+    for curve in chart.curves:
+        assert curve.limits.all()
+        assert (curve.second.min(), curve.second.max()) == (0.75, 0.85)
     assert "1 of fold, 1 of period doubling" in chart.message
     assert steps[-1][0] == steps[-1][1]
     data = chart.to_dataset()

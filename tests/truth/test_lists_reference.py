@@ -174,10 +174,10 @@ def test_many_random_lists_with_dry_friction(seed: int) -> None:
 
 def test_random_lists_with_damped_contacts_and_dry_friction_between_two_stops() -> None:
     """All forces and contacts in each hammer; the slow tests draw hammers with fewer of them."""
-    closings, sticks, impacts = check(4, 12, dry=True, front=True, lossy=True)
-    assert closings > 12
+    closings, sticks, impacts = check(4, 6, dry=True, front=True, lossy=True)
+    assert closings > 6
     assert sticks > 0
-    assert impacts > 10
+    assert impacts > 5
 
 
 @pytest.mark.slow

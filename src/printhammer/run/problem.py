@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from copy import copy
 from functools import cached_property
 from typing import Any, Final, Literal, TypeVar
 
@@ -227,9 +228,26 @@ class Problem:
         self.firings = np.array(firings, dtype=np.float64)
         self.begins = np.array(begins, dtype=np.int64)
         self.pieces = np.array(pieces, dtype=np.float64)
-        self.scales = scales_of(hammer, drive, state)
-        self.control = control_of(self.scales, tolerance)
-        self.bounds = bounds_of(hammer, self.scales)
+        self._static = StaticForce(hammer)
+        self._set_scales()
+
+    def _set_scales(self) -> None:
+        """Set the typical displacement and speed, and what follows from them."""
+        self.scales = scales_of(self.hammer, self.drive, self.state, self._static)
+        self.control = control_of(self.scales, self.tolerance)
+        self.bounds = bounds_of(self.hammer, self.scales)
+
+    def started(self, state: tuple[float, float], start: float) -> Problem:
+        """Return a problem of the same hammer and drive that starts at another state and time.
+
+        The state is outside the pack, and without current.
+        """
+        made = copy(self)
+        made.state, made.start, made.beyond = state, start, AT_REST
+        # A copy, since `leave_out` changes the constants.
+        made.constants = self.constants.copy()
+        made._set_scales()
+        return made
 
     @cached_property
     def kernel(self) -> Kernel:

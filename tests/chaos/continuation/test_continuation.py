@@ -1,6 +1,8 @@
 import dataclasses
+import functools
 import json
 import math
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -216,25 +218,26 @@ def test_grazings_are_named_as_the_constant_grows(
         assert math.isfinite(found.value)
 
 
-@pytest.fixture(scope="module")
-def steep() -> Branch:
-    """A branch with doublings close to folds and grazings, within 1e-4 of its parameter range."""
-    return ph.continuation(ph.load("hendriks-1983-1"), "period", ("1.1 ms", "1.33 ms"), period="1.25 ms")
+def steep(period: float, state: tuple[float, float]) -> Branch:
+    """A few orbits of a branch with doublings close to folds and grazings, within 1e-4 of its range."""
+    bounds = ("1.1 ms", "1.33 ms")
+    return ph.continuation(ph.load("hendriks-1983-1"), "period", bounds, period=period, state=state, most=12)
 
 
 @pytest.mark.parametrize(
-    ("born", "ends", "doublings"),
+    ("period", "state", "born", "ends", "doublings"),
     [
         # Each branch is followed from one of its two ends, upwards and downwards.
-        (1.1545156e-3, 1.2467185e-3, (1.1834217e-3, 1.2462172e-3)),
-        (1.3228613e-3, 1.2563104e-3, (1.2783385e-3, 1.3217745e-3)),
+        (1.1632e-3, (50.95e-6, 0.0932), 1.1545156e-3, 1.2467185e-3, (1.1834217e-3, 1.2462172e-3)),
+        (1.3215e-3, (51.496e-6, 0.0041), 1.3228613e-3, 1.2563104e-3, (1.2783385e-3, 1.3217745e-3)),
     ],
 )
 def test_doubled_branches_lead_from_doubling_to_doubling(
-    steep: Branch, born: float, ends: float, doublings: tuple[float, float]
+    period: float, state: tuple[float, float], born: float, ends: float, doublings: tuple[float, float]
 ) -> None:
-    event = next(e for e in steep.events if e.kind == "period doubling" and abs(e.value - born) < 1e-9)
-    doubled = steep.doubled(event, most=200)
+    branch = steep(period, state)
+    event = next(e for e in branch.events if e.kind == "period doubling" and abs(e.value - born) < 1e-9)
+    doubled = branch.doubled(event, most=200)
     assert [stop.reason for stop in doubled.stops] == ["period doubling", "period doubling"]
     assert doubled.stops[1].parameter == pytest.approx(ends, abs=1e-10)
     found = sorted(e.value for e in doubled.events if e.kind == "period doubling")
@@ -244,10 +247,11 @@ def test_doubled_branches_lead_from_doubling_to_doubling(
     assert (np.abs(doubled.x[1:-1, 0] - doubled.x[1:-1, 1]) > 0.0).all()
 
 
-def test_a_doubling_among_grazings_has_its_branch(steep: Branch) -> None:
+def test_a_doubling_among_grazings_has_its_branch() -> None:
     # It was sought too far off, at a negative period.
-    event = next(e for e in steep.events if abs(e.value - 1.1567165e-3) < 1e-9)
-    doubled = steep.doubled(event, most=40)
+    branch = steep(1.1554e-3, (54.25e-6, -0.0527))
+    event = next(e for e in branch.events if abs(e.value - 1.1567165e-3) < 1e-9)
+    doubled = branch.doubled(event, most=40)
     assert doubled.stops[0].reason == "period doubling"
     assert any(abs(e.value - 1.1565279e-3) < 1e-9 for e in doubled.events)
 
@@ -264,12 +268,17 @@ def test_regimes_follow_each_orbit_once(hammer: "ph.Hammer") -> None:
     assert any(branch.stable.all() for branch in found)
 
 
-def test_an_interrupted_search_hands_over_what_was_followed(hammer: "ph.Hammer") -> None:
+def test_an_interrupted_search_hands_over_what_was_followed(
+    hammer: "ph.Hammer", monkeypatch: pytest.MonkeyPatch
+) -> None:
+    few = functools.partial(ph.orbits, starts=20, guesses=8, follow=0)
+    monkeypatch.setattr(sys.modules[InterruptedBranches.__module__], "orbits", few)
+
     def stop(_done: int, _total: int) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt) as caught:
-        ph.regimes(hammer, (330.0, 340.0), longest=1, seeds=2, progress=stop)
+        ph.regimes(hammer, (330.0, 340.0), longest=1, seeds=2, most=5, progress=stop)
     assert isinstance(caught.value, InterruptedBranches)
     assert len(caught.value.branches) >= 1
 
@@ -302,7 +311,7 @@ def test_bad_charts(branch: Branch) -> None:
 
 def test_a_chart_without_limits_still_shows_where_trains_settle(branch: Branch) -> None:
     own = branch.regime.hammer.constants["backstop.damping"].si
-    chart = ph.stability_chart(branch, "backstop.damping", (0.98 * own, 1.02 * own), grid=(3, 2))
+    chart = ph.stability_chart(branch, "backstop.damping", (0.98 * own, 1.02 * own), grid=(3, 2), most=5)
     assert chart.curves == ()
     assert (chart.settled == 1).all()
     assert "100 % of the grid" in chart.message

@@ -157,7 +157,7 @@ def test_a_search_that_finds_nothing_says_so(hammer: ph.Hammer) -> None:
 def test_branches_lead_to_orbits_that_no_motion_comes_close_to() -> None:
     # Saddles with multipliers of 89 and -4, partners in a fold, and one of period 2 between them with -315.
     hammer = ph.load("hendriks-1983-1")
-    found = ph.orbits(hammer, period="1.05 ms", longest=2, starts=100)
+    found = ph.orbits(hammer, period="1.05 ms", longest=2, starts=100, follow=1)
     half = found.regime.window.half_widths
     for firings, x, v in ((1, 93.314e-6, -0.49619), (1, 95.380e-6, -0.48855), (2, 93.154e-6, -0.49431)):
         gaps = [

@@ -74,8 +74,10 @@ def fly(
     contacts: list[str] = []
     rigid = surface == "backstop" and has_rigid_backstop(regime)
 
+    first = Problem(hammer, train, (float(state[0]), float(state[1])), begin, tolerance)
+
     def problem(start: float, *, alone: bool) -> Problem:
-        made = Problem(hammer, train, (float(state[0]), float(state[1])), start, tolerance)
+        made = first.started((float(state[0]), float(state[1])), start)
         if alone:
             made.leave_out(surface)
         return made

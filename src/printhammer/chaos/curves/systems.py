@@ -33,9 +33,9 @@ surface.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Final
 
 import numpy as np
@@ -183,10 +183,13 @@ _IN_TRACE: Final = {"fold": -1.0, "period doubling": 1.0, "Neimark-Sacker": 0.0}
 """Coefficient c of the test function f = 1 + det J + c tr J by definition; Neimark-Sacker: f = det J - 1."""
 
 
-def _flight(
-    plane: Plane, surface: Surface, phase: float, speed: float, first: float, second: float
-) -> Flight:
-    return fly(plane.at(first, second), surface, phase, speed, plane.firings, plane.tolerance)
+def _flights(plane: Plane, surface: Surface, points: Iterable[FloatArray]) -> Iterator[Flight]:
+    """Compute the flights from points (phase, speed, first parameter, second parameter)."""
+    # Most neighbours of a point have its parameters, and share its regime.
+    at = cache(plane.at)
+    for phase, speed, first, second in points:
+        regime = at(float(first), float(second))
+        yield fly(regime, surface, float(phase), float(speed), plane.firings, plane.tolerance)
 
 
 class GrazingSystem:
@@ -202,7 +205,7 @@ class GrazingSystem:
         The closing error is the difference of the states at start and end, in units of the state scales. If
         the run ends early, the reason is returned as text. Raises InputError for invalid parameters.
         """
-        flight = _flight(self.plane, self.surface, phase, 0.0, first, second)
+        (flight,) = _flights(self.plane, self.surface, [np.array([phase, 0.0, first, second])])
         if flight.trouble:
             return flight.trouble
         at, contacts = np.array([flight.surface, 0.0]), cyclic(flight.contacts)
@@ -250,10 +253,9 @@ class ImpactSystem:
         """Evaluate the extended map on (phase, velocity after the impact, first parameter)."""
         moves, point = SPACING * self.scales, np.append(whole, other)
         try:
-            flights = [
-                _flight(self.plane, "backstop", *map(float, at))
-                for at in [point, *(point + move for move in np.diag(moves))]
-            ]
+            flights = list(
+                _flights(self.plane, "backstop", [point, *(point + move for move in np.diag(moves))])
+            )
         except InputError as error:
             return MapValue.none(3, str(error))
         for flight in flights:
