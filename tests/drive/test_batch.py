@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.errors import refused
 
@@ -17,6 +17,7 @@ from printhammer.drive.waveforms.shapes import HalfSine, Sine
 PULSE = HalfSine(amplitude=1.0, width=3e-4)
 
 
+@settings(max_examples=30)
 @given(
     rates=st.lists(st.floats(1e-3, 1e5), min_size=1, max_size=6),
     pulses=st.integers(1, 9),

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.errors import refused
 
@@ -47,6 +47,7 @@ drives: st.SearchStrategy[Drive] = st.one_of(
 )
 
 
+@settings(max_examples=50)
 @given(drives)
 def test_what_is_written_is_read_back_to_the_last_bit(drive: Drive) -> None:
     again = read_drive(drive.to_toml())
@@ -202,6 +203,7 @@ tables = st.dictionaries(keys, toml_values, max_size=5).map(
 )
 
 
+@settings(max_examples=50)
 @given(st.sampled_from(["train", "times", "burst", "sine"]), tables, tables)
 def test_any_toml_is_a_drive_or_an_input_error(kind: str, timing: str, waveform: str) -> None:
     for text in (

@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.errors import refused
 from tests.hammers import CRUDE
@@ -277,6 +277,7 @@ def test_comments_and_layout_survive_a_replacement(hammer: ph.Hammer) -> None:
 KEYS = sorted(FOUND)
 
 
+@settings(max_examples=40)
 @given(
     st.dictionaries(st.sampled_from(KEYS), st.floats(0.97, 1.03)),
     st.sampled_from(["a # b", 'c "d"', "e\\f µ"]),

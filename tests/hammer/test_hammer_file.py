@@ -238,7 +238,7 @@ def test_hertz_backstop_from_bodies_and_a_rebound() -> None:
 
 
 @given(st.text(max_size=30), st.integers(0, len(GOOD)), st.integers(0, 30))
-@settings(max_examples=150)
+@settings(max_examples=75)
 def test_any_text_is_read_or_refused(text: str, place: int, cut: int) -> None:
     told = ""
     try:

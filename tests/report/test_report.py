@@ -14,6 +14,7 @@ from printhammer.errors import InputError
 from printhammer.figures import PaperFigure
 from printhammer.report import build, pdf, write_report
 from printhammer.report.contents import (
+    Report,
     band_text,
     cited_figures,
     distance,
@@ -92,11 +93,15 @@ def blank(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(scope="module")
-def folder(hammer: "ph.Hammer", tmp_path_factory: pytest.TempPathFactory) -> Path:
+def report(hammer: "ph.Hammer", tmp_path_factory: pytest.TempPathFactory) -> Report:
     out = tmp_path_factory.mktemp("paper") / "new" / "folder"
-    report = write_report(
-        hammer, out, claims=CLAIMS, figures=[2, 3], reconstruction=results_of(hammer, out.parent)
-    )
+    made = results_of(hammer, out.parent)
+    return write_report(hammer, out, claims=CLAIMS, figures=[2, 3], reconstruction=made, pdf=True)
+
+
+@pytest.fixture(scope="module")
+def folder(report: Report) -> Path:
+    (out,) = (path.parent for path in report.files if path.name == "index.html")
     assert all(path.is_file() for path in report.files)
     assert {path for path in out.rglob("*") if path.is_file()} == set(report.files)
     return out
@@ -342,11 +347,9 @@ def test_a_page_that_is_there_stands_for_a_complete_report(
     assert not (tmp_path / "index.html").exists()
 
 
-def test_the_pdf_has_a_page_for_each_figure(hammer: "ph.Hammer", tmp_path: Path) -> None:
-    made, out = results_of(hammer, tmp_path), tmp_path / "out"
-    report = write_report(hammer, out, claims=CLAIMS, figures=[2, 3], reconstruction=made, pdf=True)
-    assert out / "report.pdf" in report.files
-    text = (out / "report.pdf").read_bytes()
+def test_the_pdf_has_a_page_for_each_figure(report: Report, folder: Path) -> None:
+    assert folder / "report.pdf" in report.files
+    text = (folder / "report.pdf").read_bytes()
     assert text.startswith(b"%PDF-")
     assert b"hendriks-1983" in text
     assert b"CreationDate" not in text
@@ -354,8 +357,8 @@ def test_the_pdf_has_a_page_for_each_figure(hammer: "ph.Hammer", tmp_path: Path)
     # The front, two figures, and at least two pages of claims and results.
     (count,) = re.findall(rb"/Type/Pages/Count (\d+)", text)
     assert int(count) >= 5
-    pdf.write_pdf(report, out / "again.pdf")
-    assert (out / "again.pdf").read_bytes() == text
+    pdf.write_pdf(report, folder / "again.pdf")
+    assert (folder / "again.pdf").read_bytes() == text
 
 
 def test_a_figure_that_cannot_be_drawn_has_its_page(hammer: "ph.Hammer", tmp_path: Path) -> None:

@@ -119,7 +119,7 @@ def oscillators(count: int) -> Iterator[tuple[float, float, float, float, float]
 
 def test_a_linear_oscillator_is_waited_for_until_its_exact_motion_has_settled() -> None:
     at_bound = 0
-    for mass, damping, stiffness, force, width in oscillators(25):
+    for mass, damping, stiffness, force, width in oscillators(15):
         hammer = hammers.made_of(
             mass,
             spring=PreloadSpring(preload=0.0, stiffness=stiffness),
@@ -150,7 +150,7 @@ def test_a_linear_oscillator_is_waited_for_until_its_exact_motion_has_settled() 
             assert is_at_rest(wait, 0.051)
         if wait > least:
             assert not is_at_rest(0.5 * wait, 0.04)
-    assert 0 < at_bound < 20
+    assert 0 < at_bound < 12
 
 
 def listed(random: np.random.Generator, *, dry: bool) -> tuple[ph.Hammer, HalfSine]:

@@ -220,15 +220,15 @@ def test_the_same_bits_for_any_threads_and_order(
     spec_file: Callable[..., Path], tmp_path: Path, bytes_of: Callable[[Path], dict[str, bytes]]
 ) -> None:
     path = spec_file()
-    for threads in (1, 2, 5):
+    for threads in (1, 5):
         ph.sweep(path, tmp_path / f"{threads}.zarr", threads=threads)
-    assert bytes_of(tmp_path / "1.zarr") == bytes_of(tmp_path / "2.zarr") == bytes_of(tmp_path / "5.zarr")
+    assert bytes_of(tmp_path / "1.zarr") == bytes_of(tmp_path / "5.zarr")
 
 
 def test_the_same_numbers_for_any_chunks(spec_file: Callable[..., Path], tmp_path: Path) -> None:
     found = [
-        ph.sweep(spec_file(f"{chunk}.toml", chunk=chunk), tmp_path / f"{chunk}.zarr").load()
-        for chunk in (1, 5, 12)
+        ph.sweep(spec_file(f"{chunk}.toml", chunk=chunk, count=3), tmp_path / f"{chunk}.zarr").load()
+        for chunk in (1, 4, 6)
     ]
     for other in found[1:]:
         xr.testing.assert_equal(found[0], other)

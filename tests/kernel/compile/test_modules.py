@@ -196,15 +196,17 @@ for verb in {verbs!r}:
 print(loaded)
 """
     done = ""
-    # The first one makes what is not there.
+    expected: dict[str, list[str]] = {"library": [], **{verb[0]: [] for verb in verbs}}
+    # The first one makes what is not there, if anything.
     for _ in range(2):
         run = subprocess.run(
             [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
         )
         assert run.returncode == 0, run.stderr
-        done = run.stdout
-    expected: dict[str, list[str]] = {"library": [], **{verb[0]: [] for verb in verbs}}
-    assert done.splitlines()[-1] == str(expected)
+        done = run.stdout.splitlines()[-1]
+        if done == str(expected):
+            break
+    assert done == str(expected)
 
 
 @pytest.mark.slow

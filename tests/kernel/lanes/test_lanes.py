@@ -50,8 +50,10 @@ def test_any_order(members: Members, whole: EnsembleResult, seed: int) -> None:
 
 @pytest.mark.parametrize("chunk", [7, 16, 129, 399])
 def test_any_chunks(members: Members, whole: EnsembleResult, chunk: int) -> None:
-    for first in range(0, len(members.hammers), chunk):
-        which = np.arange(first, min(first + chunk, len(members.hammers)))
+    # A small chunk is not run for all members.
+    count = min(len(members.hammers), 20 * chunk)
+    for first in range(0, count, chunk):
+        which = np.arange(first, min(first + chunk, count))
         assert differing(whole, members.run(which, engine="lanes"), which) == []
 
 

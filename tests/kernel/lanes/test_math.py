@@ -70,14 +70,12 @@ def near_one(count: int, seed: int) -> Array:
 
 @pytest.mark.parametrize("span", [(-708.0, 709.0), (-1.0, 1.0), (-1e-8, 1e-8), (-60.0, 0.0)])
 def test_exp(span: tuple[float, float]) -> None:
-    x = np.append(rng(0).uniform(*span, 3001), span)
+    x = np.append(rng(0).uniform(*span, 1001), span)
     assert errors(values("exp", x), exact(mpmath.exp, x), relative=True).max() < 4.0 * ULP
 
 
 def test_log() -> None:
-    x = np.concatenate(
-        [10.0 ** rng(1).uniform(-307.0, 308.0, 3001), near_one(2000, 2), [math.sqrt(0.5), 2.0]]
-    )
+    x = np.concatenate([10.0 ** rng(1).uniform(-307.0, 308.0, 1001), near_one(700, 2), [math.sqrt(0.5), 2.0]])
     assert errors(values("log", x), exact(mpmath.log, x), relative=True).max() < 4.0 * ULP
     assert values("log", [1.0])[0] == 0.0
 
@@ -85,7 +83,7 @@ def test_log() -> None:
 @pytest.mark.parametrize("y", [0.5, 1.5, 2.7, 3.7, 11.0, -8.3, -1.0])
 def test_pow(y: float) -> None:
     """The error of the power is that of exp and log, plus the rounding of y log(x)."""
-    x = np.concatenate([10.0 ** rng(3).uniform(-12.0, 2.0, 3001), near_one(1000, 4)])
+    x = np.concatenate([10.0 ** rng(3).uniform(-12.0, 2.0, 1001), near_one(400, 4)])
     truth = exact(lambda base: mpmath.power(base, mpmath.mpf(y)), x)
     allowed = 3.0 * ULP * (1.0 + np.abs(y * np.log(x)))
     assert (errors(values("pow", x, y), truth, relative=True) < allowed).all()
@@ -93,7 +91,7 @@ def test_pow(y: float) -> None:
 
 @pytest.mark.parametrize("reach", [2.0, 50.0, 5000.0])
 def test_sin(reach: float) -> None:
-    x = rng(5).uniform(-reach, reach, 3001)
+    x = rng(5).uniform(-reach, reach, 1001)
     assert errors(values("sin", x), exact(mpmath.sin, x), relative=False).max() < 4.0 * ULP
 
 
@@ -107,13 +105,13 @@ def test_sin_near_its_zeros() -> None:
 @pytest.mark.parametrize("reach", [2.0, 50.0, 5000.0])
 def test_cos(reach: float) -> None:
     """An argument shifted by a quarter turn is rounded; the slope of the sine transfers this error."""
-    x = rng(7).uniform(-reach, reach, 3001)
+    x = rng(7).uniform(-reach, reach, 1001)
     allowed = 4.0 * ULP + ULP * np.abs(x + 0.5 * math.pi) + 0.5 * np.spacing(0.5 * math.pi)
     assert (errors(values("cos", x), exact(mpmath.cos, x), relative=False) < allowed).all()
 
 
 def test_sqrt_is_rounded_correctly() -> None:
-    x = np.append(10.0 ** rng(8).uniform(-307.0, 308.0, 3001), [0.0, 5e-324, math.inf])
+    x = np.append(10.0 ** rng(8).uniform(-307.0, 308.0, 1001), [0.0, 5e-324, math.inf])
     np.testing.assert_array_equal(values("sqrt", x), np.sqrt(x))
 
 
