@@ -64,6 +64,13 @@ def test_pulses_at_the_default_rate_of_learning_interact() -> None:
     assert default_rate(paper, "switch", current_bound(paper)) == 1275.0
 
 
+def test_learning_takes_driver_and_current_from_the_device() -> None:
+    for learner in (ph.learn, ph.tune):
+        with pytest.raises(ph.InputError) as refusal:
+            learner(ph.load("relay-5v"), rate=1.0)
+        assert refusal.value.expected.startswith("a rate above ")
+
+
 def test_a_long_pulse_makes_a_device_slow(monkeypatch: pytest.MonkeyPatch) -> None:
     timed(monkeypatch, math.nan)
     pulse = Rail(voltage=5.0, width=40.0 * PAPER)

@@ -288,9 +288,7 @@ def learn(
 
     from printhammer.control.learning.learn import learn as learned
     from printhammer.control.learning.sensor import ImpactSensor
-    from printhammer.control.pulses import current_bound
     from printhammer.hammer.hammer import load
-    from printhammer.printing.dots.nominal import pulse_of
 
     readings = opt.given(
         noise=noise,
@@ -309,8 +307,6 @@ def learn(
     else:
         opt.check_unset({"signal-noise": signal_noise}, "this option only with --signal")
     driven = None if unit is None else load(unit)
-    passed["largest_current"] = current_bound(hammer, passed.get("largest_current"))
-    passed.setdefault("driver", "switch" if pulse_of(hammer).quantity == "current" else "own")
     with job.progress_bar("learning") as tell:
         result = learned(hammer, driven, sensor=ImpactSensor(**readings), progress=tell, **passed)
     likely = 100.0 * result.certainty[-1]

@@ -14,7 +14,7 @@ from printhammer.control.learning.learner import Learner
 from printhammer.control.learning.lines import DOTS, LINE, Press, printed
 from printhammer.control.learning.preparation import DOUBT, FORGETTING, MEMBERS, default_rate, law_for
 from printhammer.control.learning.sensor import ImpactSensor
-from printhammer.control.pulses import LARGEST_CURRENT
+from printhammer.control.pulses import current_bound
 from printhammer.control.table.compensation import CompensationTable
 from printhammer.control.table.drive import COLUMNS, with_pulse
 from printhammer.control.table.multipliers import with_multipliers
@@ -22,6 +22,7 @@ from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Judgement, Limits
+from printhammer.printing.dots.nominal import pulse_of
 from printhammer.printing.dots.strategy import LEAD_IN
 from printhammer.printing.rates.variability import Variability
 from printhammer.results import Result, column, coordinate, part, scalar
@@ -310,13 +311,13 @@ def learn(
     unit: Hammer | None = None,
     *,
     rate: float | str | None = None,
-    driver: str = "switch",
+    driver: str | None = None,
     sensor: ImpactSensor | None = None,
     variability: Variability | None = None,
     limits: Limits | None = None,
     history: SupportsIndex = 2,
     reach: SupportsIndex = 2,
-    largest_current: float | str = LARGEST_CURRENT,
+    largest_current: float | str | None = None,
     members: SupportsIndex = MEMBERS,
     forgetting: float = FORGETTING,
     doubt: float = DOUBT,
@@ -351,8 +352,8 @@ def learn(
         Slot rate [Hz] or text with a unit; by default 1275 Hz divided by the time scale of the device,
         but at least 1.25 times the rate up to which the device settles between pulses.
     driver, limits, history, reach, largest_current
-        As for `printhammer.tune`; the default driver is a fast switch. With the driver "own", for a hammer
-        whose coil is switched by a driver, advance and on-time are learned.
+        As for `printhammer.tune`; the default driver is a fast switch for a hammer whose waveform is a
+        current, otherwise "own": the hammer's own driver, of which advance and on-time are learned.
     sensor : ImpactSensor, optional
         Impact sensor; by default one that measures times with a standard deviation of 5 us.
     variability : Variability, optional
@@ -375,7 +376,9 @@ def learn(
     Learning
         The learned table, and the dots of the unit before, during and after learning.
     """
-    largest = read_positive(largest_current, "A", "largest_current")
+    largest = current_bound(hammer, largest_current)
+    if driver is None:
+        driver = "switch" if pulse_of(hammer).quantity == "current" else "own"
     speed = default_rate(hammer, driver, largest) if rate is None else read_positive(rate, "Hz", "rate")
     count = read_count(members, "members")
     if not 100 <= count <= 5000:
