@@ -1,15 +1,17 @@
 """Run every verb on every shipped device other than the print hammer, and write a table of the outcomes.
 
-Run ``.venv/bin/python docs/measure/devices.py``, which takes ten minutes of processor time. With names of
-devices or verbs as arguments, the script runs only these, prints their output and writes no table. Each cell
-is a run of the verb with its defaults, at a size that takes seconds, in a separate folder; the table is
-rewritten after each verb.
+Run ``.venv/bin/python docs/measure/devices.py``, which takes an hour of processor time, mostly for learning.
+With names of devices or verbs as arguments, the script runs only these, prints their output and writes no
+table. With ``--keep FOLDER``, the script stores the outcome of each cell in a file, and reads stored outcomes.
+Each cell is a run of the verb with its defaults, at a size that takes seconds except for learning, in a
+separate folder; the table is rewritten after each verb.
 """
 
 from __future__ import annotations
 
 import contextlib
 import io
+import json
 import os
 import re
 import shlex
@@ -57,6 +59,7 @@ VERBS = {
     "tune": "tune {device} --rate {fast} --history 1 --reach 1 --no-brake --out table.csv",
     "dead-time": "dead-time {device} --voltage {voltage} --temperature '20 degC, 20 degC, 1'",
     "measure all": "measure all {device} --out bench",
+    "learn": "learn {device} --history 1 --reach 1 --members 100 --table learned.csv",
 }
 """Command line of each verb; the rates correspond to 300 and 1750 Hz for the paper's hammer."""
 
@@ -76,7 +79,8 @@ scalars = ["lost_dots"]
 """
 """Spec of the sweep: two rates and two masses."""
 
-LIMIT = 60  # Processor time limit of a cell, s.
+LIMIT = 60  # Processor time limit of a cell, s
+LIMITS = {"learn": 1800}  # Processor time limits of verbs that take longer, s
 
 
 class TooLongError(Exception):
@@ -115,7 +119,7 @@ def tried(verb: str, device: str) -> tuple[int | None, str]:
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         Path("spec.toml").write_text(SPEC.format(device=device, **texts), encoding="utf-8")
-        signal.setitimer(signal.ITIMER_PROF, LIMIT)
+        signal.setitimer(signal.ITIMER_PROF, LIMITS.get(verb, LIMIT))
         try:
             with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
                 program(arguments)
@@ -136,26 +140,42 @@ def tried(verb: str, device: str) -> tuple[int | None, str]:
     return status, sentence
 
 
-WORDS = {0: "yes", 1: "in part", 2: "no", None: f"over {LIMIT} s"}
+WORDS = {0: "yes", 1: "in part", 2: "no", -1: "error"}
 """Text of a cell for each exit status."""
+
+
+def outcome(verb: str, device: str, folder: str | None) -> tuple[int | None, str]:
+    """Return the outcome of a cell as `tried` does, from its file in the folder if there is one."""
+    path = None if folder is None else Path(folder) / f"{verb} {device}.json"
+    if path is not None and path.is_file():
+        status, sentence = json.loads(path.read_text(encoding="utf-8"))
+        return status, sentence
+    found = tried(verb, device)
+    if path is not None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(found), encoding="utf-8")
+    return found
 
 
 def main() -> None:
     """Run the cells; write the table if all cells were requested."""
     signal.signal(signal.SIGPROF, late)
     asked = sys.argv[1:]
+    folder = asked.pop(asked.index("--keep") + 1) if "--keep" in asked else None
+    asked = [word for word in asked if word != "--keep"]
     devices = [name for name in DEVICES if name in asked] or list(DEVICES)
     verbs = [name for name in VERBS if name in asked] or list(VERBS)
     rows: list[list[Cell]] = []
     for verb in verbs:
-        cells = [tried(verb, device) for device in devices]
+        cells = [outcome(verb, device, folder) for device in devices]
         reasons = [
             re.sub(rf"^{device}(\.toml)?: ", "", sentence)
             for device, (status, sentence) in zip(devices, cells, strict=True)
             if status in (1, 2)
         ]
         why = "; ".join(dict.fromkeys(reasons))
-        rows.append([verb, *(WORDS.get(status, "error") for status, _sentence in cells), why])
+        too_long = f"over {LIMITS.get(verb, LIMIT)} s"
+        rows.append([verb, *(WORDS.get(status, too_long) for status, _sentence in cells), why])
         if not asked:
             columns = [Column(name=name) for name in ("verb", *devices, "why not")]
             write("devices", columns, rows, {"limit": LIMIT}, MOTION, DEVICES)
