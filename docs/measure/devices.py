@@ -2,7 +2,7 @@
 
 Run ``.venv/bin/python docs/measure/devices.py``, which takes an hour of processor time, mostly for learning.
 With names of devices or verbs as arguments, the script runs only these, prints their output and writes no
-table. With ``--keep FOLDER``, the script stores the outcome of each cell in a file, and reads stored outcomes.
+table. With ``--keep FOLDER``, the script stores the outcome of each cell in a file, and reuses these files.
 Each cell is a run of the verb with its defaults, at a size that takes seconds except for learning, in a
 separate folder; the table is rewritten after each verb.
 """

@@ -87,7 +87,7 @@ _M = TypeVar("_M", bound=BaseModel)
 class Body(BaseModel):
     """Constants at the top level of a hammer file."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     mass: float = quantity("kg", "m", "mass of the armature", gt=0)
     platen: float | None = quantity("m", "x_platen", "position of the platen", default=None)

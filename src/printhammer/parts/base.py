@@ -36,7 +36,7 @@ class Part(BaseModel):
         not take the arguments that the kernel passes.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     role: ClassVar[str]
     law: ClassVar[str]

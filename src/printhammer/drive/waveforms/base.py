@@ -51,7 +51,7 @@ class Waveform(BaseModel):
         A constant is missing, unknown, not finite, of the wrong dimension or out of bounds.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     shape: ClassVar[str]
     code: ClassVar[int] = tables.SAMPLED

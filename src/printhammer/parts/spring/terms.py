@@ -26,7 +26,7 @@ GRAVITY: Final = 9.80665
 class Term(BaseModel):
     """Base class of the entries of ``[[force]]`` and ``[[contact]]``."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     law: ClassVar[str]
 
