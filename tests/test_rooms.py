@@ -45,10 +45,15 @@ def module_of(name: str) -> str:
 
 
 @cache
+def tree_of(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
 def graph() -> Graph:
     edges: Graph = {}
     for name, path in MODULES.items():
-        targets = {module_of(target) for target in imported(ast.parse(path.read_text(encoding="utf-8")))}
+        targets = {module_of(target) for target in imported(tree_of(path))}
         edges[name] = {target for target in targets if target in MODULES and target != name}
     return edges
 
@@ -149,7 +154,7 @@ def named(name: str) -> set[str]:
         return {module for module in MODULES if module.startswith(f"{home}.")}
     words = {
         node.value
-        for node in ast.walk(ast.parse(text))
+        for node in ast.walk(tree_of(path))
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and WORD.fullmatch(node.value)
     }
     above = [*packages_of(home), home]

@@ -44,7 +44,7 @@ def test_the_value_is_the_sum_of_the_pulses_or_the_latest_one(drive: PulseSequen
         assert drive.value(float(moment)) == value
 
 
-@settings(max_examples=30)
+@settings(max_examples=18)
 @given(sequences.sequences())
 def test_the_kernel_has_the_same_value_wherever_it_begins(drive: PulseSequence) -> None:
     firings, begins, pieces, replace, _force = drive.kernel_arrays()

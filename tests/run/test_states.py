@@ -110,7 +110,7 @@ def test_a_period_includes_the_current() -> None:
                 [period],
                 waveform=DRIVERS[0],
                 points=1,
-                firings=(3, 14),
+                firings=(2, 8),
                 tolerance=1e-9,
                 threads=1,
             )[0]

@@ -33,7 +33,7 @@ def loops(
     return driven, FeedbackStrategy(coarse.controller(), sensor, threads=1).loops(driven, patterns, rate)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=15, deadline=None)
 @example((0, 1, 2), 2290.0, 0.0, 0.0, 0.0, 0)  # No throw that is decided anew comes in time.
 @given(
     PATTERNS,

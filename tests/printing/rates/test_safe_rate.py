@@ -96,11 +96,11 @@ def test_a_rate_that_eight_dots_bear_and_a_row_does_not_is_not_safe() -> None:
 
 
 def test_slow_enough_everything_passes(hammer: "ph.Hammer") -> None:
-    found = safe_rate(hammer, first=50.0, last=60.0, step=10.0)
+    found = safe_rate(hammer, first=70.0, last=80.0, step=10.0)
     assert found.passed.tolist() == [True] * 2
     assert found.long_run.all()
     assert found.at_least
-    assert found.rate == 60.0
+    assert found.rate == 80.0
     assert max(np.abs(found.force_low).max(), np.abs(found.force_high).max()) < 1e-6
     assert found.peak_drive == pytest.approx(hammer.waveform.peak)
 
@@ -141,11 +141,11 @@ def test_a_strategy_may_fire_ahead(hammer: "ph.Hammer") -> None:
     def ahead(driven: "ph.Hammer", patterns: Sequence[tuple[int, ...]], rate: float) -> list[Drive]:
         return [drive.with_times(drive.times - 40e-6) for drive in open_loop(driven, patterns, rate)]
 
-    found = safe_rate(hammer, ahead, first=60.0, last=60.0)
+    found = safe_rate(hammer, ahead, first=80.0, last=80.0)
     assert found.strategy == "ahead"
     assert found.arrival_low[0] == pytest.approx(-40e-6, abs=1e-9)
     assert found.arrival_high[0] == pytest.approx(-40e-6, abs=1e-9)
-    assert safe_rate(hammer, ahead, limits=Limits(arrival=39e-6), first=60.0, last=60.0).failure is not None
+    assert safe_rate(hammer, ahead, limits=Limits(arrival=39e-6), first=80.0, last=80.0).failure is not None
 
 
 def test_a_strategy_whose_drives_do_not_fit_is_refused(hammer: "ph.Hammer") -> None:

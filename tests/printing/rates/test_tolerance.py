@@ -88,7 +88,7 @@ def test_without_a_rate_safe_rates_are_looked_for(hammer: "ph.Hammer") -> None:
 def test_judged_by_the_design_a_stronger_hammer_fails(hammer: "ph.Hammer") -> None:
     spreads = {"waveform.amplitude": 0.3}
     own, design = (
-        tolerance_yield(hammer, 60.0, number=2, spreads=spreads, judged_by=judge)
+        tolerance_yield(hammer, 80.0, number=2, spreads=spreads, judged_by=judge)
         for judge in ("own", "design")
     )
     printing = own.status == "ok"
