@@ -19,7 +19,7 @@ def gids(figure: object) -> list[str]:
 def both(hammer: "ph.Hammer") -> Bifurcation:
     """A diagram with two directions that lead to different orbits in its middle."""
     periods = 1e-6 * np.array([860, 861, 865, 866, 867, 873])
-    return ph.bifurcation(hammer, periods=periods, direction="both", refine=0)
+    return ph.bifurcation(hammer, periods=periods, direction="both", refine=0, firings=400)
 
 
 def test_points_of_both_directions_and_bands(both: Bifurcation) -> None:

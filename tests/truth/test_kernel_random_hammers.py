@@ -64,12 +64,12 @@ def report(record: pytest.FixtureRequest, draw: Draw, errors: list[float]) -> No
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_single_pulses(seed: int, request: pytest.FixtureRequest) -> None:
-    check_single_pulses(seed, 10, request)
+    check_single_pulses(seed, 6, request)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_three_pulses(seed: int, request: pytest.FixtureRequest) -> None:
-    check_trains(seed, 10, request)
+    check_trains(seed, 6, request)
 
 
 @pytest.mark.slow

@@ -195,7 +195,7 @@ def test_a_search_finds_both_orbits_of_the_bouncing_ball(gamma: float) -> None:
     ball = made_of(backstop=rigid(0.8, position=0.0), spring=preload(-MASS * exact.gravity))
     drive = ph.SineForce(gamma * MASS * exact.gravity, exact.frequency)
     # More starts would find these orbits too.
-    found = ph.orbits(ball, drive=drive, longest=1, starts=128)
+    found = ph.orbits(ball, drive=drive, longest=1, starts=128, follow=0)
     sums = np.array([one.multipliers.sum().real for one in found])
     products = np.array([one.multipliers.prod().real for one in found])
     for stable in (True, False):

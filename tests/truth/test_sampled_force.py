@@ -194,9 +194,10 @@ def test_sensitivities_under_a_sampled_force(tmp_path: Path) -> None:
         return np.array([[dot.flight_time, dot.impact_speed, dot.peak_force] for dot in dots])
 
     drive = ph.PulseTrain(hammer.waveform, period=4e-3, pulses=2)
-    result = ph.sensitivities(hammer, drive, tolerance=1e-13)
+    keys = ("mass", "backstop.restitution", "waveform.amplitude", "pack.front")
+    result = ph.sensitivities(hammer, drive, tolerance=1e-13, constants=keys)
     rows = [result.quantities.index(name) for name in ("flight_time", "impact_speed", "peak_force")]
-    for key in ("mass", "backstop.restitution", "waveform.amplitude", "pack.front"):
+    for key in keys:
         value = hammer.constants[key].si
         step = 1e-4 * value
         weights = ((1, 8.0), (-1, -8.0), (2, -1.0), (-2, 1.0))

@@ -85,7 +85,7 @@ def test_labels_do_not_depend_on_the_order_of_the_cells(hammer: "ph.Hammer", two
 
 
 def test_a_strange_attractor_is_found_by_its_exponent(hammer: "ph.Hammer") -> None:
-    found = ph.basins(hammer, period=1.05e-3, x=(30e-6, 80e-6, 4), v=(-0.4, 0.4, 3))
+    found = ph.basins(hammer, period=1.05e-3, x=(30e-6, 80e-6, 3), v=(-0.4, 0.4, 2))
     (attractor,) = found.attractors
     assert attractor.name == "strange"
     assert attractor.period is None

@@ -87,7 +87,7 @@ def test_the_result_does_not_depend_on_threads(
     hammer: "ph.Hammer", direction: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(builder, "STRAND", 4)
-    options = {"periods": np.linspace(1.24e-3, 1.34e-3, 14), "direction": direction, "refine": 1, **SHORT}
+    options = {"periods": np.linspace(1.24e-3, 1.34e-3, 10), "direction": direction, "refine": 1, **SHORT}
     assert same(ph.bifurcation(hammer, threads=1, **options), ph.bifurcation(hammer, threads=2, **options))
 
 
@@ -97,7 +97,7 @@ def test_strands_lead_where_a_strict_carrying_does(
     # In the middle rising and falling values lead to different orbits of period 1.
     periods = [859, 860, 861, 864, 865, 866, 867, 868, 871, 872, 873, 874]
     # Some of them settle slowly.
-    settled = {"firings": 500, "transient": 300}
+    settled = {"firings": 360, "transient": 240}
     options = {"periods": 1e-6 * np.array(periods), "direction": "both", "refine": 0, **settled}
     monkeypatch.setattr(builder, "STRAND", 1000)
     strict = ph.bifurcation(hammer, **options)

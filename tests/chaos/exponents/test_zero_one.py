@@ -56,7 +56,7 @@ def test_regular_series(series: object, count: int) -> None:
     assert found.verdict == "regular", found.phrase
 
 
-@pytest.mark.parametrize("r", np.linspace(3.4, 4.0, 21))
+@pytest.mark.parametrize("r", np.linspace(3.4, 4.0, 13))
 def test_it_never_contradicts_the_exponent_of_the_logistic_map(r: float) -> None:
     value = exponent(r)
     expected = "chaotic" if value > 0.0 else "regular"
@@ -128,7 +128,7 @@ def test_a_cycle_is_found_and_taken_out() -> None:
     np.testing.assert_allclose(rest, noise - noise.mean())
 
 
-@settings(max_examples=20)
+@settings(max_examples=15)
 @given(
     factor=st.floats(1e-6, 1e6),
     shift=st.floats(-100.0, 100.0),
