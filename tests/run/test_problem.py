@@ -74,3 +74,15 @@ def test_scales_are_positive_whatever_is_lacking(state: tuple[float, float]) -> 
     for parts in ({}, {"spring": hammers.preload(0.0, 10.0)}, {"pack": hammers.power()}):
         found = Problem(hammers.made_of(1.0, **parts), hammers.idle(), state, 0.0, 1e-11)
         assert all(np.isfinite(scale) and scale > 0.0 for scale in found.scales)
+
+
+def test_a_problem_from_another_start_is_the_one_built_there() -> None:
+    """Also the units of tolerances, which depend on the state; surfaces left out are left out of one only."""
+    hammer, drive = hammers.made_of(spring=hammers.preload(-4.0, 2e4), pack=hammers.power()), hammers.idle()
+    first = Problem(hammer, drive, (1e-3, -0.5), 0.0, 1e-11)
+    first.started((0.0, 0.3), 1e-4).leave_out("pack")
+    found, built = first.started((2e-3, 0.7), 1e-3), Problem(hammer, drive, (2e-3, 0.7), 1e-3, 1e-11)
+    np.testing.assert_array_equal(found.constants, built.constants)
+    for name in ("state", "start", "scales", "control", "bounds", "beyond", "laws"):
+        assert getattr(found, name) == getattr(built, name), name
+    assert found.scales != first.scales
