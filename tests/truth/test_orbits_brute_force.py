@@ -45,14 +45,20 @@ def brute_force(firings: int) -> list[np.ndarray]:
     """Find orbits by Newton's method from random states; return one state of each orbit of that period."""
     rng = np.random.default_rng(firings)
     states = np.array([rng.uniform(-1.8, 1.8, STARTS), rng.uniform(-1.2, 1.2, STARTS)])
+    settled = []
     for _ in range(ITERATIONS):
-        images, ((a, b), (c, d)) = strobe(states, firings)
+        images, derivative = strobe(states, firings)
+        # Most states settle within a dozen iterations.
+        there = np.abs(images - states).max(axis=0) < 1e-11
+        settled.append(states[:, there])
+        images, states, ((a, b), (c, d)) = images[:, ~there], states[:, ~there], derivative[..., ~there]
         x, v = images - states
         det = (a - 1.0) * (d - 1.0) - b * c
         step = np.array([b * v - (d - 1.0) * x, c * x - (a - 1.0) * v]) / det
         states = states + step * 0.5 / np.maximum(np.abs(step).max(axis=0), 0.5)
         # Newton's method does not return from states far away, where the integration overflows.
         states = states[:, (np.abs(states) < 3.0).all(axis=0)]
+    states = np.hstack([*settled, states])
     states = states[:, np.abs(strobe(states, firings)[0] - states).max(axis=0) < 1e-9]
     divisors = [count for count in range(1, firings) if firings % count == 0]
     found: list[np.ndarray] = []
