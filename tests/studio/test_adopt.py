@@ -84,6 +84,11 @@ def test_contacts_are_refused_where_python_refuses_them(ask: Any) -> None:
     with pytest.raises(ph.InputError, match="position not before"):
         ph.Hammer.from_toml(behind)
     assert "contact.break.position = -0.000001 m" in ask("adopt", behind)["refused"]
+    twice = text.replace('name = "break"', 'name = "make"')
+    assert twice != text
+    with pytest.raises(ph.InputError, match="a name of its own"):
+        ph.Hammer.from_toml(twice)
+    assert "contact.name = make: expected a name of its own" in ask("adopt", twice)["refused"]
 
 
 def test_a_file_lists_its_views(ask: Any) -> None:

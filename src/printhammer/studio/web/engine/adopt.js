@@ -12,13 +12,16 @@ const LISTS = ["force", "contact"];
 const UNREAD = ["uncertainty", "waveform", "format", "length_unit", "time_unit", "views", ...WORDS];
 const STATUSES = ["stated", "datasheet", "derived", "reconstructed", "assumed"];
 
-/** Entries of a document by dotted key, without what describes it. */
-function entriesOf(document) {
+/** Entries of a document by dotted key, without what describes it; refused where two of a list have one name. */
+function entriesOf(document, where = "") {
   const found = Object.create(null);
   for (const [key, content] of Object.entries(document)) {
     if (UNREAD.includes(key)) continue;
     if (SECTIONS.includes(key) && isTable(content)) for (const [name, entry] of Object.entries(content)) found[`${key}.${name}`] = entry;
     else if (LISTS.includes(key) && Array.isArray(content)) {
+      const names = content.filter(isTable).map((entry) => entry.name);
+      const twice = names.find((name, place) => names.indexOf(name) < place);
+      if (twice !== undefined) throw new Refusal(`${where}: ${key}.name = ${String(twice).slice(0, 60)}: expected a name of its own`);
       for (const { name: own, ...rest } of content.filter(isTable)) for (const [name, entry] of Object.entries(rest)) found[`${key}.${own}.${name}`] = entry;
     }
     else found[key] = content;
@@ -81,7 +84,7 @@ function entryOf(text, shelf, templates) {
   const document = tomlOf(text, where, shelf.limits);
   const beside = Object.keys(document).find((key) => [document[key]].flat().some((entry) => isTable(entry) && "file" in entry));
   if (beside) throw new Refusal(`${where}: ${beside}.file names a table, which does not come with the file: \`printhammer studio FILE\` reads both`);
-  const own = entriesOf(document);
+  const own = entriesOf(document, where);
   let [template, why] = [null, ""];
   for (const { entry, known } of templates) {
     const difference = differenceOf(own, known, entry.described.constants.map((control) => control.key));
