@@ -1,5 +1,6 @@
 """Histories of dots: numbers, patterns, and gaps hidden by a rest."""
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -7,6 +8,7 @@ from tests.errors import refused
 
 from printhammer.control.table.drive import (
     REST,
+    Settings,
     checked_size,
     entries_of,
     histories,
@@ -14,6 +16,7 @@ from printhammer.control.table.drive import (
     number_of,
     pattern_of,
     plain,
+    pulses_of,
     shared_numbers,
 )
 
@@ -64,3 +67,20 @@ def test_the_last_dot_of_its_pattern_has_the_history(size: tuple[int, int], data
     for given_before in ((), before):
         slots = pattern_of(history, given_before)
         assert histories_of(slots, gaps, reach)[-2] == number_of(history, reach)
+
+
+def test_a_pulse_that_is_due_before_the_beginning_fires_at_the_beginning() -> None:
+    # A slow device, whose dots from rest are fired 3 ms ahead of their slots, and later dots 2 ms after them.
+    settings = Settings(
+        advance=np.array([3e-3, -2e-3]),
+        width=np.array([4e-3, 3e-3]),
+        brake_delay=np.array([0.0, 8e-3]),
+        brake_width=np.array([0.0, 1e-3]),
+    )
+    pulses = pulses_of(settings, 1, 1, (0, 1, 4), 50.0)
+    assert pulses.fired.tolist() == pytest.approx(
+        [0.0, pulses.due[1] + 2e-3, pulses.due[2] - 3e-3], abs=1e-15
+    )
+    # The brake between the first two dots keeps its time.
+    assert pulses.braked.tolist() == [1e-3, 0.0, 0.0]
+    assert pulses.fired[0] + pulses.offset[0] == pytest.approx(pulses.due[0] + 8e-3, rel=1e-12)

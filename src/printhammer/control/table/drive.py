@@ -279,10 +279,11 @@ class Pulses(NamedTuple):
 
 
 def pulses_of(settings: Settings, gaps: int, reach: int, slots: Sequence[int], rate: float) -> Pulses:
-    """Compute the pulses of a pattern from the table settings at a slot rate, Hz."""
+    """Compute the pulses of a pattern from table settings at a slot rate, Hz; none fires before time 0."""
     numbers = histories_of(slots, gaps, reach)
     here, after = numbers[:-1], numbers[1:]
-    due, advance = slot_times(slots, rate), settings.advance[here]
+    due = slot_times(slots, rate)
+    advance = np.minimum(settings.advance[here], due)
     offset = settings.brake_delay[after] + advance
     return Pulses(due, advance, due - advance, settings.width[here], settings.brake_width[after], offset)
 

@@ -137,9 +137,10 @@ class WebModule(Module):
         self._label = label
 
     def content(self) -> bytes:
-        """Return the content of the module; announce its compilation, which takes up to two minutes."""
+        """Return the content of the module; announce its compilation, about a minute of computation."""
         if not self.is_there():
-            say_once(f"compiling WebAssembly ({self._label}): up to two minutes; once, kept on disk")
+            time = "about a minute of processor time"
+            say_once(f"compiling WebAssembly ({self._label}): {time}; once, kept on disk")
         return super().content()
 
     @staticmethod
