@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from tests.errors import refused
 
@@ -239,6 +239,7 @@ def test_a_pitchfork_from_both_of_its_curves() -> None:
 
 @settings(max_examples=8, deadline=None)
 @given(a=st.floats(min_value=-2.0, max_value=0.5), apart=st.floats(min_value=0.3, max_value=2.0))
+@example(a=0.453125, apart=0.375)
 def test_a_transcritical_point_of_two_lines(a: float, apart: float) -> None:
     family, b = tilted(a, a + apart), a + apart
     curve = curve_of(family, [-a, -2.0 * a], -1.0, (-2.0, 2.0))

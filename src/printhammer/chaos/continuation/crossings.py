@@ -42,6 +42,8 @@ _AMPLITUDE: Final = 1e-2
 _LEAST_AMPLITUDE: Final = 1e-5  # Smallest scaled distance from a crossing to try; arbitrary
 _CLOSER: Final = 4.0
 """Factor by which the distance from a crossing shrinks after a failed search for its curve; arbitrary."""
+_OVER: Final = 1.7  # Arbitrary; not 1, since a point at the crossing itself may lead to either curve
+"""First step along the crossing curve, as a multiple of the distance of its first point from the crossing."""
 _ASIDE: Final = 0.5  # Arbitrary
 """Largest distance of a point on the crossing curve from the predicted point, relative to the step."""
 
@@ -155,7 +157,7 @@ def follow_crossing(
                     first.parameter,
                     scales=scales,
                     bounds=bounds,
-                    steps=replace(steps, first=min(steps.first, amplitude)),
+                    steps=replace(steps, first=min(steps.first, _OVER * amplitude)),
                     row=row,
                     watch=watch,
                 )
