@@ -138,11 +138,18 @@ def changed(
 
 
 def deviations(
-    hammer: ph.Hammer, drive: ph.PulseTrain, end: float, names: list[str] | None = None
+    hammer: ph.Hammer,
+    drive: ph.PulseTrain,
+    end: float,
+    names: list[str] | None = None,
+    *,
+    size: float = 4e-5,
+    levels: int = 4,
 ) -> dict[str, float]:
     """Return the relative difference between tangent columns and finite differences, by constant.
 
-    The differences are relative, in typical magnitudes; a constant at an end of its range is omitted.
+    The differences are relative, in typical magnitudes; a constant at an end of its range is omitted. The
+    steps of the differences, relative to the constant, begin at `size` and are halved `levels` - 1 times.
     """
     problem = problem_of(hammer, drive)
     wanted = []
@@ -172,7 +179,7 @@ def deviations(
             return np.asarray((ends[0] - ends[1]) / (2.0 * step))
 
         with suppress(InputError):
-            truth = settled(difference, 4e-5, 4, units) / units
+            truth = settled(difference, size, levels, units) / units
             norm = max(float(np.linalg.norm(truth[rows])), SMALLEST)
             found[parameter.name] = float(np.linalg.norm((own[:, k] - truth)[rows])) / norm
     return found

@@ -271,7 +271,8 @@ def test_random_coils_that_release_a_held_armature(kind: str) -> None:
         times = np.linspace(2e-4, 2e-3, 40)
         start = float(times[np.argmax(np.abs(motion.at(times)[1]) > 0.05)])
         assert circuit_deviation(hammer, drive, start, end, size=1e-4) < 1e-6
-        moved = deviations(hammer, drive, end)
+        # A release magnifies the errors of a run, and smaller steps magnify them further.
+        moved = deviations(hammer, drive, end, size=6.4e-4, levels=6)
         assert {"force.guide.static", "magnet.constant", "coil.resistance"} <= set(moved)
         assert all(change < 1e-6 for change in moved.values()), moved
     assert sticks > 4
