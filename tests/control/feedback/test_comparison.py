@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from tests import hammers
-from tests.control.feedback.coarse import halved
+from tests.control.feedback.coarse import HALVED, patched
 from tests.errors import refused
 
 import printhammer as ph
@@ -36,14 +36,14 @@ PERFECT = PositionSensor(noise=0.0, step=0.0)
 @pytest.fixture(scope="module")
 def controller() -> Controller:
     hammer = ph.load(HAMMER)
-    with halved():
+    with patched(HALVED):
         return Controller(hammer, driver_of(hammer, CURRENT))
 
 
 @pytest.fixture(scope="module")
 def shipped() -> Controller:
     hammer = ph.load("hendriks-1983")
-    with halved():
+    with patched(HALVED):
         return Controller(hammer, driver_of(hammer))
 
 

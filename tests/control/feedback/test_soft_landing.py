@@ -70,7 +70,7 @@ def test_a_landing_leaves_what_it_says(landing: Landing) -> None:
 
 def test_a_landing_is_the_best_of_its_grid() -> None:
     forces, _, _ = coarse.tables()
-    with coarse.grids():
+    with coarse.patched(coarse.GRIDS):
         landing = soft_landing(coarse.plant(), forces)
     scale = coarse.plant().single.flight_time
     for row in np.flatnonzero(np.isfinite(landing.left)).tolist():
@@ -129,5 +129,5 @@ def test_a_driver_that_is_too_weak_is_refused() -> None:
     forces, _, _ = coarse.tables()
     plant = coarse.plant()
     weak = Plant(plant.hammer, Driver(0.6, plant.driver.edge), nominal(plant.hammer), 1)
-    with coarse.grids(), pytest.raises(ph.InputError, match=r"no push of 0\.6 A from rest"):
+    with coarse.patched(coarse.GRIDS), pytest.raises(ph.InputError, match=r"no push of 0\.6 A from rest"):
         launch(weak, forces)

@@ -213,21 +213,12 @@ def pushes(x: float, v: float, mode: int, hammer: Hammer) -> float:
 
 
 @compiled
-def lets_go_or_takes_hold(x: float, v: float, mode: int, hammer: Hammer) -> bool:
-    """Whether a contact has ceased to push, or, if released, has begun to push again."""
-    number = pushes(x, v, mode, hammer)
-    return number > 0.0 if mode in (M.PACK_RELEASED, M.BACKSTOP_RELEASED) else number < 0.0
-
-
-@inlined
-def is_cut(v0: float, v1: float, hammer: Hammer) -> bool:
-    """Whether the dissipative force of the spring has a kink between two velocities [m/s]."""
-    return spring_switch(hammer[SPRING:PACK], v0) * spring_switch(hammer[SPRING:PACK], v1) < 0.0
-
-
-@compiled
 def push_gap(cut: bool, start: State, x: float, v: float, law: ForceLaw) -> float:
-    """Evaluate the event function of `land_on_push` at a state: positive until the event."""
+    """Evaluate the event function of `land_on_push` at a state: negative after the event.
+
+    With `cut`, the event is a kink of the dissipative force of the spring, at a velocity between those of
+    `start` and the state. Otherwise, a contact has ceased to push or, if released, has begun to push again.
+    """
     if VISCOUS and cut:
         c = law.hammer[SPRING:PACK]
         return spring_switch(c, start[2]) * spring_switch(c, v)
@@ -419,7 +410,7 @@ def advance(
             end = (turn[0], turn[1], turn[2], turn[3])
         else:
             end = land_on_level(start, h, fraction, upper, level, sign, law, control)
-        if VISCOUS and end[0] > t and is_cut(v, end[2], law.hammer):
+        if VISCOUS and end[0] > t and push_gap(True, start, end[1], end[2], law) < 0.0:
             end = land_on_push(start, end, True, law, control)
             switch = M.REACHED_LEVEL
         if LEVELS and h > shortest and end[0] > t and is_near_level(x, end[1], law.hammer):
@@ -432,7 +423,7 @@ def advance(
                 continue
         may_let_go = HAS_PACK and not PACK_PULLS and mode in (M.LOADING, M.PACK_RELEASED)
         may_let_go = may_let_go or (not BACKSTOP_PULLS and mode == M.BACKSTOP_RELEASED)
-        if may_let_go and end[0] > t and lets_go_or_takes_hold(end[1], end[2], mode, law.hammer):
+        if may_let_go and end[0] > t and push_gap(False, start, end[1], end[2], law) < 0.0:
             end = land_on_push(start, end, False, law, control)
             switch = M.PUSH_BEGAN if mode in (M.PACK_RELEASED, M.BACKSTOP_RELEASED) else M.PUSH_ENDED
         if HAS_CIRCUIT:

@@ -64,7 +64,7 @@ if TYPE_CHECKING:
 
 GOLDEN = 0.3819660112501051  # Square of the inverse golden ratio
 NEAR = 1e-6  # Bracket width, relative to the first bracket, at which a search ends; arbitrary
-ASIDE = 1e-6  # Distance from the edge of a contact at which the slope is tested, of a sample; arbitrary
+ASIDE = 1e-6  # Step by which the slope at the edge of a contact is tested, of a sample interval; arbitrary
 SAMPLES = 4
 """Number of samples per step in the search for the largest depth and force of a contact; arbitrary."""
 
