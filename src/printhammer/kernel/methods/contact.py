@@ -13,7 +13,7 @@ from printhammer.kernel.model.layout import BACKSTOP_PART, INVERSE_MASS, MAGNET,
 
 if TYPE_CHECKING:
     from printhammer.kernel.methods.crossing import closes, contact_gap_and_change, land_on_gap_in_contact
-    from printhammer.kernel.methods.dop853 import contact_step, whole_contact_step
+    from printhammer.kernel.methods.dop853 import contact_state, whole_contact_step
     from printhammer.kernel.model.circuit import (
         Electric,
         electric_rates,
@@ -89,7 +89,7 @@ def s_at(t: float, t0: float, w0: float, v0: float, kv0: float, hammer: Hammer, 
         s += change
         if abs(change) <= 1e-15 * s:
             break
-        t1, w1, v1, kv1, _error = contact_step(t0, w0, v0, kv0, s, hammer, drive, M.ANY_SCALES)
+        t1, w1, v1, kv1, _electric = contact_state(t0, w0, v0, kv0, s, hammer, drive)
     return s
 
 
@@ -136,7 +136,7 @@ def leave(
     low, high = 0.0, upper
     negligible = 1e-12 * math.sqrt(control[0])
     for _ in range(80):
-        t1, w1, v1, kv1, _error = contact_step(t, w, v, kv, fraction * h, hammer, drive, M.ANY_SCALES)
+        t1, w1, v1, kv1, _electric = contact_state(t, w, v, kv, fraction * h, hammer, drive)
         if w1 < 0.0:
             high = fraction
         else:
@@ -163,7 +163,7 @@ def reach_time(
     for _ in range(80):
         if not (low < fraction < high):
             fraction = 0.5 * (low + high)
-        t1, w1, v1, kv1, _error = contact_step(t, w, v, kv, fraction * h, hammer, drive, M.ANY_SCALES)
+        t1, w1, v1, kv1, _electric = contact_state(t, w, v, kv, fraction * h, hammer, drive)
         if t1 > target:
             high = fraction
         else:
@@ -188,12 +188,12 @@ def end_push(start: ContactState, h: float, upper: float, hammer: Hammer, drive:
     low, high = 0.0, upper
     for _ in range(60):
         middle = 0.5 * (low + high)
-        _t1, w1, v1, _kv1, _error = contact_step(t, w, v, kv, middle * h, hammer, drive, M.ANY_SCALES)
+        _t1, w1, v1, _kv1, _electric = contact_state(t, w, v, kv, middle * h, hammer, drive)
         if backstop_switch(hammer[BACKSTOP_PART:MAGNET], w1, v1) > 0.0:
             low = middle
         else:
             high = middle
-    t1, w1, v1, kv1, _error = contact_step(t, w, v, kv, high * h, hammer, drive, M.ANY_SCALES)
+    t1, w1, v1, kv1, _electric = contact_state(t, w, v, kv, high * h, hammer, drive)
     return t1, w1, v1, kv1
 
 
@@ -233,10 +233,9 @@ def electric_in_contact(
 ) -> tuple[float, Electric]:
     """Return the regularised variable s at time `t` [s] in a backstop step, and the electric state there."""
     s = s_at(t, start[0], start[1], start[2], start[3], hammer, drive)
-    step = whole_contact_step(start[0], start[1], start[2], start[3], s, hammer, drive, M.ANY_SCALES)
-    rest = t - step[0]
-    rates = electric_rates(step[0], hammer[POSITION] - step[1] * step[1], step[2], step[5], hammer, drive[0])
-    return s, moved(step[5], rest, rates)
+    t1, w1, v1, _kv1, electric = contact_state(start[0], start[1], start[2], start[3], s, hammer, drive)
+    rates = electric_rates(t1, hammer[POSITION] - w1 * w1, v1, electric, hammer, drive[0])
+    return s, moved(electric, t - t1, rates)
 
 
 @inlined

@@ -16,7 +16,7 @@ from printhammer.kernel.model import modes as M
 from printhammer.kernel.model.layout import POSITION, Control, ForceLaw
 
 if TYPE_CHECKING:
-    from printhammer.kernel.methods.dop853 import whole_contact_step, whole_time_step
+    from printhammer.kernel.methods.dop853 import contact_state, whole_time_step
     from printhammer.kernel.model.circuit import (
         Electric,
         driven,
@@ -239,7 +239,7 @@ def land_on_gap_in_contact(
             at = 0.5 * (low + high)
         if high - low <= NARROW or not (low < at < high):
             break
-        t2, w2, v2, kv2, _error, e2 = whole_contact_step(t, w, v, kv, at * h, hammer, drive, M.ANY_SCALES)
+        t2, w2, v2, kv2, e2 = contact_state(t, w, v, kv, at * h, hammer, drive)
         gap, change = contact_gap_and_change(t2, w2, v2, kv2, e2, h, hammer, drive[0])
         before, ahead = ahead, -gap / change if change < 0.0 else 2.0
         near = abs(gap) <= 1e-15 or abs(ahead) <= NARROW

@@ -226,7 +226,7 @@ def electric_error(e5: Point, e3: Point, h: float, hammer: Hammer) -> float:
     return 0.0
 
 
-@inlined
+@(called if HAS_CIRCUIT else inlined)
 def whole_time_step(
     t0: float, x0: float, v0: float, a0: float, h: float, law: ForceLaw
 ) -> tuple[float, float, float, float, float, Electric, float]:
@@ -279,7 +279,7 @@ def time_step(
     return x, v, a, error_x, error_v
 
 
-@inlined
+@(called if HAS_CIRCUIT else inlined)
 def whole_contact_step(
     t0: float, w0: float, v0: float, kv0: float, h: float, hammer: Hammer, drive: Drive, scales: Any
 ) -> tuple[float, float, float, float, float, Electric]:
@@ -320,3 +320,18 @@ def contact_step(
     """
     t, w, v, kv, error, _electric = whole_contact_step(t0, w0, v0, kv0, h, hammer, drive, scales)
     return t, w, v, kv, error
+
+
+@called
+def contact_state(
+    t0: float, w0: float, v0: float, kv0: float, h: float, hammer: Hammer, drive: Drive
+) -> tuple[float, float, float, float, Electric]:
+    """Compute the end of a step of `whole_contact_step`, in machine code shared by all callers.
+
+    Returns
+    -------
+    tuple
+        Time [s], w [m^0.5], velocity [m/s], dv/ds and electric state.
+    """
+    t, w, v, kv, _error, electric = whole_contact_step(t0, w0, v0, kv0, h, hammer, drive, M.ANY_SCALES)
+    return t, w, v, kv, electric

@@ -83,6 +83,14 @@ def whole_step(
     return x1, v1, a1, error_x, error_v, (), 0.0
 
 
+@called
+def shared_step(
+    t: float, x: float, v: float, a: float, h: float, law: ForceLaw
+) -> tuple[float, float, float, float, float, Electric, float]:
+    """Compute `whole_step` in machine code shared by all callers, which keeps the kernel short."""
+    return whole_step(t, x, v, a, h, law)
+
+
 @compiled
 def error_ratio(error_x: float, error_v: float, error_e: float, mode: int, control: Control) -> float:
     """Return the error estimate of a step as a multiple of the tolerance; NaN stays NaN.
@@ -133,7 +141,7 @@ def land_on_level(
     negligible = 1e-15 * control[0]
     for _ in range(80):
         step = fraction * h
-        x1, v1, a1, _ex, _ev = plain_step(t, x, v, a, step, law)
+        x1, v1, a1, _ex, _ev, _electric, _ee = shared_step(t, x, v, a, step, law)
         gap = level - x1
         if sign * gap < 0.0:
             high = fraction
@@ -160,7 +168,7 @@ def land_on_reversal(
     negligible = 1e-8 * control[1]
     for _ in range(80):
         step = fraction * h
-        x1, v1, a1, _ex, _ev = plain_step(t, x, v, a, step, law)
+        x1, v1, a1, _ex, _ev, _electric, _ee = shared_step(t, x, v, a, step, law)
         if sign * v1 > 0.0:
             low = fraction
         else:
@@ -245,7 +253,7 @@ def land_on_push(start: State, end: State, cut: bool, law: ForceLaw, control: Co
             at = 0.5 * (low + high)
             if not (low < at < high):
                 break
-        x2, v2, a2, _ex, _ev = plain_step(t, x, v, a, at * h, law)
+        x2, v2, a2, _ex, _ev, _electric, _ee = shared_step(t, x, v, a, at * h, law)
         gap = push_gap(cut, start, x2, v2, law)
         if gap < 0.0:
             high, high_gap, x1, v1, a1 = at, gap, x2, v2, a2
@@ -416,7 +424,7 @@ def advance(
         if LEVELS and h > shortest and end[0] > t and is_near_level(x, end[1], law.hammer):
             # Near a kink, a law may be a fractional power of the distance: the error of the step is then as
             # large as its estimate, and must meet the smaller tolerance.
-            _x, _v, _a, error_x, error_v, _electric, error_e = whole_step(t, x, v, a, end[0] - t, law)
+            _x, _v, _a, error_x, error_v, _electric, error_e = shared_step(t, x, v, a, end[0] - t, law)
             worst = max(abs(error_x) / control[0], abs(error_v) / control[1], error_e)
             if worst > control[3]:
                 h *= 0.5

@@ -35,7 +35,7 @@ from printhammer.kernel.model.layout import (
 
 if TYPE_CHECKING:
     from printhammer.kernel.methods.contact import contact_rate, s_at
-    from printhammer.kernel.methods.dop853 import contact_step
+    from printhammer.kernel.methods.dop853 import contact_state
     from printhammer.kernel.model.circuit import (
         coil_current,
         kind_of,
@@ -224,7 +224,7 @@ def quadratures(
             place = 0.5 * (low + high) + 0.5 * (high - low) * point
             share = 0.5 * (high - low) * weight
             if regular:
-                t, w, v, _kv, _error = contact_step(t0, kept, v0, kv0, place, hammer, start, M.ANY_SCALES)
+                t, w, v, _kv, _electric = contact_state(t0, kept, v0, kv0, place, hammer, start)
                 x = hammer[POSITION] - w * w
                 share *= 2.0 * w
             else:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from printhammer.kernel.compile.compiling import inlined
+from printhammer.kernel.compile.compiling import called, inlined
 from printhammer.kernel.model import modes as M
 from printhammer.kernel.model.circuit import BLOCKED, SOURCE, UNTIL
 from printhammer.kernel.single import carry as C
@@ -70,7 +70,7 @@ def keep_path(state: State, live: Any) -> None:
         state[C.UNTIL] = live[live.size - UNTIL]
 
 
-@inlined
+@called
 def acceleration_in(mode: int, v: float, state: State, setup: Setup) -> float:
     """Return the acceleration [m/s^2] at the present position for a mode and a velocity `v` [m/s]."""
     t, x, memory = state[C.TIME], state[C.POSITION_NOW], state[C.MEMORY_NOW]

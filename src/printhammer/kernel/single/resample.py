@@ -26,8 +26,8 @@ from printhammer.kernel.model.layout import (
 
 if TYPE_CHECKING:
     from printhammer.kernel.methods.contact import contact_rate, electric_in_contact, s_at
-    from printhammer.kernel.methods.dop853 import contact_step, whole_time_step
-    from printhammer.kernel.methods.landing import plain_step
+    from printhammer.kernel.methods.dop853 import contact_state, whole_time_step
+    from printhammer.kernel.methods.landing import shared_step
     from printhammer.kernel.model.circuit import (
         Electric,
         coil_current,
@@ -111,11 +111,12 @@ def state_in_step(
             a0 = acceleration(t0, x0, v0, mode, 0.0, hammer, drive)
             return x0 + 0.5 * a0 * (t - t0) ** 2, a0 * (t - t0), math.sqrt(max(-0.5 * a0, 0.0)) * (t - t0)
         s = s_at(t, t0, kept, v0, kv0, hammer, drive)
-        _t1, w1, v1, _kv1, _error = contact_step(t0, kept, v0, kv0, s, hammer, drive, M.ANY_SCALES)
+        _t1, w1, v1, _kv1, _electric = contact_state(t0, kept, v0, kv0, s, hammer, drive)
         return hammer[POSITION] - w1 * w1, v1, w1
     memory = memory_of(mode, kept, hammer)
     a0 = acceleration(t0, x0, v0, mode, memory, hammer, drive)
-    x1, v1, _a1, _ex, _ev = plain_step(t0, x0, v0, a0, t - t0, ForceLaw(mode, memory, hammer, drive))
+    law = ForceLaw(mode, memory, hammer, drive)
+    x1, v1, _a1, _ex, _ev, _electric, _ee = shared_step(t0, x0, v0, a0, t - t0, law)
     return x1, v1, 0.0
 
 
