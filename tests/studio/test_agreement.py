@@ -2,7 +2,7 @@
 
 Runs whose masses differ by rounding, upwards or downwards, drift apart. Up to the time at which one differs
 by more than 5e-13 of the range, the horizon of predictability, dots and energies have to agree to 1e-9, and
-curves to single precision.
+displacements to single precision; so do velocities and forces of runs that do not drift apart.
 """
 
 import math
@@ -34,6 +34,8 @@ pytestmark = pytest.mark.slow
 NUDGES, DRIFT, AGREES = (5e-16, -5e-16), 5e-13, 1e-9
 SINGLE, ASIDE = 1e-7, 1e-10
 """Rounding to single precision, and shift of the end of a step by rounding, as a fraction of the run."""
+OTHER_STEPS = 20.0 * DISPLAY_TOLERANCE
+"""Error of velocities and forces in a run with a horizon, where the page may take other steps."""
 NAME = "hendriks-1983-1"
 LENGTH = 1e-15
 """Allowed difference of an indentation, m, a difference of places."""
@@ -135,6 +137,7 @@ def check_curves(motion: Motion, curve: State, horizon: float) -> None:
     end = np.where(np.abs(end - t) <= ASIDE * motion.end, end, t)
     both = np.nextafter(end, 0.0), np.minimum(np.nextafter(end, math.inf), motion.end)
     sides = [motion.curves_at(at) for at in (t, *both)]
+    within = SINGLE if math.isinf(horizon) else OTHER_STEPS
     curves = {"v": [side[1] for side in sides]}
     curves |= {f"F {name}": [side[4][name] for side in sides] for name in forces}
     named = {name for name in data if name.startswith("F ")}
@@ -142,7 +145,7 @@ def check_curves(motion: Motion, curve: State, horizon: float) -> None:
     for name in ("v", *sorted(named)):
         own = curves[name]
         error = np.min(np.abs(data[name][: t.size] - own), axis=0)
-        assert error.max() <= SINGLE * np.abs(own[0]).max(), name
+        assert error.max() <= within * np.abs(own[0]).max(), name
 
 
 def check_dots_before(motion: Motion, shown: State, horizon: float) -> int:
