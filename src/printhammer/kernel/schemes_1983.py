@@ -269,7 +269,7 @@ def runge_kutta(
 def trapezoid(
     time: float, x: float, v: float, h: float, peak: float, model: Any
 ) -> tuple[float, float, bool]:
-    """Compute a step of the trapezoidal rule; return position, velocity and convergence."""
+    """Compute a step of the trapezoidal rule; return position, velocity, and whether Newton converged."""
     # Substituting x1 = x + h/2 (v + v1) into the rule for v leaves one equation for v1.
     half = 0.5 * h
     a = acceleration(time, x, v, peak, model)

@@ -29,9 +29,9 @@ _CHOICES = {
 
 
 class Bindings(NamedTuple):
-    """Law functions by name, choices by name, and for each part a digest of the sources of its laws.
+    """Law functions and compile-time choices by name, and for each part a digest of the sources of its laws.
 
-    `packing` holds the functions, by name, that pack the constants of each part.
+    `packing` holds, by name, the functions that pack the constants of a part into an array.
     """
 
     names: dict[str, Any]
@@ -92,7 +92,7 @@ def code_digest(sources: Iterable[str]) -> str:
 def syntax_text(node: Any, replaced: Callable[[ast.AST], str | None] = lambda _node: None) -> str:
     """Return a text form of a syntax tree, without docstrings, that is the same in all Python versions.
 
-    `replaced` returns a replacement text for a node, or None; a node with empty text is omitted.
+    `replaced` returns a replacement text for a node, or None; a node whose replacement is empty is omitted.
     """
     if isinstance(node, list):
         return "[" + ",".join(filter(None, (syntax_text(each, replaced) for each in node))) + "]"

@@ -1,9 +1,9 @@
 """Disk cache of machine code and lowered modules, and the messages shown during compilation.
 
-The cache folder is the first writable one of: NUMBA_CACHE_DIR, `__pycache__` in the kernel package, numba's
-cache folder of the user, and a temporary folder of the user. Cache problems never stop the program: read-only
-folders are read, and files that are missing, truncated, damaged or made for another machine are compiled
-again, also if no folder is writable or the disk is full.
+The cache folder is the first writable one of: NUMBA_CACHE_DIR, `__pycache__` in the kernel package, the
+user's numba cache folder, and a temporary folder of the user. Cache problems never stop the program: cached
+code is also read from read-only folders; code whose file is missing, truncated, damaged or made for another
+machine is compiled again, even if no folder is writable or the disk is full.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def _temporary_folder() -> Path:
 
 
 def _user_folder() -> Path:
-    """Return numba's cache folder of the user, by the convention of the operating system."""
+    """Return the user's numba cache folder, following the convention of the operating system."""
     if sys.platform == "win32":
         return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "numba" / "Cache"
     if sys.platform == "darwin":
@@ -112,7 +112,7 @@ def _content(path: Path) -> bytes | None:
 
 
 def sealed(payload: bytes) -> bytes:
-    """Return the content of a file that holds a payload: mark, digest and payload."""
+    """Return the content of a cache file: the mark, the digest of the payload, and the payload."""
     return _MARK + hashlib.sha256(payload).digest() + payload
 
 
@@ -128,7 +128,7 @@ def _write(path: Path, payload: bytes) -> None:
 
 @contextmanager
 def _alone(path: Path) -> Iterator[None]:
-    """Lock a file while its content is computed; wait for other processes; no lock if unsupported."""
+    """Hold the lock of a cache file while its content is computed; no lock if the system supports none."""
     lock = path.with_name(f".{path.name}.lock")
     handle = -1
     try:
@@ -213,7 +213,7 @@ class File:
         return content
 
     def _alone(self) -> AbstractContextManager[None]:
-        """Return a context manager that locks the file; check for the content again under the lock."""
+        """Return a context manager that locks the file, or does nothing if no folder is writable."""
         return nullcontext() if self._written is None else _alone(self._written / self.name)
 
 
@@ -222,8 +222,8 @@ class Code(File):
 
     `kind` is the name of the code in the records of compile times; `label` describes the laws in messages.
     `is_lowered` returns whether all modules of the code are already lowered, as in a wheel. `shipped` is the
-    file in which a wheel contains the machine code itself, if it does; `circuit` states whether the coil has
-    a circuit.
+    path of the machine code in the wheel; the file may be missing. `circuit` states whether the coil has a
+    circuit.
     """
 
     def __init__(

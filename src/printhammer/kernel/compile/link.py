@@ -67,8 +67,8 @@ def _machine() -> Any:
 def processor() -> tuple[str, str, str]:
     """Return the compilation target: triple of the system, name and features of the processor.
 
-    Processors with the instructions of `COMMON` get code for that level, so that their results have the same
-    bits, and the wheel needs machine code only once for all these processors.
+    Processors with the instructions of `COMMON` get code for that level, so that they compute the same bits,
+    and the wheel contains a single copy of the machine code for all of them.
     """
     system, features = llvm.get_process_triple(), llvm.get_host_cpu_features()
     if system.startswith("x86_64-") and all(features.get(name) for name in _LEVEL_3):

@@ -62,7 +62,7 @@ def plain(name: str, entry: Plain, circuit: bool | None, packing: Mapping[str, A
     """Lower a plain function as an entry point; return LLVM bitcode.
 
     `circuit` states whether the hammer has a coil circuit; None for a function that uses no names of the
-    kernel. `packing` holds further functions by name.
+    kernel. `packing` holds, by name, the functions that pack constants.
     """
     namespace = {**packing, **({} if circuit is None else _plain(circuit))}
     return _entry(bind(entry.function, namespace, compiled), name, entry.arguments, entry.results)

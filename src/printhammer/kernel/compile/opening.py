@@ -111,7 +111,7 @@ def _not(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
 
 
 def law(name: str, symbol: str, floats: int) -> Callable[..., float]:
-    """Return the stub of a law for compiling its callers; arguments: constants, then `floats` numbers."""
+    """Return the stub of a law for compiling its callers; the stub takes constants and `floats` numbers."""
     arguments = ", ".join(f"a{i}" for i in range(floats))
     scope: dict[str, Any] = {"__name__": __name__}
     exec(f"def {name}(c, {arguments}):\n    return 0.0\n", scope)

@@ -62,7 +62,7 @@ def maker() -> dict[str, str]:
 
 
 def read(folder: Path) -> list[dict[str, Any]]:
-    """Read the compile times [s] recorded in a folder, by kind of code, for each result of `maker`."""
+    """Read the compile times [s] recorded in a folder: one entry per machine and versions, see `maker`."""
     with suppress(OSError, ValueError, TypeError, KeyError):
         entries = json.loads((folder / FILE).read_bytes())["makers"]
         return [
@@ -91,7 +91,7 @@ def note(folder: Path, name: str, seconds: float) -> None:
 
 
 def expected(folders: Iterable[Path], name: str) -> float:
-    """Return the expected compile time [s]: recorded here, else on another machine, else typical."""
+    """Return the expected compile time [s]: recorded on this machine, else on another, else typical."""
     mine = maker()
     records = [read(folder) for folder in folders]
     own = [entry for entries in records if (entry := _own(entries, mine)) is not None]

@@ -85,7 +85,7 @@ class Kernel:
     def web_module(self, names: Sequence[str] = ENTRIES, further: Mapping[str, Plain] = _NONE) -> WebModule:
         """Return the WebAssembly module of the entry points `names` and of `further` plain functions.
 
-        The names may include "flow", the variational equations by states.
+        The names may include "flow", the variational equations for derivatives with respect to the state.
         The calling convention is described in :mod:`printhammer.kernel.compile.web.build`. The wheel contains
         the modules for the laws of shipped hammers; building other modules needs the extra `page`.
         """

@@ -119,7 +119,7 @@ def position_in_step(pool: Any, i: int, which: int, time: float, b: float, sixth
 
 @compiled
 def part_at(pool: Any, i: int, time: float) -> float:
-    """Return the fraction of a lane's latest backstop step, in the regularised variable s, at a time [s]."""
+    """Return the fraction of a lane's latest backstop step, in the variable s, at which `time` [s] lies."""
     t0, t1 = pool[R.OLD_T * R.BLOCK + i], pool[R.NEW_T * R.BLOCK + i]
     w0, w1 = pool[R.OLD_X * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
     v0, v1 = pool[R.OLD_V * R.BLOCK + i], pool[R.NEW_V * R.BLOCK + i]
@@ -217,7 +217,7 @@ def note_strobes(
 
 @compiled
 def enter_contact(pool: Any, i: int, v: float, slot: Any, control: Any) -> int:
-    """Start a backstop contact at zero compression with velocity `v` [m/s]; return the pool of contacts."""
+    """Start a backstop contact at zero compression with velocity `v` [m/s]; return the contact pool."""
     unit = contact_unit(v, control)
     slot[R.UNIT] = unit
     pool[R.X * R.BLOCK + i] = 0.0

@@ -41,9 +41,10 @@ def contact_rate(w: float, v: float, t: float, hammer: Hammer, drive: Drive) -> 
 
 @compiled
 def length_while_pushed_in(left: float, w: float, v: float, kv: float) -> float:
-    """Return the increment of the regularised variable s over the time `left` [s] for inward acceleration.
+    """Return the increment of the regularised variable s over `left` [s], for acceleration into the backstop.
 
-    Solves 2 w ds - v ds^2 - kv ds^3 / 3 = left for ds by Newton's method; the left side increases with ds.
+    Solves 2 w ds - v ds^2 - kv ds^3 / 3 = left for ds by Newton's method, where `kv` is dv/ds; the left side
+    increases with ds.
     """
     ds = 0.0
     for _ in range(60):
@@ -60,7 +61,7 @@ def length_of(left: float, w: float, v: float, kv: float) -> float:
     """Return the approximate increment of the regularised variable s over the time `left` [s].
 
     Solves 2 w ds - v ds^2 = left for ds; the root is regular also at release, w = 0. The cubic term is
-    included if it matters and the armature does not leave. `s_at` iterates this approximation.
+    included if it matters and the armature stays on the backstop. `s_at` iterates this approximation.
     """
     under_root = max(w * w - v * left, 0.0)
     if w > 0.0 and under_root > 0.0:

@@ -129,9 +129,10 @@ def gap_and_change(
 def land_on_gap(
     which: int, start: Any, end: Any, electric: Electric, guess: float, law: ForceLaw, control: Control
 ) -> tuple[float, float, float, float, Electric]:
-    """Locate the root of an event function in a step from `start` to `end`; `guess` is a fraction of it.
+    """Locate the root of an event function in a step from `start` to `end`, near its fraction `guess`.
 
-    Newton's method, with a bisection where a correction is not half the one before or leaves the bracket.
+    The method is Newton's, with a bisection if a correction exceeds half the previous correction or leaves
+    the bracket.
 
     Returns
     -------

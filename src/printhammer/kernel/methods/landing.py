@@ -225,7 +225,8 @@ def push_gap(cut: bool, start: State, x: float, v: float, law: ForceLaw) -> floa
     """Evaluate the event function of `land_on_push` at a state: negative after the event.
 
     With `cut`, the event is a kink of the dissipative force of the spring, at a velocity between those of
-    `start` and the state. Otherwise, a contact has ceased to push or, if released, has begun to push again.
+    `start` and the state. Otherwise, the event is that a contact ceases to push or, if already released,
+    begins to push again.
     """
     if VISCOUS and cut:
         c = law.hammer[SPRING:PACK]
@@ -238,8 +239,8 @@ def push_gap(cut: bool, start: State, x: float, v: float, law: ForceLaw) -> floa
 def land_on_push(start: State, end: State, cut: bool, law: ForceLaw, control: Control) -> State:
     """Return the state in which a contact starts or ceases to push in a step from `start` to `end`.
 
-    The Illinois rule, with a bisection at every fourth estimate. With `cut`, the contact belongs to the
-    spring law, otherwise to the pack or the backstop.
+    The method is regula falsi with the Illinois rule, and a bisection at every fourth estimate. With `cut`,
+    the contact belongs to the spring law, otherwise to the pack or the backstop.
     """
     t, x, v, a = start
     h = end[0] - t
@@ -293,7 +294,7 @@ def level_switch(
 
 @inlined
 def is_beyond(x: float, v: float, a: float, level: float) -> bool:
-    """Whether x > `level` [m] holds for a motion now, or immediately after if the motion is at `level`."""
+    """Whether `x` is above `level` [m], or at `level` and about to move above it."""
     return x > level or (x == level and (v > 0.0 or (v == 0.0 and a > 0.0)))
 
 

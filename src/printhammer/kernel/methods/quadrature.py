@@ -141,7 +141,7 @@ def kink_side(node: Any, after: Any, hammer: Hammer) -> float:
     """Return 1 if a step off the backstop begins on a kink of the spring law, -1 if it ends there, else 0.
 
     Beyond the kink, the dissipative force of a contact may be a fractional power of the distance, hence of
-    the time. The square root of the time since, or until, the kink makes the power smooth.
+    the time. As a function of the square root of the time since, or until, the kink, the power is smooth.
     """
     if int(node[3]) == M.BACKSTOP:
         return 0.0

@@ -93,7 +93,7 @@ def slip(mode: int, memory: float) -> float:
     """Return the direction in which the armature slides under dry friction, 1 or -1; 0 at rest.
 
     The direction is constant within a step, so that friction is smooth even if the step extends beyond a
-    reversal. Outside a pack with memory the direction is the `memory` of the mode.
+    reversal. Except inside a pack with memory, the direction is stored in `memory`.
     """
     if mode >= RESTING:
         return 0.0
@@ -110,7 +110,7 @@ def friction(mode: int, memory: float, hammer: Hammer) -> float:
 
 @inlined
 def hold_limit(hammer: Hammer) -> float:
-    """Return the largest acceleration [m/s^2], by all other forces, that static friction balances."""
+    """Return the largest acceleration [m/s^2] due to other forces that static friction can balance."""
     return float(friction_force(hammer[DAMPING:SPRING], 1.0) * hammer[INVERSE_MASS])
 
 
@@ -122,16 +122,16 @@ def is_on_stop(mode: int) -> bool:
 
 @inlined
 def least_at_rest(mode: int, held: float) -> float:
-    """Return the lowest acceleration [m/s^2], by all forces but friction, at which an armature stays at rest.
+    """Return the lowest acceleration [m/s^2], without friction, at which an armature at rest stays at rest.
 
-    `held` is the largest acceleration that friction balances, or that the run does not resolve.
+    `held` is the largest acceleration that friction can balance or that the run treats as zero.
     """
     return -math.inf if mode == RESTING else -held
 
 
 @inlined
 def most_at_rest(mode: int, held: float) -> float:
-    """Return the highest acceleration [m/s^2] at which an armature stays at rest; see `least_at_rest`."""
+    """Return the highest acceleration [m/s^2] at which an armature stays at rest, like `least_at_rest`."""
     if RIGID_FRONT and mode == RESTING_FRONT:
         return math.inf
     return held

@@ -56,9 +56,9 @@ def piece_rate(row: Any, i: int, s: float) -> float:
 
 @compiled
 def piece_change(row: Any, i: int, s: float, changes: Any, j: int) -> float:
-    """Return the change of a waveform piece's value for changes of p0 to p3, stored from `changes[j]`.
+    """Return the linearised change of a waveform piece's value due to changes of its coefficients.
 
-    The other arguments are as in `piece_value`.
+    The changes of p0 to p3 begin at `changes[j]`; the other arguments are as in `piece_value`.
     """
     kind, p1, p2, p3 = row[i], row[i + 2], row[i + 3], row[i + 4]
     d0, d1, d2, d3 = changes[j], changes[j + 1], changes[j + 2], changes[j + 3]
@@ -72,7 +72,7 @@ def piece_change(row: Any, i: int, s: float, changes: Any, j: int) -> float:
 
 @inlined
 def sum_of_pulses(t: float, drive: Drive) -> float:
-    """Return the sum of the active pulses, at least one, at time `t` [s], in amperes or newtons."""
+    """Return the sum of the active pulses at time `t` [s], A or N; at least one pulse must be active."""
     total = 0.0
     i = 1
     for _ in range(int(drive[0])):

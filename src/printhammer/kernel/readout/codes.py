@@ -27,7 +27,7 @@ def write_trains(rates: Any, slots: Any, pattern: bool, starts: Any, firings: An
     """Write the firing times [s] of a train at each rate, and the start index of each train.
 
     `slots`, int64, are the slot numbers of the firings. The time of a firing is its slot number divided by
-    the rate in a `pattern`, else its slot number times the period.
+    the rate in a `pattern`, otherwise its slot number multiplied by the rounded period.
     """
     count = slots.shape[0]
     starts[0] = 0
@@ -38,7 +38,7 @@ def write_trains(rates: Any, slots: Any, pattern: bool, starts: Any, firings: An
 
 
 def widen_range(x: Any, ends: Any) -> None:
-    """Extend the range `ends` [m], shape (2,), to all known displacements of `x`, float32."""
+    """Extend the range `ends` [m], shape (2,), to include all known displacements of `x`, float32."""
     for i in range(x.shape[0]):
         for j in range(x.shape[1]):
             if math.isfinite(x[i, j]):

@@ -80,7 +80,7 @@ def write_line(
     dots : float64 array, shape (number of dots, `DOT_WIDTH`)
         Output.
     extra_dots : float64 array, shape (any, 2)
-        Places of the extra contacts [m].
+        Output: positions of the extra contacts on the paper [m].
     """
     starts, lines, wires = runs
     status, reached, extra, dot_starts, rows = kept

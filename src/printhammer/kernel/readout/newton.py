@@ -2,7 +2,7 @@
 
 The unknowns are the states at successive firings, as in `printhammer.chaos.orbits.newton`: the image of each
 state has to be the next state, and the image of the last state the first state. The caller computes images at
-the trial states, with their derivatives, and calls `improve`, until the orbit is closed or given up.
+the trial states, with their derivatives, and calls `improve`, until the iteration converges or fails.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ derivative of the map by rows, four columns; all in half-widths of the window.""
 
 
 def write_guess(states: Any, scales: Any, period: int, count: int, orbit: Any, trial: Any) -> int:
-    """Write an initial guess of an orbit of `count` firings; return 0 if the states are not near one orbit.
+    """Write an initial guess of an orbit of `count` firings; return 0 if the states are not near it.
 
     If the states alternate about the orbit, their mean is closer to the orbit than any single state.
 
@@ -58,7 +58,7 @@ def write_guess(states: Any, scales: Any, period: int, count: int, orbit: Any, t
     states, scales
         As for `printhammer.kernel.readout.section.write_distances`.
     period, count : int
-        Period in which the states agree, and one of its divisors.
+        Number of firings after which the states repeat, and a divisor of this number.
     orbit : float64 array, shape (count, 10)
         Output; see `ORBIT`.
     trial : float64 array, shape (count, 2)

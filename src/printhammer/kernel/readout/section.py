@@ -47,11 +47,11 @@ def class_of(agreed: int, settled: int, value: float, error: float, smooth: bool
     Parameters
     ----------
     agreed, settled : int
-        Period in which the states agree, and the period that they prove, 0 for none.
+        Period after which the states agree, and the period that the states prove; 0 for none.
     value, error : float
         Largest exponent per firing and its standard error; used only without a period.
     smooth : bool
-        Whether the motion has a derivative.
+        Whether the motion is differentiable with respect to its initial state.
     rests : int
         Number of firings that were followed by a rest of the armature on the backstop.
 
@@ -200,10 +200,9 @@ def is_shown(states: Any, scales: Any, period: int) -> bool:
 def settled_period(states: Any, scales: Any, period: int, planar: bool) -> int:
     """Return the period of a settled motion whose states agree `period` firings apart; 0 if undecided.
 
-    The period is 0 if the states do not decide it. The rules are those of
-    `printhammer.chaos.orbits.settled`, without Newton's method: a `planar` motion
-    that the states alone do not decide is undecided here. A motion that is not planar has more components of
-    the state than displacement and velocity at a section; its states decide unless they still move.
+    The rules are those of `printhammer.chaos.orbits.settled`, without Newton's method. A motion is `planar`
+    if displacement and velocity are its complete state at a firing; its period stays undecided if the states
+    alone do not prove a period. A motion that is not planar is undecided only if its states still move.
     `states` and `scales` are as for `write_distances`.
     """
     for count in range(1, period + 1):

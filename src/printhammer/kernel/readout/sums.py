@@ -48,7 +48,7 @@ def eight_sums(table: Any, first: int, count: int, column: int) -> float:
 
 
 def pairwise_sum(table: Any, first: int, count: int, column: int, work: Any) -> float:
-    """Sum `count` rows of a column, beginning at row `first`, with the additions of `numpy.sum`.
+    """Sum `count` rows of a column, beginning at row `first`, in the same order as `numpy.sum`.
 
     Columns of more than 128 rows are halved recursively; `work`, shape (`PARTIALS`,), holds the left
     halves that wait for their right halves: first row, number of rows, whether the left sum is known, and

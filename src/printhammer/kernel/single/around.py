@@ -162,6 +162,6 @@ def kick_into_backstop(t: float, a: float, t_next: float, control: Control) -> t
 
 @compiled
 def contact_unit(v: float, control: Control) -> float:
-    """Return the scale of the regularised variable s for a touch at velocity `v`, as |v|^-0.6 (Hertz)."""
+    """Return the scale of the regularised variable s for a touch at `v`, proportional to |v|^-0.6 (Hertz)."""
     speed = max(abs(v), 1e-6 * control[1])
     return float(math.sqrt(control[0]) / (control[1] ** 0.4 * speed**0.6))

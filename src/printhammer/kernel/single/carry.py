@@ -30,11 +30,11 @@ MEMORY_NOW = 10
 STEP = 11
 """Index of the next step size: in seconds, or in the regularised variable s in the backstop."""
 FREE_STEP = 12
-"""Index of the first step size in free flight [s]."""
+"""Index of the initial step size of the next free flight [s]."""
 PACK_STEP = 13
-"""Index of the first step size in the pack [s]."""
+"""Index of the initial step size of the next pack contact [s]."""
 CONTACT_STEP = 14
-"""Index of the first step size in the backstop, in multiples of `contact_unit`."""
+"""Index of the initial step size of the next backstop contact, in multiples of `contact_unit`."""
 STARTED = 15
 """Index of the mode of the latest step."""
 ENTERED = 16

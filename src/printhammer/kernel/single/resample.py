@@ -64,7 +64,7 @@ if TYPE_CHECKING:
 
 GOLDEN = 0.3819660112501051  # Square of the inverse golden ratio
 NEAR = 1e-6  # Bracket width, relative to the first bracket, at which a search ends; arbitrary
-ASIDE = 1e-6  # Step by which the slope at the edge of a contact is tested, of a sample interval; arbitrary
+ASIDE = 1e-6  # Step of the slope test at the edge of a contact, in sample intervals; arbitrary
 SAMPLES = 4
 """Number of samples per step in the search for the largest depth and force of a contact; arbitrary."""
 
@@ -73,7 +73,7 @@ SAMPLES = 4
 def memory_of(mode: int, kept: float, hammer: Hammer) -> float:
     """Return the memory value of the pack law for the local maximum `kept` [m] stored in a node.
 
-    Elsewhere, under dry friction, a node stores the direction of sliding, which is returned.
+    In other modes, a node stores the direction of sliding under dry friction, which is returned.
     """
     if HAS_PACK and MEMORY and mode in (M.UNLOADING, M.RELOADING, M.HELD_UNLOADING):
         return pack_memory(hammer[PACK:BACKSTOP_PART], kept)
@@ -241,7 +241,7 @@ def depth_and_force(t: float, node: Any, surface: int, hammer: Hammer, live: Any
 
 @compiled
 def sample_time(place: int, nodes: Any) -> float:
-    """Return the time [s] of a sample, numbered from the first node on, `SAMPLES` to a step."""
+    """Return the time [s] of sample number `place`, counted from the first node, `SAMPLES` per step."""
     k, j = place // SAMPLES, place % SAMPLES
     t: float = nodes[k, 0]
     return t + (nodes[k + 1, 0] - t) * j / SAMPLES if j else t
@@ -269,10 +269,10 @@ def refined(
     train: Train,
     hammer: Hammer,
 ) -> tuple[float, float]:
-    """Return time [s] and value of the largest depth (`which` 0) or force (`which` 1) beside a sample.
+    """Return time [s] and value of the largest depth (`which` 0) or force (`which` 1) near a sample.
 
-    Brent's method (*Algorithms for Minimization Without Derivatives*, 1973, chapter 5) between the two
-    neighbours of the largest sample, which has the number `place` and the value `value`.
+    Brent's method (*Algorithms for Minimization Without Derivatives*, 1973, chapter 5) is applied between the
+    two neighbours of the largest sample, which has the number `place` and the value `value`.
     """
     left, right = max(place - 1, begin * SAMPLES), min(place + 1, end * SAMPLES)
     low, high, x, fx = sample_time(left, nodes), sample_time(right, nodes), sample_time(place, nodes), value

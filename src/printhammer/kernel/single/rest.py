@@ -63,7 +63,7 @@ def moment_of_end(
 def friction_ends(
     t: float, x: float, pause: float, lowest: float, highest: float, law: ForceLaw
 ) -> tuple[bool, float]:
-    """Decide as `rest_ends`, without missing an acceleration that leaves its range between two samples.
+    """Decide like `rest_ends`, but also detect an excursion of the acceleration between two samples.
 
     The pause is halved until a parabola through three samples describes the acceleration; the returned time
     is then shorter than `pause`. The extremum of the acceleration, located by parabolas through ever closer

@@ -100,7 +100,7 @@ def set_live_moves(first: int, last: int, train: Train, forcing: Forcing) -> Non
 
 @inlined
 def drive_change(t: float, drive: Drive, delayed: Any) -> float:
-    """Return the derivative of the drive with respect to the constant of row `delayed` of `live_moves`."""
+    """Return the derivative of the drive with respect to the constant whose `live_moves` are `delayed`."""
     total = 0.0
     i, j = 1, 0
     for _ in range(int(drive[0])):

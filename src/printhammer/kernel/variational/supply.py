@@ -1,7 +1,7 @@
 """Derivatives of the coil circuit with respect to constants: forcing of electric rows, moving edges.
 
 At a fixed state and time, the rates of the electric state depend on the resistances, the voltages and the
-current for a flux linkage. If an edge moves to a later time, the rates before the edge apply for longer.
+current at a given flux linkage. If an edge moves to a later time, the rates before the edge apply for longer.
 """
 
 from __future__ import annotations

@@ -78,8 +78,8 @@ NEAR = 1e-9
 reversal is differentiable."""
 
 RELEASED = 1e-6
-"""Relative tolerance of force and static friction within which the force ended a rest; otherwise an edge of
-the drive or the end of the run ended it. Behind a circuit, releases are located to 2e-8."""
+"""Largest relative difference of force and static friction at which the force has ended a rest; otherwise an
+edge of the drive or the end of the run has ended the rest. With a coil circuit, releases are located to 2e-8."""
 RELEASE_SPACING = 1e-3
 """Step size of the time for the rate of the force at a release, as a fraction of the rest."""
 
@@ -186,7 +186,7 @@ def pass_reversal(node: Any, after: Any, mode: int, following: int, columns: Any
 def pass_level(
     node: Any, after: Any, mode: int, following: int, jump: int, columns: Any, setting: Setting
 ) -> bool:
-    """Propagate the columns through a touch, a release or the old maximum; return whether differentiable."""
+    """Propagate the columns across a surface or the old local maximum; return whether differentiable."""
     hammer, drive, forcing = setting.hammer, driven(setting.drive, electric_at_node(after)), setting.forcing
     v = after[2]
     if v == 0.0:
@@ -362,8 +362,8 @@ def is_departure(before: Any, node: Any) -> bool:
 def leave_at_edge(node: Any, pulse: int, piece: int, columns: Any, setting: Setting) -> None:
     """Propagate the columns through the edge of the drive that has just ended a rest.
 
-    Until the edge, stop or friction balance the other forces: a shift of the edge shifts the motion by the
-    same time.
+    Until the edge, the stop or friction balances the other forces, so that a shift of the edge shifts the
+    later motion by the same time.
     """
     hammer, drive, forcing = setting.hammer, driven(setting.drive, electric_at_node(node)), setting.forcing
     a = acceleration_at(node, int(node[3]), node[4], 0.0, hammer, drive)
