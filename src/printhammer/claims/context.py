@@ -83,7 +83,7 @@ class Context:
         return float(self.need("pack").front)
 
     def once(self, name: str, search: Callable[[], _T]) -> _T:
-        """Return the result of `search`, which runs at the first call with a given name and is cached."""
+        """Return the result of `search`, called once per name; later calls return the cached result."""
         if name not in self._kept:
             self._kept[name] = search()
         kept: _T = self._kept[name]

@@ -103,7 +103,7 @@ def panels_view(report: Report) -> list[dict[str, Any]]:
 
 
 def schemes_view(report: Report) -> dict[str, Any] | None:
-    """Return the effect of the 1983 integrators on Fig. 11; None for another hammer's data."""
+    """Return the effect of the 1983 integrators on Fig. 11; None if computed for another hammer."""
     found = report.reconstruction.schemes
     if found is None or found.shipped != report.hammer.fingerprint:
         return None

@@ -10,7 +10,7 @@
 | `scheme` | the integration scheme of a single run |
 | `tolerance` | error allowed in one step |
 | `status` | outcome of the run, for results of a single run |
-| `printhammer`, `numpy`, `llvmlite`, `scipy` | versions on which the bits depend |
+| `printhammer`, `numpy`, `llvmlite`, `scipy` | versions that determine the exact bits of a result |
 
 Keys that do not apply to a result are omitted; the versions are always present.
 """
@@ -78,7 +78,7 @@ def provenance(
 
 
 def versions() -> dict[str, str]:
-    """Return the package versions on which a result depends bit by bit."""
+    """Return the versions of the packages that determine the exact bits of a result."""
     from printhammer import __version__
 
     return {"printhammer": __version__, **{name: _installed(name) for name in VERSIONS[1:]}}

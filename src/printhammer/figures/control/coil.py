@@ -60,7 +60,7 @@ _COLOURS: Final = (style.BLUE, style.ORANGE, style.GREEN, style.YELLOW)
 
 @styled
 def plot_duty(duty: ThermalDuty) -> Figure:
-    """Draw the highest continuous rate of a coil against the ambient temperature, down to zero."""
+    """Draw the highest continuous rate of a coil against ambient temperature, down to a rate of zero."""
     figure, ax = new_panel(3.4)
     ax.plot(duty.ambient, duty.rate, "o", color=style.BLUE, ms=4.5)
     reach = np.array([min(float(duty.ambient.min()), 0.0), duty.limit])

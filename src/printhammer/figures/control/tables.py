@@ -39,7 +39,7 @@ def plot(table: CompensationTable) -> Figure:
 
 
 def _few_rates(table: CompensationTable) -> Figure:
-    """Draw advance and width as maps with one cell per history, the last gap on the vertical axis."""
+    """Draw advance and width as maps with one cell per history; the vertical axis is the latest gap."""
     figure = new_figure(1.2 + 2.1 * table.rates.size)
     axes = figure.subplots(table.rates.size, 2, squeeze=False)
     side, across = table.reach + 1, (table.reach + 1) ** (table.gaps - 1)

@@ -126,7 +126,7 @@ class BaseRates(_Table):
 
 
 class Predictions(_Table):
-    """Counts of the other claims that hold for hammers fitted to the stated claims alone."""
+    """Counts of hammers, fitted to the stated claims alone, for which each other claim holds."""
 
     format: Literal[1] = Field(description="1, the version of the format")
     seed: int = Field(description="the seed of the search")
@@ -136,7 +136,7 @@ class Predictions(_Table):
     claims: dict[_ClaimName, _Predicted] = Field(description="the counts of each claim")
 
     def share(self, name: str) -> Share | None:
-        """Return the fraction of the hammers for which a claim holds; None for a claim not measured."""
+        """Return the fraction of fitted hammers for which a claim holds; None for a claim not measured."""
         return _share(self.claims.get(name))
 
 
