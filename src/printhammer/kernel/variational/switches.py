@@ -79,7 +79,7 @@ reversal is differentiable."""
 
 RELEASED = 1e-6
 """Largest relative difference of force and static friction at which the force has ended a rest; otherwise an
-edge of the drive or the end of the run has ended the rest. With a coil circuit, releases are located to 2e-8."""
+edge of the drive or the end of the run has ended the rest. In a circuit, releases are located to 2e-8."""
 RELEASE_SPACING = 1e-3
 """Step size of the time for the rate of the force at a release, as a fraction of the rest."""
 
