@@ -1,7 +1,7 @@
 """The program `printhammer`: its verbs and its exit status.
 
-Exit status: 0 for success; 1 if a run stopped early, or with ``--strict`` a claim fails; 2 for bad input,
-described in one sentence on standard error; 130 after Ctrl-C.
+Exit status: 0 for success; 1 in the cases that the help of a verb names, such as a run that stopped early; 2
+for bad input, described in one sentence on standard error; 130 after Ctrl-C.
 
 `MODULES` lists all verbs of the command line, in the order of the help. A command line that begins with the
 name of a verb imports the module of this verb alone.
@@ -121,7 +121,7 @@ def verb_of(name: str) -> Verb:
 
 
 def groups_of(names: Iterable[str]) -> dict[str, tuple[str, str | None]]:
-    """Return help text and example of each group of the named verbs, by the name of the group."""
+    """Return the help text and the example of each group of the named verbs, by group name."""
     groups = dict.fromkeys(name.partition(" ")[0] for name in names if " " in name)
     return {group: (_module(group).GROUP, getattr(_module(group), "EXAMPLE", None)) for group in groups}
 
@@ -165,7 +165,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 
 
 def _advice(message: str, error: Exception) -> str:
-    """Return a hint at --hammer if the error is an extra argument of a verb with this option; else empty."""
+    """Return a hint to use --hammer if a verb with this option received an extra argument; else empty."""
     command = getattr(getattr(error, "ctx", None), "command", None)
     flags = [flag for option in getattr(command, "params", ()) for flag in option.opts]
     return "; --hammer selects the hammer" if "unexpected extra" in message and "--hammer" in flags else ""

@@ -104,7 +104,7 @@ def files(what: str, *endings: str, many: bool = True, **more: Any) -> Files:
 
 
 def results(what: str, *more: str, **options: Any) -> Files:
-    """Declare an option for result files: data, pictures, and `more` endings; `what` names the result."""
+    """Declare an option for files of a result: data, a picture, or an ending in `more`; `what` names it."""
     endings = (*DATA, *more)
     kinds = f"Output file for {what} ({', '.join(endings)}; SI)"
     return files(f"{kinds} or a picture (.svg, .png, .pdf); repeatable.", *endings, **options)
@@ -120,7 +120,7 @@ def file(what: str, *endings: str, **more: Any) -> Files:
 
 
 def text(metavar: str, what: str, **more: Any) -> Any:
-    """Declare an option whose value is text, or is converted by typer to the keyword `type`."""
+    """Declare an option whose value is text, which typer converts if the keyword `type` is passed."""
     return Option(what, metavar, **more)
 
 
@@ -178,7 +178,7 @@ def span(what: str, **more: Any) -> Any:
 
 
 def rates_between(what: str, most: int) -> Any:
-    """Declare an option for evenly spaced rates: lowest, highest and their number, at most `most`."""
+    """Declare an option for evenly spaced rates: lowest, highest, and number of rates (at most `most`)."""
 
     def read(written: str, name: str) -> list[float]:
         import numpy as np

@@ -361,7 +361,7 @@ def check_endings(paths: Iterable[Path], endings: Sequence[str], option: str = "
 
 
 def ended_early(statuses: Iterable[object], total: int | None = None) -> list[str]:
-    """Return one warning, with run count and statuses, if any status is not "ok"; else an empty list."""
+    """Return a list of one warning, with run count and statuses, if any status is not "ok"; else empty."""
     every = [str(status) for status in statuses]
     failed = [status for status in every if status != "ok"]
     kinds = ", ".join(sorted(set(failed)))
@@ -369,7 +369,7 @@ def ended_early(statuses: Iterable[object], total: int | None = None) -> list[st
 
 
 def away_from_rest(hammer: Hammer) -> list[str]:
-    """Return one sentence if a single pulse leaves the armature away from rest; else an empty list."""
+    """Return the lines of a note if a single pulse leaves the armature away from rest; else an empty list."""
     from printhammer.run.window import stays_away
 
     said = stays_away(hammer)

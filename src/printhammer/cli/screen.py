@@ -125,7 +125,7 @@ def _grid(grid: Grid, units: Units) -> Table:
 
 
 def marked(text: str, units: Units = Units.SI) -> str:
-    """Convert the marked text of a summary to Rich markup."""
+    """Convert a text of a summary, in which quantities and styled words are marked, to Rich markup."""
     from printhammer.results.summary import rendered
 
     def shown(style: str, said: str) -> str:

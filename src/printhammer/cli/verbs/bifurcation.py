@@ -28,7 +28,8 @@ _of = partial(opt.text, panel=_PARAMETER)
     " --direction both --out bifurcation.png",
     {
         "transient": opt.whole(
-            "Number of firings to discard at each value (default: all but the last 200, at least a third)."
+            "Number of firings to discard at each value (default: all but the last 200, but at least a third"
+            " of all firings)."
         ),
         "refine": opt.whole(
             "Number of times to halve the step where the classification of neighbouring motions differs.",

@@ -118,7 +118,7 @@ def numbered(sources: list[str]) -> list[str]:
 
 
 def constants_table(hammer: Hammer, sources: list[str]) -> Table:
-    """Return the table of constants, grouped by part and headed by its law."""
+    """Return the table of constants, in groups headed by the part and its law."""
     laws = {key: f"{'shape' if key == 'waveform' else 'law'} {law}" for key, law in hammer.laws.items()}
     files = hammer.files
 

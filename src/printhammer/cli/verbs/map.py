@@ -114,7 +114,7 @@ def _axes(
     rates: int | None,
     times: int | None,
 ) -> tuple[FloatArray, FloatArray | int]:
-    """Return the rates [Hz] and the times [s] or their number; a measured map supplies the defaults."""
+    """Return the rates [Hz], and the times [s] or the number of times; a measured map supplies defaults."""
     import numpy as np
 
     from printhammer.maps.frequency import MOST_CELLS, RATES, TIMES, default_rates

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 ALL: Final = "all"
 _LISTS: Final = {"displacements": "m", "currents": "A", "peaks": "m", "speeds": "m/s"}
 _TEXTS: Final = ("duration", "before", "locked")
-_SENSORS: Final = "Sensors (default: an ordinary bench)"
+_SENSORS: Final = "Sensors (default: typical laboratory sensors)"
 _sensor = partial(opt.text, panel=_SENSORS)
 _bench = partial(opt.text, panel="Bench")
 

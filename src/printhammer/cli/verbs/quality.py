@@ -29,7 +29,7 @@ FEEDBACK: Final = opt.switch("Drive with position feedback, as in `printhammer f
 def chosen_strategy(
     job: Job, hammer: Hammer, table: Path | None, feedback: bool, serial: str | None = None
 ) -> tuple[dict[str, Any], CompensationTable | None]:
-    """Return the drive strategy as a keyword `strategy` (empty for open loop), and the table, if any.
+    """Return the keyword argument `strategy`, as a dict (empty for open loop), and the table, if any.
 
     Raises
     ------
@@ -102,7 +102,8 @@ def quality(
     ),
     judged_by: str | None = _more(
         "own|design",
-        "Reference dot, with --yield: single pulse of the same hammer (own) or the nominal hammer (design).",
+        "Reference dot, with --yield: single pulse of the same hammer (own) or of the nominal hammer"
+        " (design).",
     ),
     seed: int | None = opt.whole("Seed for drawing the hammers of --yield (default: 0).", panel=_MORE),
     current: str | None = _more("CURRENT", "Limit on the current, with --damping (default: 2 A)."),

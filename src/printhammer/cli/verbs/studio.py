@@ -110,7 +110,7 @@ _KERNELS: Final[dict[str, Callable[[Hammer], None]]] = {
 
 
 def _compile_code(name: str, hammer: Hammer) -> tuple[str, float]:
-    """Compile or load one kind of machine code in a process; return its name and the duration, s."""
+    """Compile or load the kind `name` of machine code; return the name and the duration, s."""
     start = time.perf_counter()
     _KERNELS[name](hammer)
     return name, time.perf_counter() - start

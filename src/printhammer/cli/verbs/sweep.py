@@ -78,7 +78,7 @@ def sweep(
 
 
 def ended(result: xr.Dataset, new: float, seconds: float) -> str:
-    """Format the outcome of a sweep: members by status, members not at rest, and computation time."""
+    """Format the outcome of a sweep: numbers of members by status and not at rest, and computation time."""
     from collections import Counter
 
     from printhammer.sweep.outputs import STATUSES
