@@ -191,7 +191,7 @@ def sections(
 def _counts(
     touches: SupportsIndex, transient: SupportsIndex, firings: SupportsIndex | None
 ) -> tuple[int, int, int]:
-    """Validate the numbers of touches, transient firings and maximum firings; return three integers."""
+    """Validate the touches to record, the firings to discard and the firing limit; return three integers."""
     wanted, skipped = read_count(touches, "touches"), read_count(transient, "transient", least=0)
     room = MOST_PULSES - skipped - 1
     limit = min(_FIRINGS_A_TOUCH * wanted, room) if firings is None else read_count(firings, "firings")

@@ -126,9 +126,10 @@ class Attractors:
         return np.stack([x, v], axis=-1) / self.scales[:2]
 
     def _match_settling(self, points: FloatArray, q: int) -> IntArray:
-        """Match unsettled trains to known orbits nearby; return indices in `found`, -1 for no match.
+        """Match slowly settling trains to orbits in `found`, or locate new orbits; return indices.
 
-        The scaled states, shape (n, points, 2), repeat after q firings.
+        The scaled states, shape (n, points, 2), agree q firings apart, but do not prove a period of q. The
+        index of a train is -1 if no orbit is found.
         """
         places = np.full(len(points), -1, np.int64)
         left = list(range(len(points)))
@@ -151,7 +152,7 @@ class Attractors:
         return places
 
     def _periodic(self, orbits: FloatArray) -> IntArray:
-        """Match orbits of one period, shape (n, q, 2), to `found`; append new orbits; return indices."""
+        """Match orbits of q firings, shape (n, q, 2), to `found`; append new orbits; return indices."""
         q = orbits.shape[1]
         places = self._known(orbits)
         while (left := np.flatnonzero(places < 0)).size:
@@ -162,7 +163,7 @@ class Attractors:
         return places
 
     def _known(self, orbits: FloatArray) -> IntArray:
-        """Match orbits of one period, shape (n, q, 2), to `found`; return indices, -1 for new orbits."""
+        """Match orbits of q firings, shape (n, q, 2), to `found`; return indices, -1 for new orbits."""
         places = np.full(len(orbits), -1, np.int64)
         for place, attractor in enumerate(self.found):
             if attractor.period == orbits.shape[1]:
@@ -191,7 +192,7 @@ class Attractors:
                     break
 
     def _within(self, points: FloatArray, rows: IntArray, place: int, places: IntArray) -> IntArray:
-        """Assign the trains that lie on a known strange attractor; return the unmatched rows."""
+        """Match trains to the strange attractor with index `place`; return the rows without a match."""
         if not rows.size:
             return rows
         lies = self._clouds[place].holds(points[rows])

@@ -264,7 +264,7 @@ class Basins(Result, rows="v x"):
 
     @property
     def rounding(self) -> str:
-        """Sentence that counts the sampled cells whose label changes at a tenth of the tolerance."""
+        """Sentence that states how many sampled cells change their label at a tenth of the tolerance."""
         if not self.compared:
             return ""
         share = 100.0 * self.changed / self.compared

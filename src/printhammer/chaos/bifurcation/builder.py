@@ -207,7 +207,7 @@ class DiagramBuilder:
         return list(range(first, len(self.values)))
 
     def rows(self, places: Sequence[int], way: int) -> list[int]:
-        """Return the table rows of the trains at parameter values, by index, in one direction."""
+        """Return the table rows of trains in one direction, from the indices of their parameter values."""
         return [len(self.ways) * place + way for place in places]
 
     def base(self, grid: FloatArray) -> None:
@@ -294,7 +294,7 @@ class DiagramBuilder:
         self.done += len(rows)
 
     def is_resting(self, columns: Columns, row: int, regime: Regime) -> bool:
-        """Whether a train without a short period repeats a longer cycle with a rest on the backstop."""
+        """Whether the motion of a train repeats exactly and includes a rest on the backstop."""
         if not is_memoryless(regime) or columns.status[row] != OK or regime.phase:
             return False
         points = np.column_stack([columns.x[row], columns.v[row]])

@@ -291,7 +291,7 @@ def confirm(
 ) -> None:
     """Check ambiguous periods from `cycles_of` by Newton's method; update periods and distances in place.
 
-    Periods are ambiguous if the states alone do not show them (`printhammer.chaos.orbits.settled`); an
+    A period is ambiguous if the states alone do not prove the period (`printhammer.chaos.orbits.settled`); an
     unconfirmed period becomes 0.
     """
     doubtful: list[int] = []
@@ -314,8 +314,8 @@ def confirm(
 def orbit_distance(one: FloatArray, other: FloatArray) -> float:
     """Compute the distance between two periodic orbits of the same period, minimised over the phase.
 
-    The distance is the largest difference of any component of the scaled states, shape (q, 2), for the cyclic
-    shift of the smallest distance.
+    For each cyclic shift, the distance is the largest absolute difference of a component of the scaled
+    states, shape (q, 2).
     """
     count = len(one)
     shifted = other[(np.arange(count) + np.arange(count)[:, np.newaxis]) % count]

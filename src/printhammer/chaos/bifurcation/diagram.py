@@ -82,7 +82,7 @@ class Route(Declared):
 
     @property
     def sentence(self) -> str:
-        """Sentence that states the first chaotic train and the windows before it, with values in SI."""
+        """Sentence that describes the windows up to the first strange train, with parameter values in SI."""
         return self.worded("{:.9g}".format)
 
     def worded(self, shown: Callable[[float], str]) -> str:
@@ -278,7 +278,7 @@ class Bifurcation(Result, rows="direction column"):
         ]
 
     def _sensitive(self) -> list[str]:
-        """Report the number of periods that change at finer tolerances; an empty list if none changes."""
+        """Return a sentence on the number of periods that change at finer tolerances; [] if none changes."""
         count = int(self.sensitive.sum())
         whose = "1 period changes" if count == 1 else f"{count} periods change"
         return [f"{whose} at a finer tolerance: rounding decides the length of long cycles."] if count else []
@@ -294,8 +294,8 @@ class Bifurcation(Result, rows="direction column"):
     def verdicts(self) -> TextArray:
         """Classification of each train, shape (D, C), as in `printhammer.chaos.strobe.verdict`.
 
-        The classes are "period-q", "strange", "undecided" and "superstable": the armature comes to rest on
-        the backstop, in a cycle longer than 64 firings.
+        The classes are "period-q", "strange", "undecided" and, for an armature that comes to rest on the
+        backstop in a cycle longer than 64 firings, "superstable".
 
         A train is undecided if its run ended early, or if it has no period and its exponent was not computed
         or is not positive by three standard errors.

@@ -171,10 +171,10 @@ class Branch(Result):
     """Branch: a curve of periodic orbits in one parameter, with its bifurcations and grazings.
 
     Every array has one row for each orbit, in order along the curve; the values of the parameter need not
-    ascend. Reasons for stopping are "bound", where the parameter reaches a bound; "closed", back at the
-    start; "period doubling", where the orbit is born; "grazing" of a rigid backstop; "merged" with an orbit
-    of fewer firings; "no value", where a run ended early; "lost", where Newton's method does not converge;
-    "jump", where Newton's method converges to another curve; and "length", at the maximum number of steps.
+    ascend. Reasons for stopping: "bound" (the parameter reaches a bound), "closed" (the curve returns to its
+    start), "period doubling" (the branch is born there), "grazing" (of a rigid backstop), "merged" (with an
+    orbit of fewer firings), "no value" (a run ended early), "lost" (Newton's method does not converge),
+    "jump" (Newton's method converges to another curve), "length" (the maximum number of steps is reached).
     """
 
     regime: Regime = part("hammer and periodic drive at the start, and phase of the section")

@@ -227,10 +227,10 @@ def fading(
 ) -> list[tuple[float, float, float]] | None:
     """Follow an impact to its grazing; return (phase, speed in m/s, parameter) at decreasing speeds.
 
-    A branch of orbits is smooth in these variables up to the grazing, which is the last entry. In terms of
-    the state at a section, the curvature of the branch diverges, since the derivative of the strobe map grows
-    as the inverse of the speed. None if the impact speed does not reach zero nearby. The arguments are those
-    of `touch_at`.
+    The last entry is the grazing itself; the result is None if the impact speed does not reach zero nearby.
+    In these variables the branch is smooth up to the grazing. In terms of the state at a section, the
+    curvature of the branch diverges, since the derivative of the strobe map grows as the inverse of the
+    speed. The arguments are those of `touch_at`.
     """
     way = [(touch.phase, touch.speed, float(regime.value(name)))]
     speeds = [touch.speed * share for share in _SLOWER] if touch.speed else []

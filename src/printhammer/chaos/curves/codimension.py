@@ -231,5 +231,8 @@ def _missed(
 
 
 def resonance_test(passages: int) -> Callable[[FloatArray], float]:
-    """Return the test function of a resonant grazing: element (1, 2) of the derivative's n-th power."""
+    """Return the test function of a resonant grazing: element (1, 2) of the n-th power of the derivative.
+
+    `passages` is n, the number of orbit periods per touch.
+    """
     return lambda jacobian: float(np.linalg.matrix_power(jacobian, passages)[0, 1])

@@ -69,7 +69,10 @@ def fewest_missing(sums: Mapping[int, int]) -> int:
 
 
 def indices_add_up(regime: Regime) -> bool:
-    """Whether theory requires the fixed-point indices to sum to 1: no pack, and damping or a backstop."""
+    """Whether theory requires the fixed-point indices to sum to 1.
+
+    True for a hammer without a pack that has damping or a backstop.
+    """
     hammer = regime.hammer
     return hammer.pack is None and (hammer.is_damped or hammer.backstop is not None)
 

@@ -151,7 +151,7 @@ def first_state(regime: Regime) -> tuple[float, float]:
 
 
 def touches(regime: Regime, count: int) -> FloatArray:
-    """Compute the states, at a firing, of motions that have just left a rigid backstop, shape (count, 2).
+    """Compute the states at the next firing of motions that leave a rigid backstop, shape (count, 2).
 
     Phases of the departure are spread evenly, speeds more densely at low values: near chatter, an
     accumulation of ever lower bounces, orbits are so dense that no even spread over the plane resolves them.
@@ -234,15 +234,16 @@ def joined(
 
 
 def moves_near(rng: np.random.Generator, count: int) -> FloatArray:
-    """Draw `count` displacements of states, in half-widths of the strobe window, shape (count, 2)."""
+    """Draw `count` random offsets of states, in half-widths of the strobe window, shape (count, 2)."""
     sizes, angles = 10.0 ** rng.uniform(*_NEARBY, count), rng.uniform(0.0, 2.0 * np.pi, count)
     return np.asarray(sizes[:, np.newaxis] * np.column_stack([np.cos(angles), np.sin(angles)]))
 
 
 def motions(maps: FastMaps, starts: FloatArray, period: int) -> list[Guess]:
-    """Simulate motions over `period` firings, which need not return, as guesses; omit motions that fail.
+    """Simulate motions over `period` firings as initial guesses; omit motions whose run fails.
 
-    Newton's method often leads from such a guess to an orbit to which no recorded motion closely returns.
+    The motions need not return to their starts: Newton's method often leads from such a guess to an orbit to
+    which no recorded motion closely returns.
     """
     table = starts[:, np.newaxis]
     for _ in range(period - 1):
@@ -255,7 +256,7 @@ def motions(maps: FastMaps, starts: FloatArray, period: int) -> list[Guess]:
 def displaced(
     orbits: Sequence[Guess], period: int, rng: np.random.Generator, scales: FloatArray, lowest: FloatArray
 ) -> list[Guess]:
-    """Displace the states of orbits of a period by random amounts of several magnitudes, above a bound."""
+    """Build guesses from orbits of a period: states displaced at random, but not below `lowest`."""
     # The same displacements for every orbit, so that a larger search includes those of a smaller search.
     sizes = 10.0 ** rng.uniform(*_SIZES, (_NEAR, 1, 1))
     moves = sizes * scales * rng.uniform(-1.0, 1.0, (_NEAR, period, 2))

@@ -224,7 +224,7 @@ class Search:
         return self._refine(regime, different)
 
     def _further(self, fast: FastMaps, different: list[_Known], records: Records, seen: set[bytes]) -> None:
-        """Try additional close returns: of longer motions, and of motions just after a touch.
+        """Try additional close returns: of longer motions, and of motions that start just after a touch.
 
         These guesses are tried last, so that no orbit of the earlier stages is lost.
         """

@@ -177,10 +177,10 @@ class States:
         return settled(train.regime.at_firings, self.points, period, _scales(train))
 
     def resting(self, train: Train, distances: FloatArray, tolerance: float) -> tuple[int, int] | None:
-        """Return cycle length, in firings, and number of rests of a motion that rests on the backstop.
+        """Return cycle length [firings] and number of rests of a motion that comes to rest on the backstop.
 
-        None if the motion does not rest. The cycle is 0 if the motion does not repeat; then at least two
-        rests are required. Cycles shorter than `LONG_CYCLE` firings are excluded, since rounding does not
+        None if the motion does not come to rest. The cycle is 0 if the motion does not repeat; then at least
+        two rests are required. Cycles shorter than `LONG_CYCLE` firings are excluded, since rounding does not
         change their length.
         """
         if not is_memoryless(train.regime):
@@ -363,7 +363,7 @@ def exponents_onward(
 ) -> list[Exponent]:
     """Compute the largest exponents of trains that continue from a state at a firing.
 
-    The exponents are averaged over `points` firings, after a hundred firings.
+    The exponents are averaged over `points` firings, after a hundred discarded firings.
     """
     window = _BEFORE + 1, _BEFORE + points
     # The tails of earlier pulses are omitted: they are the same for all neighbouring motions.
