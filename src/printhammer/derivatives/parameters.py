@@ -151,7 +151,7 @@ def _parameter(hammer: Hammer, drive: Drive, name: str) -> Parameter:
 
 
 def _spacing(drive: Drive, name: str, packed: FloatArray) -> Parameter:
-    """Build the constant "period" or "rate" of a sinusoidal force, or of a train with fixed first firing."""
+    """Build the constant "period" or "rate" of a drive; the first firing of a train stays fixed."""
     period, count = drive.period, len(drive.times)
     if period is None or (count == 1 and not isinstance(drive.waveform, Sine)):
         raise InputError.of("constant", name, "a drive with a single period and several firings")

@@ -109,7 +109,7 @@ def hammer_attributes(hammer: Hammer) -> dict[str, Any]:
 
 
 def matching(chart: xr.Dataset, other: xr.Dataset) -> tuple[IntArray, IntArray]:
-    """Return the rows, in each of two maps, of the rates that agree to a relative difference of 1e-9."""
+    """Return the row indices, in two maps, of the rates that agree to a relative difference of 1e-9."""
     here, there = chart["rate"].values, other["rate"].values
     nearest = np.abs(here[:, np.newaxis] - there).argmin(axis=1)
     same = np.isclose(here, there[nearest], rtol=1e-9, atol=0.0)

@@ -1,10 +1,10 @@
-"""Compile, in a second process, the machine code that a motion needs after its run.
+"""Compile, in a second process, the machine code that evaluates a motion after its run.
 
     python -m printhammer.run.ahead LAWS
 
-compiles, for laws passed as JSON, the functions that evaluate a motion after its run. The first process then
-loads them from disk. If the second process cannot compile, because the laws come from a part file or the
-cache cannot be written, the first process compiles these functions too.
+compiles these functions for laws passed as JSON; the first process then loads the machine code from disk. If
+the second process cannot compile, because the laws come from a part file or the cache cannot be written, the
+first process compiles the functions itself.
 """
 
 from __future__ import annotations

@@ -92,7 +92,7 @@ class Effort:
         return Effort(tolerance, self.threads)
 
     def within(self, begun: int, total: int) -> Effort:
-        """Return a copy for a subtask: its progress counts from `begun` of `total` steps."""
+        """Return a copy for a subtask that begins when `begun` of `total` steps of the task are done."""
         return replace(self, progress=shifted(self.progress, begun, total))
 
     def report(self, done: int, total: int) -> None:

@@ -61,7 +61,7 @@ class Group:
     `members` lists the indices of the group's members in the ensemble; `hammers` and `hammer_of` are the
     distinct hammers and the index for each member, and `fired` contains the drives of all members. Each
     member of the ensemble has a row of `states` (time, displacement, velocity and further components at the
-    start) and an end, s. No run takes more than `max_steps`.
+    start) and an end time, s. No run takes more than `max_steps`.
     """
 
     def __init__(

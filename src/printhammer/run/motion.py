@@ -254,7 +254,8 @@ class Motion(Result, fields=False):
 
         Displacement [m], velocity [m/s], branch of the pack (-1 outside the pack) and memory [m]; under a
         voltage also the currents in the coil and in its shorted turn [A], and the voltage of the supply's
-        capacitor [V]. A run that begins with this state and with a firing continues exactly as this run does.
+        capacitor [V]. A new run that starts from the state at a firing, and begins with that firing,
+        continues the motion, unless a pulse of an earlier firing is still active.
 
         Raises
         ------
@@ -288,7 +289,7 @@ class Motion(Result, fields=False):
 
     @cached_property
     def contacts(self) -> Rows[Contact]:
-        """All contacts in order of touch, including one open at the start; a tuple, shown as a table."""
+        """All contacts in order of touch, with any contact open at the start; a tuple, shown as a table."""
         return Rows(contacts_of(self._contact_rows), Contact)
 
     @cached_property

@@ -232,7 +232,7 @@ class Problem:
         self._set_scales()
 
     def _set_scales(self) -> None:
-        """Set the typical displacement and speed, and what follows from them."""
+        """Set the typical displacement and speed, the step-size control and the displacement bounds."""
         self.scales = scales_of(self.hammer, self.drive, self.state, self._static)
         self.control = control_of(self.scales, self.tolerance)
         self.bounds = bounds_of(self.hammer, self.scales)

@@ -37,7 +37,7 @@ def waits_of(
 def windows_of(
     hammers: Sequence[Hammer], waveforms: Sequence[Waveform], threads: int | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """Compute the window of each run by ensembles; return waits and flight times [s] as in `Window`.
+    """Compute the window of each run by ensembles; return windows and flight times [s] as in `Window`.
 
     One hammer and one waveform for each run, shape (runs,); equal objects are simulated once. Devices whose
     armature does not rest clear of a pack are simulated one by one: most of the work is then the search for

@@ -181,7 +181,7 @@ def is_enough(hammer: Hammer, seen: Single, wait: float) -> bool:
 
 
 def last_wait(hammer: Hammer, waveform: Waveform) -> float:
-    """Return the upper bound [s] on the window, at which the search by doubling stops."""
+    """Return the window [s] at which the search by doubling stops."""
     way, speed = scales_of(hammer, PulseTrain(waveform), (hammer.rest, 0.0))
     return last_window(least_wait(waveform), way, speed)
 

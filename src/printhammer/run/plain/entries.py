@@ -1,9 +1,10 @@
-"""Plain functions compiled as entry points of a web page's WebAssembly module, besides the kernel.
+"""Plain functions that are compiled, with the kernel, as entry points of a page's WebAssembly module.
 
 A plain function takes numbers, arrays and tuples of them, allocates nothing, raises nothing, and returns
 integers; the functions that it calls may be in any folder. Python calls a plain function directly, or as
-machine code through `compiled`; a page calls it in the module of a hammer's laws, `page_module`. A name that
-its module leaves undefined is bound to the law, choice or function of the kernel of that name.
+machine code through `compiled`; a page calls it in the module of a hammer's laws, `page_module`. In a plain
+function, a name that its Python module does not define refers to the kernel's law, choice or function of that
+name.
 """
 
 from __future__ import annotations
@@ -89,9 +90,9 @@ elements (None for an element that no constant sets), and the elements, SI (NaN 
 def numbers_of(hammer: Hammer) -> Numbers:
     """Return the constants of a hammer as input arrays of the entry points `constants` and `rest`.
 
-    The arrays are `body`, one for each part by role, and `limits`, whose first two elements `constants`
-    writes. The page replaces the elements of the keys that the user changes; the positions of backstop and
-    front occur twice.
+    The arrays are `body`, one array for each part, named after its role, and `limits`, whose first two
+    elements are an output of `constants`. When the user changes a constant, the page replaces every element
+    with the key of that constant; the positions of backstop and front occur twice.
     """
     place, front = hammer.position, hammer.front
     missing = math.nan
@@ -128,9 +129,9 @@ def entries() -> dict[str, Plain]:
 
 
 def templates() -> Iterator[Module]:
-    """Yield the templates of plain functions, with and without a coil circuit if they call laws.
+    """Yield the templates of plain functions: with and without a coil circuit if a function calls laws.
 
-    A function that packs the constants of parts has a template for each combination of laws instead.
+    Functions that pack the constants of parts are omitted: they have a template for each combination of laws.
     """
     from printhammer.kernel.compile.modules import plain_template
 

@@ -34,10 +34,10 @@ PATIENCE: Final = 16.0
 """Largest time from the last firing to the end of a run if the armature does not settle, in flight times."""
 
 LONGEST: Final = 64.0
-"""Largest time from the last firing to the end of a run without a dot, in displacement over speed."""
+"""Extension of the smallest window at which doubling stops, in typical displacement / typical speed."""
 
 LAST: Final = 1.0
-"""Upper limit of the time from the last firing to the end of a run, s."""
+"""Extension of the smallest window at which doubling always stops, s."""
 
 
 PAPER_X: Final = (38.1e-6, 88.9e-6)
@@ -119,7 +119,7 @@ def main_inductance(x: float, current: float, coil: Coil) -> float:
 def sustained_current(
     voltage: float, series: float, support: float, upper: float, origin: float, coil: Coil
 ) -> tuple[float, float]:
-    """Return the current [A] that a voltage can sustain in a coil, with and without the limit of a chopper.
+    """Return the currents [A] that a voltage can sustain in a coil with and without the limit of a chopper.
 
     `upper` is the current at which the chopper switches off, A, NaN without a chopper.
     """
@@ -214,7 +214,7 @@ def least_window(support: float, replaces: bool) -> float:
 
 
 def last_window(least: float, way: float, speed: float) -> float:
-    """Return the largest window [s] from the smallest window and typical displacement [m] and speed [m/s]."""
+    """Return the window [s] at which doubling stops, from smallest window, typical displacement and speed."""
     return least + min(LONGEST * way / speed, LAST)
 
 
