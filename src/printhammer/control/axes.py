@@ -48,7 +48,7 @@ _MILLIONTH: Final = 1e-6  # Resolution of axis values other than lengths in a C 
 
 @dataclass(frozen=True)
 class Axis:
-    """Axis of a family of tables: an operating condition known to the firmware, e.g. rail voltage."""
+    """Axis of a family of compensation tables: an operating condition, e.g. rail voltage."""
 
     unit: str
     meaning: str
@@ -99,7 +99,7 @@ class AxisTables:
     tables: tuple[CompensationTable, ...]
 
     def at(self, value: float | str) -> CompensationTable:
-        """Interpolate the tables at an axis value; where two solution branches meet, use the nearer entry."""
+        """Interpolate the tables at an axis value; where solution branches differ, use the nearer entry."""
         asked = read_number(value, AXES[self.axis].unit, self.axis)
         least, most = self.values[0], self.values[-1]
         if not least <= asked <= most:
@@ -117,7 +117,7 @@ class AxisTables:
         return replace(first, **times, deviation=unknown, multiplier=unknown)
 
     def strategy(self, hammer: Hammer, value: float | str) -> TableStrategy:
-        """Return a drive strategy: the table at an axis value, and the hammer's pulses at that value."""
+        """Return a drive strategy from the table and the pulses of the hammer at an axis value."""
         table = self.at(value)
         table.check_hammer(hammer)
         place = read_number(value, AXES[self.axis].unit, self.axis)
@@ -155,7 +155,7 @@ class AxisTables:
         return replace(self, tables=tuple(table.quantised(tick) for table in self.tables))
 
     def with_multipliers(self, hammer: Hammer, effort: Effort = DISPLAY) -> AxisTables:
-        """Return a copy with the multipliers of every table, on the hammer at the axis value of the table."""
+        """Return a copy with multipliers, computed for the hammer at the axis value of each table."""
         change = AXES[self.axis].change
         tables = [
             replace(
@@ -234,7 +234,7 @@ def tune_along(
     progress: Callable[[int, int], None] | None = None,
     **options: Any,
 ) -> AxisTables:
-    """Tune a table for each axis value; all tables print the single-pulse dot of the nominal hammer.
+    """Tune a table for each axis value, so that every dot equals the nominal hammer's single-pulse dot.
 
     Parameters
     ----------

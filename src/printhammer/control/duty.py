@@ -88,7 +88,10 @@ class DotHeat:
 
 
 def dot_heat(heat: float | str, feed: str = "voltage") -> DotHeat:
-    """Build a `DotHeat` from the coil heat per dot at 20 degC, J; the driver keeps `feed` constant."""
+    """Build a `DotHeat` from the coil heat per dot at 20 degC, J, and the quantity that the driver regulates.
+
+    `feed` is "voltage", "current" or "energy".
+    """
     if feed not in FEEDS:
         raise InputError.of("feed", feed, f"one of {', '.join(FEEDS)}")
     return DotHeat((REFERENCE,), (read_positive(heat, "J", "heat"),), feed)
@@ -100,7 +103,7 @@ def read_temperature(value: float | str, name: str) -> float:
     Raises
     ------
     InputError
-        The value is not a temperature, or the linear law gives copper no resistance at that temperature.
+        The value is not a temperature, or is so low that the linear law gives copper no resistance.
     """
     temperature = read_number(value, "degC", name)
     if not temperature > COLDEST:
@@ -140,7 +143,7 @@ class ThermalCoil:
 
 
 class ThermalDuty(Result, rows="ambient burst"):
-    """Largest continuous rates of a coil, and the allowed bursts at higher rates."""
+    """Largest continuous dot rates of a coil, and the allowed bursts at higher rates."""
 
     coil: ThermalCoil = part("thermal model")
     heat: DotHeat = part("coil heat per dot")

@@ -1,7 +1,7 @@
 """Impact time from samples of coil current or voltage, by a matched filter with nuisance parameters.
 
-The moving armature induces a voltage in its coil, which changes at the impact: the current, which had dipped,
-turns, or the open-circuit voltage of a coil with a permanent magnet falls. The samples y are modelled as
+The moving armature induces a voltage in its coil, which changes at the impact: the falling current rises
+again, or the open-circuit voltage of a coil with a permanent magnet falls. The samples y are modelled as
 
   a s(t - shift) + r(t) + b0 + b1 t + noise
 
@@ -9,12 +9,12 @@ in a window around the touch, and the estimate is the shift with the least resid
 b1 are a linear least-squares fit, so the score is a filter with fixed weights (a matched filter, the
 generalised likelihood ratio; S. M. Kay, *Fundamentals of Statistical Signal Processing: Detection Theory*,
 1998, ch. 7). The straight line absorbs slow differences between a unit and the nominal hammer: resistance,
-temperature, rail. The signature s and the reference r come from simulations of the nominal hammer:
+temperature, rail voltage. The signature s and the reference r come from simulations of the nominal hammer:
 
 - where the driver holds its voltage throughout the search, the signal depends on the motion alone and moves
   with the impact: s is the signal, r is 0;
-- where the driver switches, its edges stay: r is the signal of the hammer without its pack, and s is the
-  difference that the pack makes, which is zero up to the touch.
+- where the driver switches, its edges do not move with the impact: r is the signal of the hammer without its
+  pack, and s is the difference that the pack makes, which is zero up to the touch.
 
 The estimator knows the samples, the fired pulse and the nominal hammer, but nothing of the unit. Delay and
 bandwidth of the probe, if known, are part of the template. An estimate is flagged if the samples do not

@@ -1,8 +1,8 @@
 """The temperature limit of a coil winding, from the maker's dot rates at several ambient temperatures.
 
 On one rail the largest rate is (L - A) / K, with the temperature limit L of the winding, the ambient
-temperature A and the warming K per dot rate (`printhammer.control.duty`). L is common to all rails, K is one
-constant per rail; both are fitted by least squares to the logarithms of the rates.
+temperature A and the temperature rise K per unit of dot rate (`printhammer.control.duty`). L is common to all
+rails, K is one constant per rail; both are fitted by least squares to the logarithms of the rates.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Closed-loop simulation of hammers, a position sensor, and a controller that decides before contacts.
+"""Closed-loop simulation of hammers with a position sensor and a controller that acts before each contact.
 
 All runs are advanced from decision to decision together. At each decision the controller knows the sensor
 readings so far, and nothing else about the driven hammer. The result is an ordinary drive.

@@ -115,7 +115,7 @@ class BoundedSequence(PulseSequence):
 
 
 def driver_of(hammer: Hammer, current: float = LARGEST_CURRENT, edge: float | None = None) -> Driver:
-    """Return a driver for a current-driven hammer, with a current limit, A.
+    """Return a driver with the current limit `current` [A] for a current-driven hammer.
 
     The time constant `edge` [s] applies to rise and decay; by default it is the decay time constant of the
     hammer's waveform. The current of the hammer's waveform rises more slowly; the faster rise of the driver
@@ -181,17 +181,17 @@ class Learned:
     scale_error: float = SCALE_ERROR
 
     def drift(self) -> None:
-        """Add process noise to the errors of pack front and current scale, up to their prior values."""
+        """Inflate the standard deviations of pack front and current scale, at most to their prior values."""
         self.front_error = float(min(np.hypot(self.front_error, _FRONT_DRIFT), FRONT_ERROR))
         self.scale_error = float(min(np.hypot(self.scale_error, _SCALE_DRIFT), SCALE_ERROR))
 
     def take_scale(self, scale: float, variance: float) -> None:
-        """Store an estimate of the current scale unless implausibly far from nominal; see `_FARTHEST`."""
+        """Store an estimate of the current scale unless it is too far from nominal; see `_FARTHEST`."""
         if abs(scale) <= _FARTHEST * SCALE_ERROR and variance > 0.0:
             self.scale, self.scale_error = scale, float(np.sqrt(variance))
 
     def take_front(self, front: float, variance: float) -> None:
-        """Store an estimate of the pack front unless implausibly far from nominal; see `_FARTHEST`."""
+        """Store an estimate of the pack front unless it is too far from nominal; see `_FARTHEST`."""
         if abs(front) <= _FARTHEST * FRONT_ERROR and variance > 0.0:
             self.front, self.front_error = front, float(np.sqrt(variance))
 
@@ -212,7 +212,7 @@ class Touched:
 
 @dataclass(frozen=True)
 class Printed:
-    """Pack contact as predicted when its pulse was chosen, before samples corrected the pack front."""
+    """Pack contact as predicted when its pulse was chosen, with the pack front as estimated at that time."""
 
     # Time, s, speed, m/s, and kind of the touch
     touch: float

@@ -1,11 +1,11 @@
 """The control policy: the action of least present and future cost, by dynamic programming.
 
 The cost of a dot is a² (1 + k a⁴) + b² (1 + k b⁴), with a and b its deviations of force and arrival as
-fractions of the limits, so that a deviation near its limit costs far more than a small deviation. The return
-current has a small cost, as has an action whose next touch depends strongly on the uncertain speed of the
-present touch. The discounted cost-to-go is a function of the touch (kind, lateness, speed) and of the number
-of dots before the next rest, and satisfies Bellman's equation (R. Bellman, *Dynamic Programming*, 1957). The
-cost-to-go is computed by backward induction from the last dot before a rest.
+fractions of the limits, so that a deviation near its limit costs far more than a small deviation. Small costs
+are added for the return current, and for an action whose next touch depends strongly on the uncertain speed
+of the present touch. The discounted cost-to-go is a function of the touch (kind, lateness, speed) and of the
+number of dots before the next rest, and satisfies Bellman's equation (R. Bellman, *Dynamic Programming*,
+1957). The cost-to-go is computed by backward induction from the last dot before a rest.
 
 The maps are computed for packs at several distances and interpolated to the estimated distance, which is gain
 scheduling with the distance as scheduling variable. The contact itself depends only on the distance from the
@@ -312,8 +312,8 @@ class Choice:
     def settle(self, force: FloatArray) -> None:
         """Condition the outcomes on M dots with known forces, relative to the single pulse.
 
-        Outcomes of actions for the middle force are interpolated linearly in force; actions for the other
-        forces become inadmissible.
+        Actions are tabulated for each of `FORCES`. The outcomes of the actions for the middle force are
+        interpolated linearly to the known force; actions for the other forces become inadmissible.
         """
         middle = len(FORCES) // 2
         shape = len(self.below), len(np.unique(self._fronts.table.back)), len(FORCES), -1

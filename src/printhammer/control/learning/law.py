@@ -185,7 +185,7 @@ TRIED: Final = slots_of(cycle_with_lead_in(6, 0))
 
 
 def _judged_slots() -> tuple[int, ...]:
-    """List the slots of the test pattern: the cycle with its lead-in, and rows of dots, each from rest."""
+    """List the slots of the test pattern: the test cycle with its lead-in, and rows of dots from rest."""
     slots = slots_of(cycle_with_lead_in())
     for step in STEPS:
         slots += tuple(slots[-1] + 1 + SLOTS + slot for slot in row_of_dots(step))
@@ -233,7 +233,7 @@ class Verdict(NamedTuple):
 
 
 class Update(NamedTuple):
-    """Result of a learning stage: corrections, contraction, comparison with open loop, objective."""
+    """Result of a learning stage: corrections, contraction factor, comparison with open loop, objective."""
 
     corrections: FloatArray  # (inputs,)
     contraction: float  # Largest eigenvalue of Q - L (G + a (G' - G))
@@ -251,7 +251,7 @@ class _Unit(NamedTuple):
 
 @dataclass(frozen=True)
 class LearningLaw:
-    """Learning law common to all units: prior, test pulses and update of corrections, but no readings."""
+    """Learning law common to all units: prior, test pulses and update of corrections; holds no readings."""
 
     entries: Adjustable
     production: Production
@@ -410,7 +410,7 @@ class LearningLaw:
     def _compare(self, alike: Sequence[Hammer], corrections: FloatArray) -> Printing[Verdict]:
         """Compare a table with open-loop drive on samples of the posterior; return the outcome.
 
-        The table gains if the samples print more dots with the table than in either open loop, and if no
+        The table is better if the samples print more dots with the table than in either open loop, and if no
         sample, except for a fraction `doubt`, prints fewer dots or has a row in which errors grow from dot to
         dot.
         """
@@ -431,7 +431,7 @@ class LearningLaw:
         return Verdict(gains, loops[chosen], most, float(good.mean()), every, self.alone)
 
     def _leads(self, share: FloatArray, others: FloatArray) -> bool:
-        """Whether the mean gain of a drive is at least `_GAIN`, with losses on at most a fraction `doubt`."""
+        """Whether a drive is better: mean gain at least `_GAIN`, losses on at most `doubt` of the samples."""
         harmless = np.quantile(share - others.max(axis=0), self.doubt) >= 0.0
         return bool(harmless and share.mean() - others.mean(axis=1).max() >= _GAIN)
 

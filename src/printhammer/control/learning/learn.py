@@ -64,7 +64,7 @@ _SAID: Final = ("multiplier", "expected", "certainty", "loop_certainty")
 def compare(press: Press, learners: Sequence[Learner], sensor: ImpactSensor) -> None:
     """Print the line `COMPARED` once in each open loop, and store the readings in the learners.
 
-    All learners have the same learning law. With a single open loop there is nothing to compare.
+    All learners have the same learning law. With a single open loop nothing is printed.
     """
     loops, single = learners[0].law.entries.loops, press.task.single.nominal
     if len(loops) == 1:
@@ -361,8 +361,8 @@ def learn(
     members : int, optional
         Number of simulated hammers on which the test pulses are chosen, 100 to 5000.
     forgetting : float, optional
-        Fraction by which earlier corrections decay at each stage, above 0 and below 1. The decay keeps
-        corrections that the readings do not determine from growing.
+        Fraction by which earlier corrections decay at each stage, above 0 and below 1. Without the decay,
+        corrections that the readings do not determine could grow.
     doubt : float, optional
         Largest fraction of the posterior samples that may print fewer dots within limits with the table
         than in an open loop, for the table to be used (default: 0, none).

@@ -3,9 +3,9 @@
 The positive work of a dot is at least the energy that lifts the armature from its turning point to the
 largest indentation and indents the pack: L + U(x_max) - U(x_turn), with L the loading work of the pack, and U
 the energy stored in magnet (at zero current), spring and backstop. The motion before the turning point does
-not matter. The first dot starts from rest. A later dot can turn no nearer to the paper than the front of the
-pack, since the preceding contact has to end, and no nearer than the point from which a current within its
-limit can still print the dot.
+not matter. The first dot starts from rest. Before a later dot the armature turns no nearer to the paper than
+the front of the pack, since the preceding contact has to end, and no nearer than the point from which a
+current within its limit can still print the dot.
 
 Alternatively the armature bounces off the backstop, which returns energy without coil work. The returned
 energy is at most the rebound energy of an undriven armature that falls with all the energy left after the

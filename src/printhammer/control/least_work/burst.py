@@ -77,7 +77,7 @@ SHAPES: Final = get_args(Shape)
 # pulse; arbitrary
 _PAST_PEAK: Final = 1.2
 _SPARE: Final = 5e-4  # Relative margin on the force of a planned dot; arbitrary
-# Motional energy below which a hammer counts as at rest, as a fraction of the pack loss of a dot; arbitrary
+# Energy above rest below which a hammer counts as at rest, as a fraction of the pack loss of a dot; arbitrary
 _SETTLED: Final = 1e-2
 
 
@@ -215,7 +215,7 @@ class LeastWork(Result, rows="node"):
 
     @cached_property
     def rest_time(self) -> float:
-        """Time after which the motional energy stays below 1 % of the pack loss of a dot, s."""
+        """Time after which the energy above rest stays below 1 % of the pack loss of a dot, s."""
         motion, hammer = self.motion, self.hammer
         rest = stored_energy(hammer, rest_state(hammer))
         stored = np.array([stored_energy(hammer, x) for x in motion.x.tolist()])

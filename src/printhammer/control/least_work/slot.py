@@ -168,9 +168,9 @@ class Task:
     def cost(self, outcomes: Outcomes, duration: float) -> FloatArray:
         """Compute the objective of currents, normalised by the loading work of a dot.
 
-        The net work is included since it grows with the backstop loss. Lag in the pack is penalised: if the
-        armature re-enters the pack during unloading, the pack law of the paper jumps to the loading branch,
-        and the pack returns more energy than after an uninterrupted unloading.
+        The net work is included since it grows with the backstop loss. A slow or interrupted departure from
+        the pack is penalised: if the armature re-enters the pack during unloading, the pack law of the paper
+        jumps to the loading branch, and the pack returns more energy than after an uninterrupted unloading.
         """
         heat = outcomes.squared_current / (self.largest**2 * duration)
         spent = heat if self.heat else outcomes.positive / self.loading + _SMOOTHING * heat

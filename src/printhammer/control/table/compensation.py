@@ -203,9 +203,10 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return mixed(low_row, high_row, share)
 
     def fired_by(self, driver: str, hammer: Hammer) -> CompensationTable:
-        """Convert a table tuned for the driver `driver` of a hammer to a table with the present driver.
+        """Return a copy for `driver`, whose dots arrive as with the hammer's own driver.
 
-        All pulses are shifted by the difference of the flight times from rest.
+        The present pulses must be tuned for `driver`; all are shifted by the difference between the flight
+        times from rest with either driver.
         """
         if driver == self.driver:
             return self

@@ -223,7 +223,7 @@ def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
 
 
 def fading(hammer: Hammer, pulse: Waveform, share: float) -> float:
-    """Return the time [s] from the end of a pulse until its current stays below `share` times its peak.
+    """Return the time [s] from the end of a pulse until its current has decayed below `share` times its peak.
 
     For a driver this is the first time at which the current has decayed; later induced currents are ignored.
     """
@@ -238,9 +238,9 @@ def fading(hammer: Hammer, pulse: Waveform, share: float) -> float:
 def clearance(hammer: Hammer, pulse: Waveform, width: float, largest: float) -> float:
     """Return the time [s] from the end of a brake pulse to the earliest start of the next pulse.
 
-    The brake pulse has the width `width` [s]. For a current, the next pulse may have the same width: the sum
-    of both pulses stays within the current limit `largest` [A]. For a driver, the wait lasts until the
-    current has decayed to `MARGIN` times its peak.
+    The brake pulse has the width `width` [s]. If the pulse is a current, the next pulse may have the same
+    width, and the sum of both pulses stays within the current limit `largest` [A]. If the pulse is that of
+    a driver, the wait lasts until the current has decayed to `MARGIN` times its peak.
     """
     wide = of_width(pulse, width)
     if pulse.quantity == "voltage":
@@ -256,7 +256,10 @@ def clearance(hammer: Hammer, pulse: Waveform, width: float, largest: float) -> 
 
 
 def brake_of(pulse: Waveform, width: float) -> Waveform:
-    """Return the brake pulse of a given width [s]; at full supply if the width is at most the peak time."""
+    """Return the brake pulse of a given width [s].
+
+    A pulse of a peak-and-hold driver that is no wider than its peak time has no hold phase.
+    """
     if isinstance(pulse, PeakAndHold) and width <= pulse.peak_time:
         shared = {name: value for name, value in dict(pulse).items() if name in Rail.model_fields}
         return Rail(**{**shared, "width": width})

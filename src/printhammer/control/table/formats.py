@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 FORMAT: Final = 1  # Version of the CSV format
 KIND: Final = "printhammer compensation table"  # First words of a CSV file
 FIGURES: Final = ("deviation", "multiplier")
-"""Names of the arrays that are not times; an empty cell is unknown."""
+"""Names of the arrays that are not times; an empty cell is an unknown value."""
 DEVIATION, MULTIPLIER = FIGURES
 # Required metadata of a table file
 HEAD: Final = {"hammer": str, "fingerprint": str, "gaps": int, "reach": int, "largest_current": float}

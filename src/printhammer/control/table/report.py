@@ -158,8 +158,8 @@ def judge_table(
 ) -> TableReport:
     """Compare a table with open loop on hammers that differ from the hammer of the table.
 
-    The patterns are all patterns of the safe rate, and random patterns. The dots of every hammer
-    are compared with the single-pulse dot of the hammer for which the table was tuned.
+    The patterns are the test patterns of `printhammer.safe_rate`, and random patterns. The dots of every
+    hammer are compared with the single-pulse dot of the hammer for which the table was tuned.
 
     Parameters
     ----------
@@ -262,7 +262,7 @@ def _is_applicable(hammer: Hammer, by: Perturbation) -> bool:
 
 
 def _growth(driven: Sequence[Hammer], rate: float, strategy: Strategy, effort: Effort) -> FloatArray:
-    """Compute the larger multiplier of the rows with a dot in every or every second slot, per hammer."""
+    """Compute the larger multiplier of two rows, with a dot in every and in every second slot, per hammer."""
     rates = [rate] * len(driven)
     each = np.array([multipliers(driven, rates, strategy, effort, step) for step in (1, 2)])
     largest = np.nan_to_num(np.abs(each), nan=-1.0).argmax(axis=0)

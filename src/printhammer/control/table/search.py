@@ -2,7 +2,7 @@
 
 A candidate ("way") consists of a firing time, a pulse width and an optional brake pulse, for a dot that
 follows another dot after a given period. If the first dot is right, the state after the first dot is always
-the same, so the candidates are a function of the period alone. At most periods several candidates print the
+the same, so the candidates are a function of the period alone. For most periods several candidates print the
 second dot as required: fired before, on or after a rebound, and with different brake pulses while the
 armature returns. The bucking current that releases the armature slows it down on its return; Fig. 6 of F.
 Hendriks, *Bounce and Chaotic Motion in Impact Print Hammers* (1983), calls that a quenched response. The

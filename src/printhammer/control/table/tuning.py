@@ -384,7 +384,7 @@ def _periods(rates: FloatArray, reach: int, single: Single) -> FloatArray:
 
 
 def _usable(draft: Draft) -> int:
-    """Return the number of rates, from the lowest upward, that are well within the limits."""
+    """Return the number of consecutive rates, from the lowest upward, that are well within the limits."""
     bad = np.flatnonzero(~(draft.worst <= _USABLE))
     if bad.size and bad[0] == 0:
         raise InputError(

@@ -253,8 +253,8 @@ def growths(task: Task, ways: Ways) -> FloatArray:
 
     An unknown factor is NaN. If the first two dots meet their target, the state after them is the fixed point
     of the row. If the cost shows that the dots miss the target, and the row looks stable, the fixed point is
-    located by iteration. If `task.located`, the fixed points of all rows are located: near a grazing no fixed
-    point may exist, however good the first dots are.
+    located by iteration. If `task.located` is set, the fixed points of all rows are located: near a grazing
+    no fixed point may exist, however good the first dots are.
     """
     rows = rows_of(task, ways, _SECOND + MORE)
     hammers = [task.hammers[0]] * ways.size
