@@ -124,7 +124,7 @@ def find_buzz_train(
 
     The search is a grid search over one number, the period or the delay, refined around the three best
     values. Trains at a constant rate come first, since they need no sensor: periods from half the flight time
-    of a single pulse up to the time of the return to the backstop. If none of them both prints enough dots
+    of a single pulse up to the time of the return to the backstop. If no such train both prints enough dots
     and stays clear after its first dot, delayed trains follow: delays from 0, at the departure from the pack,
     to the return, every 2 us or 400 delays, whichever is coarser. A delayed train is built firing by firing;
     a dot counts as missing after three times the single pulse's time from firing to departure. Trains are

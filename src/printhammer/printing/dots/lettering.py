@@ -1,6 +1,6 @@
 """Conversion of text to dots: line breaking and rendering in the built-in font or a TrueType font.
 
-The built-in font has nine wires and all printable ASCII characters; it was drawn for the program. Characters
+The built-in font has nine wires and all printable ASCII characters; it was drawn for this package. Characters
 are five columns wide and six columns apart: ten characters per inch at a column pitch of 1/60 in. Every
 column is a slot in which a wire may be fired, so horizontal strokes are printed at the full slot rate; there
 are no half-dot columns.

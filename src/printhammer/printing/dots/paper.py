@@ -1,6 +1,6 @@
 """Paper that varies along the line: pack stiffness and pack front are random functions of position.
 
-Pack stiffness and the position of the pack front are normal and mutually independent, with the correlation
+Pack stiffness and the position of the pack front are independent normal processes, each with the correlation
 exp(-d / length) between two positions d apart: a first-order autoregressive process. Draws are clipped at
 three standard deviations.
 

@@ -165,8 +165,8 @@ def settled_from(away: BoolArray) -> int:
 def _settle_time(motion: Motion, rest: float, limit: float) -> float | None:
     """Bisect for the time [s] after which the armature stays within `limit` [m] of its rest position.
 
-    The time is measured from the firing. The result is None if the armature never leaves the limit, or is
-    outside the limit at the end of the motion.
+    The time is measured from the firing. The result is None if the distance from rest never exceeds the
+    limit, or exceeds the limit at the end of the motion.
     """
     count = round((motion.end - motion.start) / _SPACING) + 1
     grid = np.union1d(np.linspace(motion.start, motion.end, count), motion.maxima[0])

@@ -325,9 +325,9 @@ class Page(Result, rows="dot"):
     def worst_place(self, slots: int) -> tuple[int, int]:
         """Locate the window of `slots` slots with the largest print error; return its line and first slot.
 
-        The measure is summed over the window: a lost dot counts 1, a printed dot its placement error in slots
-        plus its deviation in density, an extra contact its density. Both indices count from 0; the first
-        window wins a tie.
+        The print error is a sum over the window: a lost dot adds 1, a printed dot its placement error in
+        slots plus its deviation in density, an extra contact its density. Both indices count from 0; the
+        first window wins a tie.
         """
         off = np.abs(self.placement_error) / self.head.pitch + np.abs(self.density - self.head.density)
         worth = np.where(self.printed, np.nan_to_num(off), 1.0)

@@ -310,9 +310,9 @@ def quality(
     pitch : float or str, optional
         Distance between neighbouring slots on the paper, m, or text with a unit.
     paper : Paper, optional
-        Variation of pack stiffness and pack front along the line; by default none. Each dot meets the pack
-        at its slot, from its firing until the next firing. A strategy observes the variation only through
-        its sensor.
+        Variation of pack stiffness and pack front along the line; by default none. From the firing of a dot
+        until the next firing, the hammer has the pack of that dot's slot. A strategy observes the variation
+        only through its sensor.
 
     Returns
     -------

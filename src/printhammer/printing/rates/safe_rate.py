@@ -227,7 +227,7 @@ def safe_rate(
         device is exactly at rest at each pulse.
     stop : bool, optional
         Whether to stop at the first rate that does not pass; otherwise all rates of the grid are simulated,
-        as a chart needs them.
+        as required for a chart.
     long : bool, optional
         Whether the cycle, the rows and the line of text must pass too, besides the patterns from rest.
     progress : callable, optional

@@ -185,7 +185,7 @@ def tolerance_yield(
 ) -> ToleranceYield:
     """Draw hammers about a design, and determine which hammers print within limits.
 
-    Every constant is uniform within its spread, drawn by a scrambled Sobol sequence.
+    Every constant is distributed uniformly within its spread, and drawn by a scrambled Sobol sequence.
 
     Parameters
     ----------

@@ -2,8 +2,8 @@
 
 `Variability` is a diagonal covariance of the constants: hammers are drawn from a normal distribution, and the
 sigma points lie one standard deviation on either side of the design along each constant. A `Perturbation` is
-a single deviation from the hammer for which a drive was designed: in current, travel, forms, magnet or
-damping.
+a single deviation from the hammer for which a drive was designed: in current, travel, number of paper forms,
+magnet or damping.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from printhammer.support.arrays import FloatArray
 
 
 class Perturbation(Declared):
-    """Deviation of a hammer from its design: current, travel, forms, magnet and damping (default: 0)."""
+    """Deviation of a hammer from its design in current, travel, paper forms, magnet and damping."""
 
     current: float = part(
         "relative change of every current, e.g. by the supply voltage: 0.03 for 3 % more", default=0.0

@@ -1,8 +1,8 @@
 """Words of dots: patterns are split where a device comes to rest, and each word is simulated once.
 
 A slow device with a rigid backstop is exactly at rest some slots after a dot. A pattern is then a sequence of
-*words*, the dots between such gaps, that do not affect each other. The words of all test patterns are few:
-if a dot affects only the next slot, the words are rows of one to eight dots, and a row of 200.
+*words*, the dots between such gaps, that do not affect each other. The test patterns contain few distinct
+words: if a dot affects only the next slot, the words are rows of one to eight dots, and a row of 200.
 """
 
 from __future__ import annotations
@@ -50,9 +50,9 @@ def attempt_words(
     """Simulate the words (groups of close dots) of patterns for all cases (hammer and rate).
 
     Each word is followed by one more dot, which must equal the first dot of the word, from rest: only then is
-    the word independent of the dots that follow. Of a row only the first dots are simulated, and the last of
-    these must be equal: the row has then reached its periodic orbit. The row remains on the orbit if errors
-    do not grow, so the multiplier of the row must be at most 1 in absolute value.
+    the word independent of the dots that follow. Of a row only the first dots are simulated, and the last few
+    of these dots must equal each other: the row has then reached its periodic orbit. The row remains on the
+    orbit if errors do not grow, so the multiplier of the row must be at most 1 in absolute value.
 
     Parameters
     ----------
