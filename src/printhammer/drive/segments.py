@@ -11,7 +11,7 @@ kind  value                               used by
 2     p0 + p1 sin(p2 s + p3)              half sine, sinusoidal force
 4     p0, a voltage; thresholds p2, p3    supply on, with a chopper
 5     0; decays against p0                supply off
-6     p0, at first                        reservoir
+6     p0, the initial voltage             reservoir
 ====  ==================================  ================================
 
 The first row starts at 0, starts ascend strictly, and the last row ``[end, 0, 0, 0, 0, 0]`` marks the end of

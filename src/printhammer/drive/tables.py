@@ -334,7 +334,7 @@ def pulse(shape: int, fields: Any, table: Any, about: Any) -> int:
     fields : float64 array
         Fields of the shape in order of declaration, NaN if missing; for a driver then the index of the decay
         path. For a record, the times and then the values.
-    table : float64 array, shape (rows, 6), at least 4 rows, for a record one more than samples
+    table : float64 array, shape (rows, 6), at least 4 rows, for a record one row more than samples
         Segment table, in the form for the kernel: the last row has the kind `END`.
     about : float64 array, shape (14,)
         In order: support, s; end of the table, s; largest value; 1 if the latest firing replaces earlier

@@ -36,9 +36,10 @@ _ROUNDING: Final = 1e-14  # Relative difference between times that counts as rou
 class Chain(Waveform):
     """Several consecutive waveforms in one firing, each at an offset, with a zero drive in between.
 
-    `parts` are pairs of the offset [s] or a string with a unit, and the waveform, in ascending order; all
-    are currents or all are forces. A waveform may begin once the preceding one has ended or decayed to `TAIL`
-    of its peak; the remainder is cut off. The edges of a waveform lie at the rounded sums of offset and edge.
+    `parts` are pairs of an offset, a number in s or a string with a unit, and a waveform, in ascending order
+    of offset; all waveforms are currents, or all are forces. A waveform may begin once the preceding one has
+    ended or decayed to `TAIL` of its peak; the remainder is cut off. The edges of a waveform lie at the
+    rounded sums of offset and edge.
     """
 
     shape: ClassVar[str] = "chain"
