@@ -184,7 +184,7 @@ def fit_coil(
 class CurrentLaw:
     """Law of the current fit: predicted currents of all records, A, shape (m,).
 
-    The parameters p are the named constants, the fitted probe errors, and the offset of each edge of a
+    The parameters p are the named constants, the fitted probe errors, and the time offset of each edge of a
     recorded voltage from the middle between its two rows, SI.
     """
 

@@ -30,8 +30,8 @@ def fit(
         rebounds; "motion": mass, damping and so on from records of single shots; "coil": resistance,
         inductance and so on from records of the current while a voltage is applied.
     path : path, or sequence of path
-        The table, CSV with units in its heading; several for "motion" and "coil", and for "magnet" optionally
-        a second table without currents, for the spring alone.
+        The table, CSV with units in its heading; several tables for "motion" and "coil"; for "magnet"
+        optionally a second table without currents, for the spring alone.
     hammer : Hammer, optional
         Hammer with the known constants: position of the backstop, thickness of the pack, stiffness of the
         backstop; for "motion" and "coil", which require it, all constants that are not fitted. The
@@ -130,7 +130,7 @@ _TAKEN: Final = {
 
 
 def _known(hammer: Hammer | None, key: str) -> float | None:
-    """Return a known constant of a hammer, SI, or None; a backstop stiffness may follow from its bodies."""
+    """Return a known constant of a hammer, SI, or None; a backstop stiffness may be a computed value."""
     if hammer is None:
         return None
     if key == "backstop.stiffness":

@@ -80,7 +80,8 @@ def _joined(first: float, at_start: list[float], at_end: list[float], kept: list
     """Return the output at the ends of all pieces, from the first output on.
 
     `at_start` and `at_end` are the particular solution at the ends of each piece; `kept` is the fraction of
-    the transient that is left at its end. A loop over floats is several times faster than over short rows.
+    the transient that is left at its end. The loop over floats is several times faster than array operations
+    on short rows.
     """
     result = [first]
     value = first

@@ -1,4 +1,4 @@
-"""Plausibility of a data sheet: the magnet against iron, size and supply, the contacts against limits."""
+"""Plausibility checks of a data sheet: mass, size, saturation and energy of the magnet; contact times."""
 
 from __future__ import annotations
 

@@ -92,7 +92,7 @@ class Approach:
         self.keep = [(~rows).astype(np.float64) for rows in spikes]
 
     def run(self, values: FloatArray, states: Sequence[FloatArray]) -> tuple[FloatArray, list[FloatArray]]:
-        """Return parameters, SI, and joint states: a start for the fit without gaps between segments."""
+        """Compute parameters, SI, and joint states as initial guess for the fit without gaps."""
         values, states = values.copy(), list(states)
         chains = self.shooting.chains(values, states, derivatives=True)
         width = 0.0 if chains is None else _WIDE * largest_gap(chains, self.shooting.units)

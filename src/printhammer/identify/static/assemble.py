@@ -341,7 +341,7 @@ def profile(law: Law, data: FloatArray, solution: Solution, index: int) -> Profi
 
 
 def _crossing(values: FloatArray, increase: FloatArray, level: float, never: float) -> float:
-    """Locate the first crossing of a level by a profile likelihood, by linear interpolation of its root."""
+    """Locate the first crossing of a level by a profile likelihood; its square root is interpolated."""
     above = np.flatnonzero(increase >= level)
     if not above.size:
         return never

@@ -5,8 +5,8 @@
 
 Data: the columns ``indentation`` from the front of the pack, ``force`` as a magnitude, and ``branch``, with
 the words "loading" or "unloading"; rows in the order of measurement. Without ``branch``, the direction of the
-indentation decides. The turning point of each cycle is fitted, not read off: the unloading force depends
-on its 8.3th power, and the largest measured indentation is biased upward by noise.
+indentation separates loading from unloading. The turning point of each cycle is fitted, not read off: the
+unloading force depends on its 8.3th power, and the largest measured indentation is biased upward by noise.
 """
 
 from __future__ import annotations

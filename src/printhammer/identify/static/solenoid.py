@@ -3,7 +3,7 @@
 Data: the columns ``gap``, ``force``, the magnitude of the pull, and ``inductance`` or ``linkage``, optionally
 ``current``; from a static measurement or a field computation. Force and linkage at one current determine the
 saturation: without saturation, the force is half the square of the current times the slope of the inductance.
-Both are fitted in logarithms, so that each row counts by its relative error.
+The logarithms of force and linkage are fitted, so that each row counts by its relative error.
 """
 
 from __future__ import annotations
