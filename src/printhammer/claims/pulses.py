@@ -88,7 +88,7 @@ def low_restitution(context: Context, _claim: Claim) -> Measured:
 
 @measures("backstop_force_dominates", *WHOLE)
 def backstop_force_dominates(context: Context, _claim: Claim) -> Measured:
-    """Measure the largest total force inside and outside backstop contacts after a single pulse."""
+    """Measure the largest total force during and outside backstop contacts after a single pulse."""
     motion = context.single
 
     def total(t: FloatArray) -> FloatArray:

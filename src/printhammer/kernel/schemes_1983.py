@@ -48,7 +48,7 @@ Scheme = Literal["trapezoid", "runge-kutta-4"]
 Reading = Literal["look-ahead", "inside", "grid", "no-late-step", "firings"]
 READINGS: Final[tuple[Reading, ...]] = get_args(Reading)
 """Rules for when the short step is used. "look-ahead": if x < b, or if the next free step would end there.
-"inside": only if x < b, so that the first step into the backstop is long. "grid": a free step that
+"inside": only if x < b, so that the step that enters the backstop is long. "grid": a free step that
 begins or would end there is divided into ten short steps, so that free steps begin on a grid of 10 us.
 "no-late-step": like "look-ahead", with short steps late in the settle-out as well. "firings": like
 "look-ahead", and a step ends at each firing, where the state of Fig. 11 is read."""
@@ -58,7 +58,7 @@ FREE_STEP = 10e-6
 CONTACT_STEP = 1e-6
 """Step size if x < b, or if the next free step would end at x < b, s."""
 LATE_STEP = 20e-6
-"""Step size in the backstop late in the settle-out, s."""
+"""Step size in backstop contact late in the settle-out, s."""
 LATE_AFTER = 200e-6
 """Time since the last separation from the backstop and the last firing after which the settle-out is late,
 s."""

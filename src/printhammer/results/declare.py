@@ -198,7 +198,7 @@ def part(meaning: str, *, more: str = "", repr: bool = True, **default: Any) -> 
 def derived(
     unit: str, meaning: str, dims: str = "", *, kind: Kind | None = None, **more: Unpack[More]
 ) -> Callable[[_F], _F]:
-    """Decorate a property as a variable of the Dataset; placed below `@property` or `@cached_property`.
+    """Declare a property as a variable of the Dataset: a decorator below `@property` or `@cached_property`.
 
     Arguments as for the function `column`; without dimensions the property is an attribute of the Dataset.
     """

@@ -243,7 +243,7 @@ def write_parquet(table: pd.DataFrame, path: str | Path) -> None:
 
 
 def _text(value: Any) -> str:
-    """Encode an attribute as text: verbatim, or as JSON if the text would be read as number or list."""
+    """Encode an attribute as text: verbatim, or as JSON if the text would be read as a number or list."""
     if isinstance(value, str) and _decode(value) == value == value.strip() and value.isprintable():
         return value
     return json.dumps(_strict(value), ensure_ascii=False)

@@ -82,7 +82,7 @@ def multiplier(value: complex) -> str:
 
 
 def display(unit: str, system: System, largest: float = 0.0) -> tuple[str, str]:
-    """Return display unit and number format, in a unit system, for quantities up to `largest`, SI."""
+    """Return the display unit and number format of a unit system for SI quantities up to `largest`."""
     ladder = LARGE.get(unit, ()) if system == "si" else ()
     return next(((name, digits) for least, name, digits in ladder if largest >= least), SHOWN[unit][system])
 

@@ -103,7 +103,7 @@ def shade(number: int) -> str:
 
 @styled
 def plot(basins: Basins, *, attractors: bool = True, manifolds: Sequence[Manifolds] = ()) -> Figure:
-    """Draw basins of attraction, and the attractors in their plane.
+    """Draw basins of attraction, and the attractors in the same plane.
 
     `manifolds` of saddles are drawn on top: stable manifolds, which bound the basins, in white, unstable
     manifolds in black.

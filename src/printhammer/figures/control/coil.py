@@ -1,4 +1,4 @@
-"""Plots for a coil: dead time and width of the pulse, against rail voltage and temperature.
+"""Figures of a coil: dead time and pulse width against rail voltage and temperature.
 
 `plot_duty` draws the highest continuous rate of a coil against the ambient temperature.
 

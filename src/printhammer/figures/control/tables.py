@@ -71,7 +71,7 @@ def _few_rates(table: CompensationTable) -> Figure:
 
 
 def _many_rates(table: CompensationTable) -> Figure:
-    """Draw advance and width of the second dot after a rest against the rate, one line per gap."""
+    """Draw, against the rate, advance and width of the second dot after a rest; one line per gap."""
     figure = new_figure(5.0)
     upper, lower = figure.subplots(2, 1, sharex=True)
     lowest = int(np.argmax((table.advance != 0.0).any(axis=1)))

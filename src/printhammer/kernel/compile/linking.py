@@ -28,7 +28,7 @@ class _Part(JITCodeLibrary):
         self._finalized = True
 
     def own_module(self) -> Any:
-        """Return the module of the helper alone, whose functions may occur in several linked modules."""
+        """Return the helper's module without callees; its functions may occur in several linked modules."""
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == Linkage.external:
                 function.linkage = "linkonce_odr"

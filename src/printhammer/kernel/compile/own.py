@@ -1,4 +1,4 @@
-"""Lowering of user-defined laws to modules, with numba's public interface only.
+"""Lowering of user-defined laws to modules, using only numba's public interface.
 
 Templates and shipped laws are lowered when the wheel is built, with private classes of numba. A user-defined
 law is lowered on the user's machine, and must therefore work with any version of numba.

@@ -95,7 +95,7 @@ def guess_in_pack(pool: Any, i: int, which: int, hammer: Hammer) -> tuple[int, f
 
 @compiled
 def guess_in_contact(pool: Any, i: int) -> tuple[int, float]:
-    """Return the first event inside the latest step in the backstop, and its estimated step fraction."""
+    """Return the first event inside the latest step in backstop contact, and its step fraction."""
     t0, t1 = pool[i], pool[R.NEW_T * R.BLOCK + i]
     w0, w1 = pool[R.X * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
     v0, v1 = pool[R.V * R.BLOCK + i], pool[R.NEW_V * R.BLOCK + i]

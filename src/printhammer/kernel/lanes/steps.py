@@ -97,7 +97,7 @@ def settle(
     event += R.SAMPLED if (valid and t1 >= pool[R.SAMPLE * BLOCK + i]) else 0.0
     event += R.AT_EDGE if (valid and edge) else 0.0
     most = pool[R.MOST_STEPS * BLOCK + i]
-    # Compare times, since step sizes in the backstop are in s and not in seconds.
+    # Compare times, since step sizes in backstop contact are in s and not in seconds.
     most = min(most, R.MANY_STEPS) if abs(t1 - t) < R.SHORT * abs(t1) else most
     stuck = not (small or following > 1e-14 * scale) or steps > most
     event = R.STUCK if (stuck or (small and outside)) else event
@@ -127,7 +127,7 @@ def time_to_level(distance: float, v: float, a: float) -> float:
 
 @inlined
 def start_at(pool: Any, i: int) -> State:
-    """Return time, position, velocity and acceleration of a lane; in the backstop, t, w, v and dv/ds."""
+    """Return time, position, velocity and acceleration of a lane; in backstop contact, t, w, v and dv/ds."""
     return pool[i], pool[R.X * BLOCK + i], pool[R.V * BLOCK + i], pool[R.A * BLOCK + i]
 
 
@@ -223,7 +223,7 @@ def stiffness(w: float, hammer: Any) -> float:
 
 @compiled
 def contact_block(pool: Any, begin: int) -> None:
-    """Advance each lane of a block by one step in the backstop, in regularised variables."""
+    """Advance each lane of a block by one step in backstop contact, in regularised variables."""
     pool = pool[begin:]
     for i in range(BLOCK):
         start = start_at(pool, i)
@@ -258,5 +258,5 @@ def lane_acceleration(pool: Any, i: int, t: float, x: float, v: float, mode: int
 
 @compiled
 def lane_contact_rate(pool: Any, i: int, t: float, w: float, v: float) -> float:
-    """Return dv/ds of the member in a lane at a state in the backstop."""
+    """Return dv/ds of the member in a lane at a state in backstop contact."""
     return 2.0 * w * backstop_acceleration(t, w, v, hammer_at(pool, i), drive_at(pool, i))

@@ -1,4 +1,4 @@
-"""Error-controlled step in the elastic backstop, in regularised variables, with event location."""
+"""Error-controlled step in contact with the elastic backstop, in regularised variables; event location."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.pulses import Drive
 
 ContactState = Any
-"""State in the backstop: time [s], w = sqrt(compression) [m^0.5], velocity v [m/s], and dv/ds, where s is
+"""State in backstop contact: time [s], w = sqrt(compression) [m^0.5], velocity v [m/s], and dv/ds, where s is
 the regularised variable."""
 
 PHASE_LIMIT = 2.0
@@ -35,7 +35,7 @@ PHASE_LIMIT = 2.0
 
 @compiled
 def contact_rate(w: float, v: float, t: float, hammer: Hammer, drive: Drive) -> float:
-    """Return dv/ds = 2 w a, the derivative of the velocity with respect to s in the backstop."""
+    """Return dv/ds = 2 w a, the derivative of the velocity with respect to s in backstop contact."""
     return 2.0 * w * backstop_acceleration(t, w, v, hammer, drive)
 
 
@@ -243,7 +243,7 @@ def electric_in_contact(
 def advance_contact(
     start: ContactState, h: float, t_next: float, hammer: Hammer, drive: Drive, control: Control
 ) -> tuple[int, ContactState, float, Electric]:
-    """Integrate over one accepted step in the backstop, up to the first switching event or `t_next` [s].
+    """Integrate over one accepted step in backstop contact, up to the first switching event or `t_next` [s].
 
     Returns
     -------

@@ -179,7 +179,7 @@ def time_slope(t: float, y: Point, law: ForceLaw) -> Point:
 
 @(called if HAS_CIRCUIT else inlined)
 def contact_slope(y: Point, hammer: Hammer, drive: Drive) -> Point:
-    """Return the derivative of the state vector in the backstop with respect to s, where dt = 2 w ds."""
+    """Return the derivative of the state vector with respect to s in backstop contact: dt = 2 w ds."""
     pace = 2.0 * y[1]
     if HAS_CIRCUIT:
         electric, live = electric_of(y), drive[0]
@@ -310,7 +310,7 @@ def whole_contact_step(
 def contact_step(
     t0: float, w0: float, v0: float, kv0: float, h: float, hammer: Hammer, drive: Drive, scales: Any
 ) -> tuple[float, float, float, float, float]:
-    """Compute a DOP853 step in the backstop of `h` in regularised time s; `kv0` is dv/ds at its start.
+    """Compute a DOP853 step of length `h` in s during backstop contact; `kv0` is dv/ds at the start.
 
     Returns
     -------

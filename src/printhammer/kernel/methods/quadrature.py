@@ -1,4 +1,4 @@
-"""Integrals of power along a recorded run: the terms of the energy ledger, each by its own quadrature.
+"""Integrals of power along a recorded run: the terms of the energy ledger, each integrated separately.
 
 Each integration step is integrated by eight-point Gauss-Legendre quadrature; the state at each point is
 computed by a shortened step of the integrator. In the backstop, the integration variable is the regularised

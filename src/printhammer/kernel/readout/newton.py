@@ -243,7 +243,7 @@ def largest_multiplier(orbit: Any) -> float:
 
 
 def has_settled(states: Any, scales: Any, orbit: Any, search: Any, outcome: int, out: Any) -> int:
-    """Classify a motion by the outcome of Newton's method as settled to an orbit or not; see `APPROACHES`.
+    """Decide from Newton's method whether a motion has settled to the orbit; see `APPROACHES`.
 
     Parameters
     ----------

@@ -72,11 +72,11 @@ def class_of(agreed: int, settled: int, value: float, error: float, smooth: bool
 
 
 def write_exponent(growth: Any, work: Any, out: Any) -> int:
-    """Write mean and standard error of the largest growth per firing to `out`; return the number of rests.
+    """Write the largest Lyapunov exponent and its standard error to `out`; return the number of rests.
 
-    The standard error of the mean of the n autocorrelated numbers is that of overlapping batch means, see
-    `printhammer.derivatives.states.standard_error`: infinite for fewer than eight numbers or if a number
-    is not finite.
+    The exponent is the mean growth per firing. Its standard error is estimated by overlapping batch means,
+    since successive values are correlated; see `printhammer.derivatives.states.standard_error`. The error is
+    infinite for fewer than eight firings or if a value is not finite.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def write_exponent(growth: Any, work: Any, out: Any) -> int:
     Returns
     -------
     int
-        Number of factors that are minus infinity, i.e. of rests on the backstop that erase the past.
+        Number of values that are minus infinity, i.e. of rests on the backstop that erase the past.
     """
     n, rests = growth.shape[0], 0
     mean = 0.0

@@ -22,13 +22,13 @@ POSITION_NOW = 5
 VELOCITY = 6
 ACCELERATION = 7
 ROOT = 8
-"""Index of w = sqrt(b - x) in the backstop [m^0.5]."""
+"""Index of w = sqrt(b - x) in backstop contact [m^0.5]."""
 ROOT_RATE = 9
 """Index of dv/ds, the derivative of the velocity in the regularised variables of the backstop."""
 MEMORY_NOW = 10
 """Index of the memory value of the pack law for the latest local maximum."""
 STEP = 11
-"""Index of the next step size: in seconds, or in the regularised variable s in the backstop."""
+"""Index of the next step size: in seconds or, in backstop contact, in the regularised variable s."""
 FREE_STEP = 12
 """Index of the initial step size of the next free flight [s]."""
 PACK_STEP = 13

@@ -1,8 +1,8 @@
 """Record of a run: nodes, i.e. the states at the ends of all steps, and contacts.
 
 A node is ``[time, position, velocity, mode, memory]``. Mode and memory are valid from this node to the next;
-the memory is the displacement at the latest local maximum in the pack, w = sqrt(b - x) in the backstop, and
-zero elsewhere. With a coil circuit, the electric state and the path of the current follow, see
+the memory is the displacement at the latest local maximum in the pack, w = sqrt(b - x) in backstop contact,
+and zero elsewhere. With a coil circuit, the electric state and the path of the current follow, see
 `printhammer.kernel.model.circuit`. A contact is ``[surface, time in, velocity in, time out, velocity out,
 index of the last node before the contact, open at the start]``; the time out of a contact that is still open
 at the end of the run is NaN.

@@ -1,4 +1,4 @@
-"""One step of a run, by mode: in the backstop, at rest, or off the backstop."""
+"""One step of a run, by mode: in backstop contact, at rest, or off the backstop."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def circuit_is_quiet(state: State, setup: Setup) -> bool:
 
 @inlined
 def backstop_step(state: State, setup: Setup, t_next: float, still: float, nodes: Any) -> int:
-    """Integrate one step in the backstop, in regularised variables; return the event that ends the step."""
+    """Integrate one step in backstop contact, in regularised variables; return the event that ends it."""
     hammer, control, live = setup.hammer, setup.control, setup.train.live
     if state[C.ENTERED] != 0.0:
         rate_in_backstop(state, setup)

@@ -197,7 +197,7 @@ def linkage_change(x: float, k: int, forcing: Forcing) -> float:
 
 @called
 def add_circuit(rates: Any, y: Any, count: int, x: float, moves: bool, setting: Setting) -> None:
-    """Write the rates of the electric state and of its tangent rows; add the effect on the velocity rows.
+    """Write the rates of the electric state and of its tangent rows; add their effect to the velocity rows.
 
     `moves` is false while the armature is held at rest.
     """

@@ -5,7 +5,7 @@ fixed time. Off the backstop
 
     d(dx)/dt = dv,    d(dv)/dt = a_x dx + a_v dv + a_p dp + a_c,    dp constant,
 
-and in the backstop, with w = sqrt(b - x) and dt = 2 w ds,
+and in contact with the backstop, with w = sqrt(b - x) and dt = 2 w ds,
 
     d(dx)/ds = 2 w dv,    d(dv)/ds = -a_w dx + 2 w a_v dv + 2 w a_c,
 
@@ -150,7 +150,7 @@ def column_step(
 ) -> None:
     """Integrate state and tangent columns over one step of `length` from row START of `work`.
 
-    The length is a time [s] or, in the backstop, an increment of the regularised time s.
+    The length is a time [s] or, in backstop contact, an increment of the regularised time s.
     """
     count = V.FIRST_COLUMN + CHANGING * columns.shape[1]
     if HAS_CIRCUIT:

@@ -113,7 +113,7 @@ class Carried(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """Arguments shared by the derivatives in a step: scales, bounds, parameter array, drive and forcing.
+    """Arguments of the functions that compute derivatives: scales, bounds, parameters, drive, forcing.
 
     The bounds are the result of `smooth_bounds`.
     """

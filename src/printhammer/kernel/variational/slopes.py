@@ -60,8 +60,8 @@ DEPTH_SPACING = 3e-4
 LEAST_DEPTH_SPACING = 1e-7
 """Smallest step size in the pack or near a kink, as a fraction of the displacement scale."""
 ROOT_SPACING = 1e-3
-"""Step size of w in the backstop, as a fraction of w, or of 1/100 of the root of the displacement scale if
-larger."""
+"""Step size of w in backstop contact, as a fraction of w, or of 1/100 of the root of the displacement scale
+if larger."""
 SPEED_SPACING = 1e-3
 """Step size of the velocity, as a fraction of the velocity scale."""
 
@@ -202,7 +202,7 @@ def pack_slopes(
 
 @inlined
 def peak_spacing(peak: float, hammer: Hammer) -> float:
-    """Return the step size [m] of the local maximum for the derivative of the unloading branch."""
+    """Return the shift [m] of the local maximum in difference quotients of the unloading force."""
     return float((peak + DEPTH_SPACING * (peak - hammer[FRONT])) - peak)
 
 

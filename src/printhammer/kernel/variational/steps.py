@@ -87,7 +87,7 @@ def begin_step(node: Any, work: Any) -> None:
 def length_in_contact(
     t: float, leaves: bool, t0: float, w0: float, v0: float, hammer: Hammer, drive: Drive
 ) -> float:
-    """Return the length in the regularised variable s from a backstop state at time `t0` to time `t` [s].
+    """Return the increment of the regularised variable s from time `t0` to `t` [s] in a backstop contact.
 
     The accuracy is lower than that of :func:`printhammer.kernel.methods.contact.s_at`, but sufficient for the
     tangent columns. If the armature `leaves` the backstop at `t`, the equation solved is w = 0, since there
@@ -136,7 +136,7 @@ def place_of_rest(t: float, node: Any, k: int, columns: Any, setting: Setting) -
 
 @compiled
 def settle(pause: float, node: Any, columns: Any, setting: Setting) -> float:
-    """Propagate the columns for `pause` [s] at a rest position in the elastic backstop, in closed form.
+    """Propagate the columns for `pause` [s] at rest in contact with an elastic backstop, in closed form.
 
     The perturbation obeys the linear oscillator with the stiffness and damping at the rest position. Returns
     the logarithm of a factor that has been divided out of the columns.
@@ -282,7 +282,7 @@ def carry(t_to: float, node: Any, after: Any, columns: Any, work: Any, setting: 
 
 @compiled
 def carry_state(t_to: float, node: Any, after: Any, columns: Any, work: Any, setting: Setting) -> float:
-    """Propagate state and tangent columns to `t_to` [s]; without current, linkage rows are not set yet.
+    """Propagate state and tangent columns to `t_to` [s], except linkage rows of a currentless coil.
 
     Returns the logarithm of a factor that has been divided out of the columns.
     """

@@ -327,7 +327,7 @@ def value_of_piece(t: float, fired: float, piece: int, pieces: Any) -> float:
 def pass_edge(
     node: Any, value: float, change: float, pulse: int, piece: int, columns: Any, setting: Setting
 ) -> float:
-    """Propagate the columns through an edge where the drive jumps by `change`; return the new drive."""
+    """Propagate the columns through an edge where the drive jumps by `change`; return the new drive value."""
     hammer, forcing = setting.hammer, setting.forcing
     new = value + change
     if HAS_CIRCUIT:
@@ -373,7 +373,7 @@ def leave_at_edge(node: Any, pulse: int, piece: int, columns: Any, setting: Sett
 
 @compiled
 def pass_moving_edges(node: Any, train: Train, first: int, last: int, columns: Any, setting: Setting) -> None:
-    """Propagate the columns through the edges of the drive at a node not yet passed by `pass_edges`."""
+    """Propagate the columns through the drive edges at a node that `pass_edges` has yet to process."""
     firings, begins, pieces, replace, under_way, live = train
     t = node[0]
     value = drive_value(t, live)
