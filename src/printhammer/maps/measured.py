@@ -297,7 +297,7 @@ def _opened(path: Path) -> Any:
             raise missing_extra(f"{path}: NetCDF-4 files need h5netcdf and h5py", "netcdf")
     try:
         return xr.open_dataset(path, decode_times=False, **options)
-    except Exception as error:  # noqa: BLE001 - the backends raise what they like
+    except Exception as error:  # noqa: BLE001 - the backends raise exceptions of any type
         reason = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{path}: the measured map cannot be read ({reason[:200]})", file=path) from None
 

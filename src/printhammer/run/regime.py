@@ -154,8 +154,8 @@ class Regime(Declared):
         Raises
         ------
         InputError
-            There is no waveform, not exactly one of period and rate is set or positive, the drive is not a
-            continuous periodic force, or the phase is invalid.
+            There is no waveform; both or neither of period and rate are set; a value is invalid; the drive is
+            not a continuous periodic force; or a regime is passed with other arguments than a phase.
         """
         part = 0.0 if phase is None else read_phase(phase)
         if isinstance(hammer, Regime):
@@ -317,7 +317,7 @@ class Regime(Declared):
             continuous periodic force, or the dotted key of any constant of the hammer, such as
             "backstop.damping".
         value : float
-            SI.
+            New value of the parameter, SI.
         """
         if name in (PERIOD, RATE):
             period = period_of_rate(value) if name == RATE else read_positive(value, "s", name)

@@ -55,8 +55,8 @@ def simulate(
     drive : Drive
         The drive.
     duration : float or str, optional
-        End of the run, s, or text with a unit; by default the window of the device after the last firing
-        (`printhammer.run.window`), and required for a drive that does not end.
+        End of the run, s, or text with a unit; by default the last firing plus the window of the device
+        (`printhammer.run.window`). Required for a drive that does not end.
     state : sequence of float or str, optional
         Displacement [m] and velocity [m/s] at time 0, as numbers or text with units; by default the rest
         state. For a start inside the pack, mode and memory may be added, see
@@ -67,7 +67,7 @@ def simulate(
     tolerance : float, optional
         Error tolerance of one step, in units of the distance from backstop to pack and of a typical speed.
     points : int, optional
-        Number of points of a uniform output grid; by default about a hundred in the time of one flight.
+        Number of points of a uniform output grid; by default about a hundred per flight time.
     times : array, optional
         Times of the output grid, ascending, s. The motion does not depend on the grid.
     scheme : str, optional

@@ -47,9 +47,9 @@ def sweep(
     spec : path or mapping
         Spec file, or its contents as a mapping; see the guide on sweeps.
     out : path
-        Folder of the store (Zarr v3), new, to be resumed, or complete. If the name ends in .csv, a table with
-        one row per member and one column per firing is written to that file; the store has the same name with
-        the suffix .zarr.
+        Folder of the store (Zarr v3): a new folder, an unfinished store to resume, or a complete store. If
+        the name ends in .csv, a table with one row per member and one column per firing is written to that
+        file; the store has the same name with the suffix .zarr.
     threads : int, optional
         Threads on this machine; by default as many as there are cores.
     dask : str or distributed.Client, optional

@@ -158,7 +158,7 @@ class _Tasks:
             except (FutureCancelled, TaskCancelled, OSError):
                 # The task returns its own errors as text.
                 raise _GoneError from None
-            except Exception as late:  # noqa: BLE001 - told as a sentence
+            except Exception as late:  # noqa: BLE001 - reported in a sentence
                 # Several workers were killed before they returned the results.
                 error = late
             else:
@@ -201,7 +201,7 @@ def _task(base: Base, outputs: Outputs, rows: FloatArray, wanted: dict[str, str]
         return run_chunk(base, outputs, rows)
     except PrinthammerError as error:
         return f"a worker of the cluster cannot do the work: {error}"
-    except Exception as error:  # noqa: BLE001 - a client may wait for ever for an error it cannot unpickle
+    except Exception as error:  # noqa: BLE001 - a client may hang on an error that it cannot unpickle
         return _unable(error)
 
 

@@ -440,7 +440,7 @@ def _decided(
 
 
 def _sample(decided: IntArray, count: int) -> IntArray:
-    """Select the rows of a sample of decided cells, spread evenly by multiples of the golden section."""
+    """Select the rows of a sample of decided cells, spread evenly by multiples of the golden ratio."""
     size = min(SAMPLE, max(count // 8, 1), len(decided))
     shares = (np.arange(1, size + 1) * _GOLDEN) % 1.0
     return np.unique(decided[(shares * len(decided)).astype(np.int64)]) if size else decided[:0]

@@ -289,8 +289,8 @@ class Branch(Result):
     def stable(self) -> BoolArray:
         """Mask of the stable orbits, shape (N,): all small perturbations decay.
 
-        Where a branch is born at a period doubling, a multiplier is 1; the orbit there has the stability of
-        its neighbour.
+        Where a branch is born at a period doubling, a multiplier is 1; the orbit there is assigned the
+        stability of its neighbour.
         """
         stable = np.asarray(np.abs(self.multipliers[:, 0]) < 1.0)
         for end, beside, stop in ((0, 1, self.stops[0]), (-1, -2, self.stops[1])):

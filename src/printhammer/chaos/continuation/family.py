@@ -72,8 +72,8 @@ class Passage(Declared):
     def sequence(self) -> str:
         """Sequence of contacts as text, P (pack) or B (backstop), rotated to the alphabetically first form.
 
-        The form is the same after a touch has moved through the section: the beginning of an orbit is
-        arbitrary.
+        The text does not change if a touch passes through the section along a branch, since the start of an
+        orbit is arbitrary.
         """
         return cyclic(touch.surface for touch in self.touches)
 

@@ -218,7 +218,7 @@ def strobes(
         Displacement [m], velocity [m/s] and further state components at the first firing of each train,
         as for `printhammer.simulate`, all of one form; by default the rest state.
     firings : tuple of int, optional
-        First and last firing that are classified; the very first firing is number 1.
+        First and last firing used for the classification; the very first firing is number 1.
     every_exponent : bool, optional
         Whether to compute the exponents of periodic trains, too; this takes several times as long as the
         points, and does not change the classification.
