@@ -40,7 +40,7 @@ class Samples(NamedTuple):
     error: float
 
     def take(self, which: Any) -> Samples:
-        """Return a copy with the selected rows (runs) or columns (samples)."""
+        """Return a copy with the runs (rows) and samples (columns) that the array index `which` selects."""
         return Samples(self.times[which], self.shown[which], self.used[which], self.error)
 
 

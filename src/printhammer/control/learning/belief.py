@@ -1,12 +1,12 @@
 """Maximum a posteriori estimation of a unit's constants, with a Laplace approximation.
 
-The constants are in prior standard deviations: the prior is the standard normal distribution. Each mode of
-the posterior is found by the Levenberg-Marquardt method (Nocedal and Wright, *Numerical Optimization*, 2006,
-section 10.3) with Broyden's rank-one updates of the Jacobian (their section 11.1), and the posterior near it
-is approximated by a normal distribution (Laplace; MacKay, *Information Theory, Inference, and Learning
-Algorithms*, 2003, chapter 27). A belief is a mixture of these normal distributions, since several sets of
-constants may explain the readings. Errors follow Student's t distribution, so that outliers have little
-weight.
+The constants are deviations from nominal in prior standard deviations, so the prior is the standard normal
+distribution. Each mode of the posterior is found by the Levenberg-Marquardt method (Nocedal and Wright,
+*Numerical Optimization*, 2006, section 10.3) with Broyden's rank-one updates of the Jacobian (their section
+11.1), and the posterior near it is approximated by a normal distribution (Laplace; MacKay, *Information
+Theory, Inference, and Learning Algorithms*, 2003, chapter 27). A belief is a mixture of these normal
+distributions, since several sets of constants may explain the readings. Errors follow Student's t
+distribution, so that outliers have little weight.
 
 The readings of a hammer that is fired while it still moves are strongly nonlinear in the constants, and a
 search that starts far away stops at a local minimum. The estimation is therefore a continuation in the noise:

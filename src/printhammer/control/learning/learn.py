@@ -338,9 +338,9 @@ def learn(
     rows of 200 slots with the table than in open loop, or a row in which errors grow from dot to dot.
     Otherwise one of two open-loop drives is used: the pulse of the driver, or the hammer's own pulse. Before
     the first run, the unit prints a short line with each of the two. The drive that prints more dots over the
-    production is used, unless 90 % of the posterior samples given all readings print no fewer dots with the
-    other drive. `loop_certainty` of the result is that fraction for the drive in use; below 0.9, or NaN, the
-    readings do not decide between the two drives.
+    production is used, unless 90 % of the samples of the posterior from all readings print no fewer dots with
+    the other drive. `loop_certainty` of the result is that fraction for the drive in use; below 0.9, or NaN,
+    the readings do not decide between the two drives.
 
     Parameters
     ----------

@@ -48,9 +48,9 @@ class Learner:
     """Run-to-run calibration of the compensation table of one unit by a learning law.
 
     An open loop is used during the first stage. Later stages use an open loop in three cases: no hammer of
-    the production explains the readings; more posterior samples than the doubt allows would print fewer dots
-    within limits with the table than in open loop, or a row in which errors grow; or the mean gain is below
-    2 % of the dots. Of the two open loops, the learner uses the loop that prints more dots over the
+    the production explains the readings; more than a fraction `doubt` of the posterior samples would print
+    fewer dots within limits with the table than in open loop, or a row in which errors grow; or the mean gain
+    is below 2 % of the dots. Of the two open loops, the learner uses the loop that prints more dots over the
     production, unless the readings of the unit in both loops show that the other loop prints more.
 
     Parameters

@@ -130,9 +130,9 @@ def _refine_groups(task: Task, tried: Sequence[Ways]) -> list[Ways]:
 
 
 def _look_closely(task: Task, periods: FloatArray, groups: list[Ways]) -> None:
-    """Search brake pulses between the grid values, in place, at periods with a poor best candidate.
+    """Search brake pulses between the grid values, at periods whose best candidate is poor.
 
-    New candidates are added to the groups of the periods.
+    New candidates are added to the groups of the periods, in place.
     """
     least = [group.cost.min(initial=np.inf) for group in groups]
     # Where even the re-solved neighbours cost more than `_FAR`, no candidate is expected. An unstable

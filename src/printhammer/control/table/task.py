@@ -73,7 +73,7 @@ def single_of(hammer: Hammer, pulse: Waveform, tolerance: float) -> Single:
 def search_scale(hammer: Hammer, pulse: Waveform) -> float:
     """Return the scale factor of the search's time ranges, relative to the paper's hammer; at least 1.
 
-    Faster devices are searched over the same ranges: with shorter ranges, a device twice as fast lost its
+    The ranges are not shortened for a faster device: with shorter ranges, a device twice as fast lost its
     only stable candidate at 1.3 kHz (`tests/control/table/test_tuning.py`).
     """
     return max(1.0, time_scale(hammer, pulse))

@@ -151,7 +151,7 @@ def tune(
     """Tune a compensation table: pulse width and advance as a function of the last gaps between dots.
 
     If a dot equals a dot from rest, the hammer is left in the same state as after a dot from rest. The pulse
-    of the next dot is then a function of the time since that dot alone; longer histories correct the
+    of the next dot then depends only on the time since that dot; longer histories correct the
     remaining error. For each history, advance and width are found by a damped Gauss-Newton
     (Levenberg-Marquardt) iteration so that force and arrival of the last dot of patterns with that history
     are those of the single pulse. There are usually several solutions: before or after a rebound, with or
