@@ -1,7 +1,7 @@
 """The safe rate: the largest slot rate up to which a hammer prints every pattern within limits.
 
-R(limits) is the largest rate of a grid such that, there and at every lower rate of the grid, all dots are
-within limits: the dots of all 255 patterns of eight slots from rest, and of the long patterns. The long
+R(limits) is the largest rate of a grid such that, at this rate and at every lower rate of the grid, all dots
+are within limits: the dots of all 255 patterns of eight slots from rest, and of the long patterns. The long
 patterns are the binary de Bruijn cycle of order 8, which contains every word of eight slots exactly once,
 after a lead-in of 64 slots; rows of 200 slots; and a line of text.
 
