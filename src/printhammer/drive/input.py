@@ -92,7 +92,7 @@ def read_array(values: npt.ArrayLike, name: str, what: str = "numbers", si: str 
 def even_times(
     rate: float | str | None, period: float | str | None, count: int
 ) -> tuple[FloatArray, tuple[str, float], float]:
-    """Compute the firing times of a train at a constant rate that starts at 0.
+    """Compute the firing times of a train of constant rate, the first at time 0.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Segment tables of pulse shapes, their values, and firing times, as plain functions of arrays.
+"""Plain functions that write and evaluate the segment tables of pulse shapes, and write firing times.
 
 A plain function allocates nothing and raises nothing, so that it can be compiled as an entry point, see
 `printhammer.run.plain.entries`. Segment tables are described in `printhammer.drive.segments`; the classes of

@@ -75,7 +75,8 @@ class PulseTrain(_Pulsed):
     at
         Firing times [s], ascending, instead of a rate or period.
     pulses
-        Number of firings; by default nine, as in the bursts of the paper, or one without rate and period.
+        Number of firings; by default nine, as in the bursts of the paper, or one if neither rate nor period
+        is passed.
     overlap
         "add": overlapping pulses add up; "replace": each firing cuts off the preceding pulse.
     start
