@@ -243,7 +243,7 @@ def _pair(key: str, written: Any, units: tuple[str, str], wanted: str) -> tuple[
 
 
 def _keys(document: Mapping[str, Any]) -> list[str]:
-    """List the keys of a data sheet that may state a source: top-level keys and table entries."""
+    """List the keys of a data sheet that `assumed` and `[why]` may name: top-level and table entries."""
     whole = [key for key in document if key not in (*TEXTS, "assumed", "why")]
     inner = [f"{name}.{key}" for name in (*TABLES, "driver") for key in document.get(name, {})]
     return [*whole, *inner]
