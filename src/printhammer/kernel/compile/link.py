@@ -1,4 +1,4 @@
-"""Linking and code generation: from LLVM bitcode to machine code, with llvmlite only.
+"""Linking and code generation: from LLVM bitcode to machine code, using only llvmlite.
 
 The template of an entry point, the laws of a hammer and the values of its choices are linked to one module.
 LLVM optimises the module as a whole and generates machine code for this processor.

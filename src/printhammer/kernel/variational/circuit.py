@@ -277,9 +277,10 @@ def threshold_change(live: Any, k: int, forcing: Forcing) -> float:
 
 @called
 def pass_path(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
-    """Propagate the tangent columns through a change of the current path; return whether differentiable.
+    """Propagate the tangent columns through a change of the current path.
 
-    The current and all forces are continuous at the change; only the rate of the coil's flux linkage jumps.
+    Return whether the motion is differentiable there. The current and all forces are continuous at the
+    change; only the rate of the coil's flux linkage jumps.
     """
     hammer, live, forcing = setting.hammer, setting.drive, setting.forcing
     before, behind = node[ELECTRIC + 3], after[ELECTRIC + 3]

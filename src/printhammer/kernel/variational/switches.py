@@ -186,7 +186,10 @@ def pass_reversal(node: Any, after: Any, mode: int, following: int, columns: Any
 def pass_level(
     node: Any, after: Any, mode: int, following: int, jump: int, columns: Any, setting: Setting
 ) -> bool:
-    """Propagate the columns across a surface or the old local maximum; return whether differentiable."""
+    """Propagate the tangent columns across a surface or the old local maximum in the pack.
+
+    Return whether the motion is differentiable there.
+    """
     hammer, drive, forcing = setting.hammer, driven(setting.drive, electric_at_node(after)), setting.forcing
     v = after[2]
     if v == 0.0:
@@ -226,10 +229,10 @@ def rate_at_release(node: Any, after: Any, mode: int, memory: float, setting: Se
 
 @compiled
 def pass_release(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
-    """Propagate the columns through the end of a rest under dry friction; return whether differentiable.
+    """Propagate the tangent columns through the end of a rest under dry friction.
 
-    The rest ends at a time that depends on the position of the armature and on constants, or at an edge of
-    the drive, see `leave_at_edge`.
+    Return whether the motion is differentiable there. The rest ends at a time that depends on the position of
+    the armature and on constants, or at an edge of the drive, see `leave_at_edge`.
     """
     hammer, drive = setting.hammer, driven(setting.drive, electric_at_node(after))
     mode, memory = int(node[3]), memory_of(int(node[3]), node[4], setting.hammer)
@@ -298,7 +301,10 @@ def pass_friction(node: Any, after: Any, columns: Any, setting: Setting) -> tupl
 
 @compiled
 def pass_node(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
-    """Propagate the columns through any event at the node `after`; return whether differentiable."""
+    """Propagate the tangent columns through any event at the node `after`.
+
+    Return whether the motion is differentiable there.
+    """
     if is_rebound(node, after):
         pass_rebound(node, after, columns, setting)
         return True
@@ -353,7 +359,7 @@ def pass_edge(
 
 @inlined
 def is_departure(before: Any, node: Any) -> bool:
-    """Whether a rest on a rigid stop, or under friction, ended at a node; `before` is the preceding node."""
+    """Whether a rest on a rigid stop or under friction ended at a node; `before` is the preceding node."""
     mode = int(before[3])
     return mode >= M.RESTING and (FRICTION or mode != M.HELD) and int(node[3]) < M.RESTING
 
