@@ -121,7 +121,7 @@ def nearest(name: str, known: Iterable[str], otherwise: str = "") -> str:
 
 
 def missing_extra(needs: str, extra: str) -> InputError:
-    """Return the error for a missing optional package, naming the extra that installs the package."""
+    """Return the error for a package that an extra installs; the message begins with `needs`."""
     return InputError(
         f"{needs}, which the extra printhammer[{extra}] installs: pip install 'printhammer[{extra}]'",
         key=extra,

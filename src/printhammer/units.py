@@ -1,4 +1,4 @@
-"""Conversion of numbers with units, as text, to SI and back; the only module that knows units.
+"""Conversion of quantities between SI and other units; the only module that knows units.
 
 All internal quantities are floats in SI; units occur in hammer files, drives, tables, the command line and on
 the axes of figures. Units are written in the usual way: "N/m^1.5", "N^0.5 m^0.25/A", "in", "us", "lbf", "1"
@@ -115,13 +115,13 @@ def to_si(value: float, unit: str, si_unit: str) -> float:
     Raises
     ------
     InputError
-        If `value` is not a finite number, `unit` is not known, or is of another dimension than `si_unit`.
+        If `value` is not a finite number, or `unit` is unknown or has another dimension than `si_unit`.
     """
     return _scaled(value, _factor(unit, si_unit), unit)
 
 
 def all_to_si(values: Sequence[float], unit: str, si_unit: str) -> list[float]:
-    """Convert an array of numbers to SI, element by element as `to_si`; NaN stays NaN."""
+    """Convert a sequence of numbers to SI, element by element, as `to_si` does; NaN stays NaN."""
     factor = _factor(unit, si_unit)
     if factor == 1:
         return [value + 0.0 for value in values]
@@ -147,7 +147,7 @@ def from_si(value: float, si_unit: str, unit: str) -> float:
 
 
 def factor_of(unit: str, si_unit: str) -> float:
-    """Return the conversion factor from `unit` to `si_unit`, such as for "A/V"; errors as for `to_si`.
+    """Return the factor that converts a number in `unit`, such as "mA/V", to `si_unit`.
 
     Raises
     ------
@@ -160,7 +160,7 @@ def factor_of(unit: str, si_unit: str) -> float:
 
 
 def is_unit_of(unit: str, si_unit: str) -> bool:
-    """Whether a text is a known unit of the dimension of `si_unit`."""
+    """Whether `unit` is a known unit with the dimension of `si_unit`."""
     try:
         _factor(unit, si_unit)
     except InputError:
@@ -256,7 +256,7 @@ def _factor(unit: str, si_unit: str) -> Fraction:
 
 @lru_cache(maxsize=1024)
 def _measure(unit: str) -> tuple[Fraction, _Dimension]:
-    """Return the size of a unit in the base units, and its dimension, without bases of power zero."""
+    """Return the size of a unit in base units, and its dimension: the nonzero exponents of the base units."""
     size, dimension = Fraction(1), dict[str, Fraction]()
     for name, power in _factors(unit):
         try:
@@ -288,7 +288,7 @@ def _dimension(powers: Sequence[int]) -> _Dimension:
 
 
 def _looked_up(name: str) -> tuple[Fraction, _Dimension]:
-    """Return size and dimension of a unit by name from `units.txt`; LookupError if the unit is unknown."""
+    """Look up size and dimension of a unit in `units.txt`; raise LookupError if the name is unknown."""
     from pint import UndefinedUnitError
 
     registry = _registry()
@@ -301,7 +301,7 @@ def _looked_up(name: str) -> tuple[Fraction, _Dimension]:
 
 
 def _factors(unit: str) -> Iterator[tuple[str, Fraction]]:
-    """Split a unit into names and powers; a slash divides by the next factor only."""
+    """Yield the factors of a unit as name and power; a slash divides by the next factor only."""
     text, position, sign = unit.translate(_SIGNS), 0, 1
     while unit.isprintable() and (match := _FACTOR.match(text, position)):
         if match["name"] != "1":

@@ -11,7 +11,7 @@ role      functions
 magnet    ``magnet_force(c, x, current)``, ``magnet_energy(c, x)``; for a coil driven by a voltage also
           ``magnet_linkage(c, x, current)``, ``magnet_emf(c, x, current)``,
           ``magnet_inductance(c, x, current)`` and ``magnet_current(c, x, linkage, inductance)``
-coil      none: its circuit is the kernel's, `printhammer.kernel.model.circuit`
+coil      none; the circuit is in the kernel, `printhammer.kernel.model.circuit`
 spring    ``spring_force(c, x)``, ``spring_energy(c, x)``; a law whose slope jumps also ``LEVELS`` = True and
           ``spring_level(c, k)``, the position of the k-th jump; one that dissipates energy ``VISCOUS`` =
           True and ``spring_viscous(c, x, v)``, its force at the velocity v, 0 at rest;

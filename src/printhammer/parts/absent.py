@@ -139,7 +139,7 @@ def magnet_packed(q: Any, origin: float, c: Any) -> int:
 
 
 def magnet_domain(q: Any, ends: Any) -> None:
-    """Write the displacement range, m: the last two values of a law that has no domain function."""
+    """Write the displacement range [m] of a law without a domain function: the last two of its values."""
     ends[0], ends[1] = -math.inf, math.inf
     if len(q) > 1:
         ends[0], ends[1] = q[len(q) - 2], q[len(q) - 1]

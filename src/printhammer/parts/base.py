@@ -82,7 +82,7 @@ class Part(BaseModel):
     def numbers(self) -> tuple[float, ...]:
         """Return the fields as numbers, and the index of the law among the laws of its module.
 
-        A missing constant is NaN, an option 0 or 1 or the index of its choice.
+        A missing constant becomes NaN, a Boolean option 0 or 1, and any other option the index of its choice.
         """
         fields = _fields(type(self))
         return (*[_number(getattr(self, name), choices) for name, choices in fields], float(self.variant))
@@ -237,14 +237,14 @@ def laws(role: str) -> tuple[str, ...]:
 
 @cache
 def _fields(part: type[Part]) -> tuple[tuple[str, tuple[Any, ...] | None], ...]:
-    """List the fields in `Part.numbers`: names, and the choices of an option of a few words, else None."""
+    """List the fields in `Part.numbers`: name, and allowed words of an option with text values, else None."""
     kinds = options(part)
     words = {name: get_args(kind) for name, kind in kinds.items() if get_origin(kind) is Literal}
     return tuple((name, words.get(name)) for name in part.names())
 
 
 def _number(value: Any, choices: tuple[Any, ...] | None) -> float:
-    """Return a field as a number: of an option with `choices`, the index of its choice."""
+    """Convert the value of a field to a number: one of `choices` to its index, None to NaN."""
     if choices is not None:
         return float(choices.index(value))
     return math.nan if value is None else float(value)

@@ -27,13 +27,14 @@ _FORCES: Final = {
 def check_functions(part: Any, *, complete: bool = False) -> None:
     """Check that the law functions of a part class take the arguments that the kernel passes.
 
-    Functions that the module omits come from the absent part; a `complete` law has at least one force.
+    Functions that the module omits come from the absent part; if `complete`, the module must define at least
+    one force function of the role.
 
     Raises
     ------
     InputError
-        A function has other arguments, is not callable or prints, a force is missing, or the law is defined
-        at an interactive prompt or in a notebook cell; the message names the module.
+        A function has other arguments, is not callable or calls `print`; a force function is missing; or the
+        law is defined at an interactive prompt or in a notebook cell. The message names the module.
     """
     module = sys.modules.get(part.__module__)
     where = getattr(module, "__file__", None)

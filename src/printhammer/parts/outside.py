@@ -29,7 +29,7 @@ def load_parts(path: str | Path) -> list[type[Part]]:
     ------
     InputError
         The file does not exist, its name is taken by another module, it cannot be imported, it registers no
-        part, or a law lacks a function or has one with other arguments.
+        part, or a law function is missing or has the wrong arguments.
     """
     source = Path(path).resolve()
     name = source.stem

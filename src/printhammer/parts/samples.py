@@ -26,7 +26,10 @@ def cell_of(c: Any, first: int, knots: int, at: float) -> int:
 
 
 def end_slope(h0: float, h1: float, m0: float, m1: float) -> float:
-    """Return the slope of a shape-preserving cubic at the end of a record, from the two outer intervals."""
+    """Return the slope of a shape-preserving cubic at the end of a curve.
+
+    The arguments are the widths h and the secant slopes m of the outermost cell and of its neighbour.
+    """
     slope = ((2.0 * h0 + h1) * m0 - h0 * m1) / (h0 + h1)
     if slope * m0 <= 0.0:
         return 0.0
@@ -36,7 +39,10 @@ def end_slope(h0: float, h1: float, m0: float, m1: float) -> float:
 
 
 def inner_slope(h0: float, h1: float, m0: float, m1: float) -> float:
-    """Return the slope of a shape-preserving cubic between two intervals, 0 at an extremum of the record."""
+    """Return the slope of a shape-preserving cubic between two cells of widths h and secant slopes m.
+
+    The slope is 0 at an extremum of the samples.
+    """
     if m0 == 0.0 or m1 == 0.0 or (m0 < 0.0) != (m1 < 0.0):
         return 0.0
     w0, w1 = 2.0 * h1 + h0, h1 + 2.0 * h0
@@ -54,7 +60,7 @@ def secant_at(c: Any, first: int, n: int, k: int) -> float:
 
 
 def slope_at(c: Any, first: int, n: int, k: int) -> float:
-    """Return the slope of the shape-preserving cubics at sample `k`."""
+    """Return the slope of the shape-preserving cubic at sample `k`."""
     if n == 2:
         return secant_at(c, first, n, 0)
     inside = min(max(k, 1), n - 2)

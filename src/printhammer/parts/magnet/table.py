@@ -87,7 +87,7 @@ def _linkage(c: Any, x: float, j: int) -> tuple[float, float, float]:
 
 
 def magnet_linkage(c: Any, x: float, current: float) -> float:
-    """Return the flux linkage relative to the smallest displacement, Wb; NaN outside the table."""
+    """Return the flux linkage minus its value at the smallest displacement, Wb; NaN outside the table."""
     nx = int(c[0])
     ni = int(c[1])
     if not (c[2] <= x <= c[1 + nx] and c[2 + nx] <= current <= c[1 + nx + ni]):
@@ -117,7 +117,7 @@ def magnet_emf(c: Any, x: float, current: float) -> float:
 
 
 def magnet_inductance(c: Any, x: float, current: float) -> float:
-    """Return the differential inductance relative to the smallest displacement, H; NaN outside the table."""
+    """Return the derivative of `magnet_linkage` with respect to current, H; NaN outside the table."""
     nx = int(c[0])
     ni = int(c[1])
     if not (c[2] <= x <= c[1 + nx] and c[2 + nx] <= current <= c[1 + nx + ni]):

@@ -43,7 +43,7 @@ def pack_unloading(c: Any, x: float, v: float, q: float) -> float:
 
 
 def pack_switch(c: Any, x: float, v: float) -> float:
-    """Return the contact force [N] whose sign changes where the force is cut off; 1 if the pack may pull."""
+    """Return K (x - xp) + C v, N, which changes sign at the cut-off of the force; 1 with `pull`."""
     if c[3] != 0.0:
         return 1.0
     return float(c[0] * (x - c[2]) + c[1] * v)

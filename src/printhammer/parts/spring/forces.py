@@ -89,7 +89,7 @@ def spring_level(c: Any, k: float) -> float:
 
 
 def spring_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants to `c`, with `origin` for NaN positions; return the number of constants."""
+    """Write the packed constants to `c`, with `origin` in place of NaN positions; return their count."""
     count = 1 + WIDTH * int(q[0])
     for k in range(count):
         c[k] = origin if math.isnan(q[k]) else q[k]

@@ -27,7 +27,10 @@ __all__ = ["LEVELS", "spring_domain", "spring_energy", "spring_force", "spring_l
 
 
 def sum_of_curves(c: Any, x: float, integrated: bool) -> float:
-    """Return the sum of the sampled forces [N] or of the integrals [J] at `x` [m]; NaN beyond the samples."""
+    """Return the sum of the sampled forces [N] at `x` [m]; NaN beyond the samples of any force.
+
+    If `integrated`, return the sum of the integrals of the forces from their first samples to `x`, J.
+    """
     total = 0.0
     at = 1 + WIDTH * int(c[0])
     first = at + 3
@@ -55,7 +58,7 @@ def spring_energy(c: Any, x: float) -> float:
 
 
 def spring_level(c: Any, k: float) -> float:
-    """Return the position of kink `k`, from 0, m: an inner sample or a contact; infinity beyond the last."""
+    """Return the position of kink `k`, counted from 0, m: an inner sample or a contact; or infinity."""
     at = 1 + WIDTH * int(c[0])
     first = at + 3
     left = int(k)
@@ -80,7 +83,7 @@ def spring_domain(q: Any, ends: Any) -> None:
 
 
 def spring_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants to `c`, with `origin` for NaN positions; return the number of constants."""
+    """Write the packed constants to `c`, with `origin` in place of NaN positions; return their count."""
     for k in range(rows_packed(q, origin, c), len(q)):
         c[k] = q[k]
     return len(q)

@@ -57,7 +57,7 @@ def spring_viscous(c: Any, x: float, v: float) -> float:
 
 
 def spring_switch(c: Any, v: float) -> float:
-    """Return a number that changes sign where, at a velocity `v` [m/s], the force of a contact becomes 0."""
+    """Return a number that changes sign at each velocity `v` [m/s] at which a contact force is cut off."""
     product = 1.0
     for k in range(int(c[0])):
         row = 1 + WIDTH * k

@@ -107,7 +107,7 @@ class Friction(Term):
 
     @property
     def largest(self) -> float:
-        """Static friction, N."""
+        """Static friction force, N; the kinetic friction force if `static` is None."""
         return self.kinetic if self.static is None else self.static
 
 
