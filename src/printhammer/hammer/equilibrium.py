@@ -301,7 +301,7 @@ def _equilibrium_at(force: StaticForce, root: Root, current: float) -> Equilibri
 
 
 def _is_stable(root: Root, force: StaticForce) -> bool:
-    """Whether the force points to the root from both sides; a rigid backstop replaces the lower side."""
+    """Whether the force points to the root from both sides; a rigid stop at the root replaces this force."""
     return is_stable(root.x, root.before, root.after, force.statics)
 
 

@@ -267,7 +267,7 @@ def _build(
 
 
 def _check_friction(backstop: BackstopPart | None) -> None:
-    """Raise InputError for an elastic backstop: its contact is integrated without dry friction."""
+    """Raise InputError for an elastic backstop, which cannot be combined with dry friction."""
     if backstop is not None and not backstop.rigid:
         expected = "rigid beside dry friction, or a [[contact]] with side = 'back' in its place"
         raise InputError.of("backstop.law", backstop.law, expected)

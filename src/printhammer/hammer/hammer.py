@@ -122,7 +122,7 @@ class Hammer:
         Parameters
         ----------
         mass : str or float
-            Mass of the armature, text with its unit or kg.
+            Mass of the armature, as text with its unit, or in kg.
         name : str, optional
             Short name.
         status, source : str, optional
@@ -390,7 +390,7 @@ class Hammer:
 
     @property
     def files(self) -> dict[str, str]:
-        """Paths of the table files, relative to the folder of the hammer file, by role, entry or term."""
+        """Paths of the table files, relative to the folder of the hammer file, by key such as "magnet"."""
         models = {"magnet": self.magnet, "waveform": self.waveform, **self.terms}
         names = {key: getattr(model, "file", None) for key, model in models.items()}
         return {key: name for key, name in names.items() if name}

@@ -68,8 +68,8 @@ def range_of(hammer: Hammer, name: str, factor: float = 10.0) -> Range:
     """Return the control range of a constant, around its value in a hammer.
 
     Positions vary by half the distance from backstop to platen in either direction; other constants range
-    from 1 / `factor` to `factor` times their value, a coefficient of restitution at most to 1; the range of a
-    constant that is zero is typical of its dimension. These rules are arbitrary.
+    from 1 / `factor` to `factor` times their value, but a coefficient of restitution only up to 1. A constant
+    that is zero has a typical range for its unit. These rules are arbitrary.
     """
     constant = hammer.constants[name]
     value = constant.si
@@ -107,7 +107,7 @@ def quantities_of(waveform: Waveform) -> dict[str, Quantity]:
 
 
 def in_unit_of_drive(note: Quantity, unit: str) -> Quantity:
-    """Return a declaration with `unit` as its only unit, if the constant may have several units, A or N."""
+    """Return a declaration, restricted to `unit` if it allows several units, such as A and N."""
     return replace(note, si=unit, also=()) if note.also else note
 
 

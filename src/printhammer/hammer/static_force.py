@@ -15,7 +15,7 @@ from printhammer.parts.base import domain_of
 
 
 class HammerLike(Protocol):
-    """Attributes of a hammer that the statics use, as a protocol."""
+    """Protocol with the attributes of a hammer that the static computations use."""
 
     @property
     def name(self) -> str:

@@ -105,7 +105,7 @@ def force_at(x: float, about: tuple[float, Statics]) -> float:
 
 
 def nearest_level(x: float, s: Statics) -> float:
-    """Return the distance [m] from `x` to the nearest kink of the spring law other than `x`; or infinity."""
+    """Return the distance [m] from `x` to the nearest other kink of the spring law; infinity without one."""
     nearest = math.inf
     k = 0.0
     level = float(s.spring_level(s.spring, k))
@@ -170,14 +170,14 @@ def spacing(x: float) -> float:
 
 
 def is_stable(x: float, before: float, after: float, s: Statics) -> bool:
-    """Whether the force points to a root from both sides; a rigid stop replaces the side beyond it."""
+    """Whether the force points to a root from both sides; a rigid stop at the root replaces this force."""
     low, high = limits_of(s)
     held = before > 0.0 or (s.rigid and x == low)
     return held and (after < 0.0 or (s.rigid_front and x == high))
 
 
 def put_cluster(anchor: float, sign: float, limit: float, grid: Any, count: int) -> int:
-    """Append an anchor and a geometric sequence of points around it; return the new point count."""
+    """Append an anchor and a geometric sequence of points on its side `sign`; return the new point count."""
     grid[count] = anchor
     if limit <= NEAREST:
         grid[count + 1] = anchor + sign * limit
@@ -194,7 +194,7 @@ def put_cluster(anchor: float, sign: float, limit: float, grid: Any, count: int)
 
 
 def fill_grid(low: float, high: float, s: Statics, grid: Any) -> int:
-    """Write an unsorted search grid between two limits, m: even points, and clusters at anchors.
+    """Write an unsorted search grid between two limits, m: evenly spaced points, and clusters at anchors.
 
     Returns
     -------
