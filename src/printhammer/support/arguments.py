@@ -47,8 +47,8 @@ def check_objects(function: F) -> Callable[[tuple[Any, ...], dict[str, Any]], No
     Returns
     -------
     Callable
-        Check of the positional arguments and the keywords of a call; raises InputError with name and value of
-        an argument of another class.
+        Function that checks the positional and keyword arguments of a call; raises InputError with name and
+        value of an argument of the wrong class.
     """
     arguments = []
     for place, each in enumerate(inspect.signature(function).parameters.values()):
@@ -77,7 +77,7 @@ def check_objects(function: F) -> Callable[[tuple[Any, ...], dict[str, Any]], No
 
 
 def checked(function: F) -> F:
-    """Decorate a public function to raise InputError for an argument of a class other than annotated."""
+    """Decorate a public function so that an argument of the wrong class raises InputError."""
     check = check_objects(function)
 
     @functools.wraps(function)

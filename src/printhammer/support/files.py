@@ -11,7 +11,7 @@ from pathlib import Path
 from printhammer.errors import InputError
 
 listeners: set[Callable[[str], None]] = set()
-"""Callbacks for a message before a long table, which takes seconds to parse, is read."""
+"""Callbacks that receive a message before a long table is parsed, which takes seconds."""
 
 
 def write_file(path: str | Path, content: str | bytes) -> None:

@@ -38,7 +38,7 @@ def thread_count(threads: int | None) -> int:
 
 
 def shifted(progress: Progress | None, begun: int, total: int) -> Progress | None:
-    """Return a progress callback for a later stage of a computation: `begun` steps of `total` are done."""
+    """Return a progress callback for a later stage, which starts when `begun` of `total` steps are done."""
     return None if progress is None else lambda done, _all: progress(begun + done, total)
 
 
@@ -76,7 +76,7 @@ def in_threads(
     Parameters
     ----------
     works : sequence of callable
-        Functions of the first index of a chunk and the index after its last.
+        Functions, called with the first index of a chunk and the index after its last.
     sizes : sequence of int
         Length of the range of each function.
     threads : int
@@ -169,7 +169,7 @@ def together(works: Sequence[Work[A, B, T]]) -> Work[A, B, list[T]]:
 
 
 def translated(work: Work[A, B, T], answer: Callable[[list[A]], Work[C, D, list[B]]]) -> Work[C, D, T]:
-    """Adapt a `Work` coroutine: `answer` converts its queries to queries of another kind."""
+    """Adapt a `Work` coroutine: the coroutine `answer` answers its queries by queries of another kind."""
     answers: list[B] | None = None
     while True:
         try:

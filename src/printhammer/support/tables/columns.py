@@ -57,12 +57,12 @@ class Source:
     """Offset added after multiplication, with its unit; empty for no offset."""
 
     def scale(self, own: str, si: str) -> float:
-        """Compute the factor that converts table numbers to SI; `own` is the unit of the table, if stated.
+        """Compute the factor that converts table numbers to SI; `own` is the unit that the table states.
 
         Raises
         ------
         InputError
-            The unit of the factor does not convert that of the table to the quantity.
+            The unit of the factor does not convert the unit of the table to a unit of the quantity.
         """
         if not self.unit and not own:
             raise InputError(

@@ -103,7 +103,7 @@ def unit_of(text: str) -> str:
 
 
 def is_unit_row(cells: list[str]) -> bool:
-    """Whether the cells of a row are units, counts, or empty, with at least one unit."""
+    """Whether each cell of a row is a unit, a word such as "samples", or empty, with at least one unit."""
     units = [unit_of(cell) or cell.strip().strip("()").lower() in _COUNTS for cell in cells if cell.strip()]
     return all(units) and any(isinstance(unit, str) for unit in units)
 
@@ -358,7 +358,7 @@ def _is_named(cell: str) -> bool:
 
 
 def _without_facts_beside(rows: list[Row]) -> tuple[list[Row], dict[str, list[str]]]:
-    """Remove columns of metadata left of the numbers, as written by older Tektronix oscilloscopes."""
+    """Separate metadata columns left of the numbers, as in files of older Tektronix oscilloscopes."""
     first = rows[0][1]
     if not first[0].strip() or is_reading(first[0].strip()):
         return rows, {}
@@ -408,7 +408,7 @@ def _with_units(columns: list[Heading], facts: dict[str, list[str]], above: list
 
 
 def _beside_names(columns: list[Heading], facts: dict[str, list[str]]) -> list[Heading]:
-    """Return the headings of an older Tektronix oscilloscope, from the metadata."""
+    """Return the column headings of a file of an older Tektronix oscilloscope, from its metadata."""
     source = _fact(facts, ("source",), [""])[0]
     unit = split_heading(f"x [{facts[_TIME_UNIT[0]][0]}]").unit
     return [Heading("time", unit), *(column._replace(name=source) for column in columns[1:])]

@@ -80,7 +80,7 @@ class Readings:
             )
 
     def check_before(self, times: FloatArray, name: str) -> None:
-        """Check that a drive column starts at time 0, the time of firing, and not earlier.
+        """Check that the drive signal in a column starts at time 0, the time of firing, and not earlier.
 
         Raises
         ------
@@ -415,7 +415,8 @@ def _in_time(
 ) -> tuple[dict[str, FloatArray], IntArray]:
     """Remove column delays by interpolation to common times; drop incomplete rows.
 
-    The times of the first column are shifted; all other columns are interpolated linearly.
+    The common times are those of the first column, minus its delay; all other columns are interpolated
+    linearly.
     """
     times = values["time"]
     names = [name for name in values if name != "time"]
