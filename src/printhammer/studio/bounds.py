@@ -1,4 +1,4 @@
-"""Limits of the studio: sizes of states and files, ranges of inputs, computation, resolution of pictures."""
+"""Limits of the studio: sizes of states and files, ranges of inputs, numbers of steps, and resolution."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ SPAN: Final = 10.0
 """Largest factor by which a control may change a constant from its value in the loaded hammer; arbitrary."""
 
 SPAN_OF_PLACES: Final = 100e-6
-"""Range of a control about the only position of a device, at 0, m; arbitrary."""
+"""Half the control range of a position at 0 that is the only position of a device, m; arbitrary."""
 
 QUARTER_TURN: Final = 0.5 * math.pi
-"""Range of a control of an angle, rad."""
+"""Half the control range of an angle, rad."""
 
 MOST_STEPS: Final = 50_000
 """Step limit of the single run that the curves show; arbitrary."""

@@ -45,7 +45,7 @@ def has_rail(hammer: Hammer) -> bool:
 
 @lru_cache(maxsize=16)
 def open_constants(hammer: Hammer) -> dict[str, tuple[Constant, Range]]:
-    """Return the coil constants that a hammer file does not specify and a control sets, by dotted key."""
+    """Return the coil constants that the page adds to a hammer, and their control ranges, by dotted key."""
     if not has_rail(hammer):
         return {}
     values: dict[str, float] = {"temperature": REFERENCE}
@@ -65,9 +65,9 @@ def open_constants(hammer: Hammer) -> dict[str, tuple[Constant, Range]]:
 
 
 def span_of(hammer: Hammer, constant: Constant) -> Range | None:
-    """Return the range of the control of a constant of a hammer; None for a constant without a control.
+    """Return the control range of a constant of a hammer; None for a constant without a control.
 
-    Constants of the waveform have no control here: the editor of the pulse changes them.
+    Constants of the waveform have no such control: the pulse editor changes them.
     """
     section = constant.key.partition(".")[0]
     if section == "waveform":

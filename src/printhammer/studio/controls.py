@@ -174,7 +174,7 @@ def _control(hammer: Hammer, constant: Constant, span: Range) -> dict[str, Any]:
 
 
 def _law_of(hammer: Hammer, section: str) -> type[Part] | None:
-    """Return the class of a part as the file states it; None for other sections."""
+    """Return the part class of the law that the file states; None for a section that is not a part."""
     part = hammer.parts.get(section)
     if part is None:
         return Winding if section == "coil" else None
@@ -214,7 +214,7 @@ def equation_of(section: str, part: type[Part] | None) -> str:
 
 
 def combined_of(hammer: Hammer) -> list[dict[str, Any]]:
-    """Return the controls that change several constants at once, as on the terminal of the paper.
+    """Return the controls that change several constants at once, as on the terminal of the 1983 paper.
 
     Two of platen position, pack front and pack thickness are independent, since the pack lies on the platen:
     the platen distance moves platen and front; the forms thickness moves the front toward the hammer.
@@ -256,7 +256,7 @@ def units_of(hammer: Hammer) -> dict[str, list[dict[str, Any]]]:
 
 
 def vocabulary() -> dict[str, Any]:
-    """Return the pulse shapes with their constants, the drivers among them, and the paths of decay."""
+    """Return the pulse shapes with their constants, the names of the drivers, and the current decay paths."""
     shapes = {name: [_field(shape, field) for field in quantities(shape)] for name, shape in SHAPES.items()}
     # The frequency of a continuous force is the rate.
     shapes[Sine.shape] = [_field(Sine, field) for field in SINE]

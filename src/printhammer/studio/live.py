@@ -170,8 +170,8 @@ def _line() -> dict[str, Any]:
 def _hammer(shelf: Shelf, name: str, modules: dict[Laws, str]) -> dict[str, Any]:
     """Compose the page entry of a hammer, and add its WebAssembly modules to `modules`.
 
-    Every hammer has the module of its pulse, or of the pulse that the page initially shows; the first hammer
-    also has the modules of a current and of a voltage.
+    Every hammer has the module for its pulse, or for the pulse that the page initially shows; the first
+    hammer also has the modules for current and voltage drives.
     """
     hammer = shelf.hammer(name)
     described = describe(hammer)
@@ -220,9 +220,9 @@ def widget(*hammers: Hammer, state: str = "", height: str = "760px") -> Any:
     *hammers : Hammer
         Hammers of the page; by default all shipped hammers.
     state : str, optional
-        State, in the form of the page's address after the #.
+        Initial state, written as in the page's address after the #.
     height : str, optional
-        Height, in the syntax of a style sheet.
+        Height of the widget, in CSS syntax.
 
     Returns
     -------
@@ -232,7 +232,8 @@ def widget(*hammers: Hammer, state: str = "", height: str = "760px") -> Any:
     Raises
     ------
     InputError
-        The extra `notebook` is not installed, or a hammer has laws of its own and the extra `page` is not.
+        The extra `notebook` is not installed, or a hammer has custom laws and the extra `page` is not
+        installed.
     """
     try:
         import anywidget

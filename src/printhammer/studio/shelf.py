@@ -15,7 +15,7 @@ _load: Final = lru_cache(maxsize=32)(load)
 
 
 class Shelf:
-    """Hammers of a studio page, in the order of its list; the page opens with the first hammer.
+    """Hammers of a studio page, in display order; the page opens with the first hammer.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""Forces and contacts of a hammer on the page: how their constants set the numbers of spring and damping.
+"""Forces and contacts on the page: the numbers of spring and damping as functions of the constants.
 
 The page receives the sum of the spring and of the entries of ``[[force]]`` and ``[[contact]]`` as one array
-of numbers (`printhammer.parts.spring.forces`), and a damping with dry friction as another one
+of numbers (`printhammer.parts.spring.forces`), and a damping with dry friction as another
 (`printhammer.parts.friction`). Each number of these arrays is a sum of products of constants, which the page
 evaluates again when a control changes one of the constants.
 """
@@ -45,7 +45,7 @@ _ROWS: Final[dict[str, dict[int, _Template]]] = {
 
 
 def sums_of(hammer: Hammer) -> dict[str, list[tuple[int, list[Product]]]]:
-    """Return the numbers that are sums of products of constants: index and products, by role of the part.
+    """Return the numbers of spring and damping as sums of products of constants: index and products, by role.
 
     The result is empty for a hammer without forces and contacts. Numbers that no constant of the hammer file
     sets are left out.
@@ -69,7 +69,7 @@ def _numbers_of_rows(hammer: Hammer) -> Iterator[tuple[int, list[Product]]]:
 
 
 def _product(hammer: Hammer, entry: str, template: _Template) -> Product | None:
-    """Return a product with the keys of an entry; None if a constant besides `acceleration` is missing."""
+    """Insert the keys of an entry in a template; None if a constant other than `acceleration` is missing."""
     factor, *roles = template
     keys: list[list[str]] = []
     for names in roles:
@@ -105,19 +105,19 @@ def contacts_of(hammer: Hammer) -> list[dict[str, Any]]:
 
 
 def frictions_of(hammer: Hammer) -> list[list[str]]:
-    """Return the keys of kinetic and static friction of the entries whose file states both."""
+    """Return the keys of kinetic and static friction of each friction entry that states both."""
     entries = (key for key, term in hammer.terms.items() if isinstance(term, Friction))
     pairs = [[f"{entry}.kinetic", f"{entry}.static"] for entry in entries]
     return [pair for pair in pairs if pair[1] in hammer.constants]
 
 
 def is_place(key: str) -> bool:
-    """Whether a constant of an entry is a position."""
+    """Whether a dotted key denotes the position of a force or contact."""
     return key.partition(".")[0] in TERMS and key.rpartition(".")[2] in ("position", "center")
 
 
 def span_of_term(hammer: Hammer, key: str) -> Range:
-    """Return the range of the control of a constant of a force or contact.
+    """Return the control range of a constant of a force or contact.
 
     Positions vary by half the largest distance between the positions of the hammer, in either direction; a
     contact stays beyond the backstop. Angles vary by a quarter turn about 0, or more if the file states more.
