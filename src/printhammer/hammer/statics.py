@@ -105,7 +105,7 @@ def force_at(x: float, about: tuple[float, Statics]) -> float:
 
 
 def nearest_level(x: float, s: Statics) -> float:
-    """Return the distance [m] from `x` to the nearest other kink of the spring law; infinity without one."""
+    """Return the distance [m] from `x` to the nearest other kink of the spring law, or infinity."""
     nearest = math.inf
     k = 0.0
     level = float(s.spring_level(s.spring, k))
