@@ -363,7 +363,7 @@ def _fire(hammer: Hammer, pulse: Waveform, span: float, tolerance: float) -> _Fi
 def _same_blow(
     hammer: Hammer, pulse: Waveform, wanted: float, longest: _Fired, tolerance: float
 ) -> float | None:
-    """Solve for the pulse width [s] that gives an impact speed [m/s]; None without a solution.
+    """Solve for the pulse width [s] that gives the impact speed `wanted` [m/s]; None without a solution.
 
     The search ends at the flight time of the longest pulse, since current after the impact has no effect.
     """

@@ -138,7 +138,7 @@ def thermal_limit(
 
 
 def read_rates(path: Path) -> dict[str, list[float]]:
-    """Read a file of dot rates for `thermal_limit`: the `COLUMNS`, of which the voltage is optional."""
+    """Read a table of dot rates for `thermal_limit`, with the `COLUMNS`; the voltages are optional."""
     from printhammer.support.tables.readings import read_table
 
     wanted = {name: COLUMNS[name] for name in ("ambient", "rate")}

@@ -1,1 +1,1 @@
-"""Run-to-run calibration of an unmeasured hammer's compensation table, from sensor readings of dots."""
+"""Run-to-run calibration of the compensation table of a hammer with unknown constants, by a sensor."""

@@ -311,7 +311,7 @@ class LearningLaw:
         return Update(found, contraction, verdict, left)
 
     def choose_loop(self, belief: Belief, verdict: Verdict) -> Printing[Verdict]:
-        """Print the line `COMPARED` on posterior samples in each open loop; choose the unit's open loop."""
+        """Simulate the line `COMPARED` on posterior samples in each open loop, and choose an open loop."""
         drawn = self.production.hammers(belief.draw(_ALIKE, self.seed))
         press = self.production.press([each for each in drawn if each is not None])
         others = yield from order_loops(press, self.entries)

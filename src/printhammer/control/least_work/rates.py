@@ -1,4 +1,4 @@
-"""Coil work of bursts of least work as a function of the dot rate."""
+"""Least coil work of a burst as a function of the dot rate."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ NOT_FOUND = "no current found"
 
 
 class LeastWorkRates(Result):
-    """Coil work of bursts of least work by dot rate; NaN where no current was found."""
+    """Least coil work of a burst, by dot rate; NaN where no current was found."""
 
     hammer: Hammer = part("driven hammer")
     rates: FloatArray = coordinate("Hz", "dot rate", "rate", name="rate")

@@ -51,7 +51,7 @@ def entries_of(gaps: int, reach: int) -> int:
 
 
 def plain(history: Sequence[int]) -> History:
-    """Normalise a history: replace every gap that precedes a rest in time by rest."""
+    """Normalise a history: every gap earlier than a rest becomes a rest."""
     known = list(itertools.takewhile(lambda gap: gap != REST, history))
     return (*known, *[REST] * (len(history) - len(known)))
 
@@ -359,7 +359,7 @@ def driven_by(hammer: Hammer, driver: str, largest: float) -> Hammer:
 
 
 def of_force(hammer: Hammer, pulse: Waveform, force: float, low: float, high: float) -> Hammer:
-    """Return the hammer with the pulse width, from `low` to `high` [s], that prints with `force` [N]."""
+    """Return a copy of the hammer with the pulse width, from `low` to `high` [s], that gives `force` [N]."""
     for _ in range(_ROUNDS):
         widths = np.linspace(low, high, _GRID).tolist()
         pulses = [of_width(pulse, width) for width in widths]

@@ -112,7 +112,7 @@ def _is_barred(task: Task, ways: Ways) -> BoolArray:
 
 
 def spaced(periods: FloatArray, spacing: float) -> list[float]:
-    """Return a subset of the periods at least `spacing` apart, including the first and the last."""
+    """Return a subset of the periods that are at least `spacing` apart, including the first and the last."""
     nodes: list[float] = []
     for period in periods.tolist():
         if not nodes or period >= nodes[-1] + spacing or period == float(periods[-1]):
