@@ -161,7 +161,7 @@ def longest_run(motion: Motion, reference_force: float, forces: tuple[float, flo
     """Return the longest run of dots whose relative peak force is within `forces`.
 
     Peak forces are relative to `reference_force` [N]. The first run wins a tie. If no dot is in the range,
-    all touches count as before the run.
+    all backstop touches are counted as touches before the run.
     """
     returns = [contact.t_in for contact in touches(motion)]
     best: list[tuple[int, float, float]] = []

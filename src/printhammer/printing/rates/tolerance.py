@@ -1,4 +1,4 @@
-"""Tolerance yield: the fraction of a production that prints within limits, and its safe rates."""
+"""Tolerance yield: fraction of the units of a production that print within limits, and safe rates."""
 
 from __future__ import annotations
 
