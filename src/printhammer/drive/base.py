@@ -61,7 +61,7 @@ class Drive:
 
     @property
     def overlap(self) -> Overlap:
-        """Rule for overlapping pulses: "add" or "replace"; a driver of a voltage always replaces."""
+        """Rule for overlapping pulses: "add" or "replace"; pulses of a voltage always replace each other."""
         return self._overlap
 
     @property

@@ -144,7 +144,7 @@ def put_on(fields: Any, table: Any, row: int, at: float, upper: float, lower: fl
 
 
 def put_off(fields: Any, table: Any, row: int, at: float) -> int:
-    """Write the off segment of a driver, from time `at` [s] and the end row; return the number of rows."""
+    """Write the off segment of a driver, from time `at` [s], and the end row; return the number of rows."""
     decay = fields[len(fields) - 1]
     against = fields[_DECAY_VOLTAGE]
     if math.isnan(against):
