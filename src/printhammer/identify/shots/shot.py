@@ -354,7 +354,7 @@ def _fit_waveform(
 
 
 def _starts(t: FloatArray, current: FloatArray, values: dict[str, float], top: float) -> list[FloatArray]:
-    """Return the logarithms of two guesses: `values`, and `values` with the record's amplitude and width."""
+    """Return the logarithms of two initial guesses, with amplitude and width from `values` or the record."""
     high = t[np.abs(current) > 0.5 * top]
     recorded = dict(values)
     recorded["amplitude"] = top

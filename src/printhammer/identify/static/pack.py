@@ -139,7 +139,7 @@ _FAR: Final = 1.0
 
 
 class PackLaw:
-    """Equation (5) at measured indentations relative to the thickness of the pack, r, shape (m,).
+    """Pack force, equation (5), at measured indentations r, as fractions of the pack thickness, shape (m,).
 
     p = [S, ln rho of each cycle with unloading rows], followed by the two exponents if they are fitted.
     `thickness` [m] converts an error of the indentation to an error of r.

@@ -67,8 +67,8 @@ def fit_solenoid(
     """Fit the law `reluctance` to a table of one coil with a given number of turns.
 
     `current` [A] applies to all rows of a table without a column of currents. The `CONSTANTS` are fitted for
-    a magnet that pulls toward the paper and is closed at 0; a table over the gap does not determine that
-    position.
+    a magnet that pulls toward the paper and is closed at x = 0; a table over the gap does not determine the
+    position at which the magnet is closed.
     Common options are described with `printhammer.identify.fitting.fit`.
 
     Raises

@@ -21,7 +21,7 @@ _ROWS = 5  # Smallest number of rows for two constants and their errors; arbitra
 
 
 class SpringLaw:
-    """Equation (4) at displacements from the backstop, x - b, m, shape (m,); p = [Bs, As]."""
+    """Spring force, equation (4), at displacements x - b [m] from the backstop, shape (m,); p = [Bs, As]."""
 
     def __init__(self, travel: FloatArray) -> None:
         self.travel = travel
