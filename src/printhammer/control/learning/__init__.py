@@ -1,1 +1,1 @@
-"""Run-to-run calibration of the compensation table of a hammer with unknown constants, by a sensor."""
+"""Run-to-run calibration of the compensation table of a unit with unknown constants, from sensor readings."""

@@ -1,4 +1,4 @@
-"""Least coil work of a burst as a function of the dot rate."""
+"""Coil work of optimised bursts as a function of the dot rate."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ NOT_FOUND = "no current found"
 
 
 class LeastWorkRates(Result):
-    """Least coil work of a burst, by dot rate; NaN where no current was found."""
+    """Coil work of optimised bursts, by dot rate; NaN where no current was found."""
 
     hammer: Hammer = part("driven hammer")
     rates: FloatArray = coordinate("Hz", "dot rate", "rate", name="rate")

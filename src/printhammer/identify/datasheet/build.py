@@ -166,7 +166,7 @@ def forces_of(part: ReluctanceMagnet, sheet: Sheet) -> FloatArray:
 
 
 def inductance_of(part: ReluctanceMagnet, sheet: Sheet) -> float:
-    """Compute the small-current inductance [H] at the gap of the stated inductance, else at the widest gap."""
+    """Compute the small-current inductance [H] at the gap of the stated value, else at the widest gap."""
     gap = float(sheet.gaps.max()) if sheet.inductance is None else sheet.inductance[1]
     return law.magnet_inductance(part.packed(0.0), sheet.closed_at - gap, 0.0)
 
