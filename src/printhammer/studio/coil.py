@@ -91,7 +91,7 @@ def rail_of(hammer: Hammer) -> dict[str, Any] | None:
 
 
 def _inductance(hammer: Hammer) -> float:
-    """Return the inductance [H] with which coil and magnet at rest have the time constant `_LAST`."""
+    """Return the coil inductance [H] for which the time constant at rest is `_LAST` pulse widths."""
     current, width = _pulse(hammer)
     whole = _LAST * width * _RESISTANCE
     wound = hammer.replace("coil", {"resistance": _RESISTANCE, "inductance": whole})

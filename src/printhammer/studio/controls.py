@@ -197,7 +197,7 @@ def opening_of(hammer: Hammer) -> dict[str, Any]:
 
 
 def _slow_opening(waveform: Waveform) -> dict[str, Any]:
-    """Return the initial rates of a device whose pulses would overlap at the rates of print hammers."""
+    """Return the initial rates of a device with long pulses, which overlap at the rates of print hammers."""
     width = getattr(waveform, "width", None) or 0.0
     if width <= _SLOW:
         return {}
@@ -206,7 +206,7 @@ def _slow_opening(waveform: Waveform) -> dict[str, Any]:
 
 
 def equation_of(section: str, part: type[Part] | None) -> str:
-    """Return the equation of the law of a class of parts, or else the first line of its module docstring."""
+    """Return the equation of the law of a part class, or else the first line of its module's docstring."""
     if part is None:
         return EQUATIONS.get(section, "")
     text = import_module(part.__module__).__doc__ or ""

@@ -41,7 +41,7 @@ _ROWS: Final[dict[str, dict[int, _Template]]] = {
     "contact.linear": _CONTACT,
     "contact.hertz": _CONTACT,
 }
-"""Columns of the row of a spring, force or contact that its constants set, by section and law."""
+"""Products that set the columns of the row of a spring, force or contact, by section and law."""
 
 
 def sums_of(hammer: Hammer) -> dict[str, list[tuple[int, list[Product]]]]:

@@ -42,7 +42,8 @@ def studio(
     ),
     only: bool = opt.switch("Leave out the shipped hammers that are not named, for a smaller page."),
     state: str | None = opt.text(
-        "FILE|TEXT", "State to open: a file exported by the studio, or the part of an address after the #."
+        "FILE|TEXT",
+        "Page state to open: a file exported by the studio, or the part of a page address after the #.",
     ),
     browser: bool = opt.switch(
         "Open the page in the default browser.", flag="--open/--no-open", default=True
