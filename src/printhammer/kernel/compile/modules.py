@@ -137,9 +137,9 @@ class WebModule(Module):
         self._label = label
 
     def content(self) -> bytes:
-        """Return the content of the module; announce its compilation, about a minute of computation."""
+        """Return the content of the module; announce its compilation, about half a minute of computation."""
         if not self.is_there():
-            time = "about a minute of processor time"
+            time = "about half a minute of processor time"
             say_once(f"compiling WebAssembly ({self._label}): {time}; once, kept on disk")
         return super().content()
 
