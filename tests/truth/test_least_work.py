@@ -1,6 +1,5 @@
 """The lower bound on the positive work against closed forms, and a burst against the energy balance."""
 
-import itertools
 import math
 
 import numpy as np
@@ -9,6 +8,7 @@ from scipy import optimize
 from tests import hammers
 
 import printhammer as ph
+from printhammer.control.least_work import search
 from printhammer.control.least_work.bound import bound
 from printhammer.control.least_work.slot import CoilForce
 from printhammer.parts.backstop.hertz import HertzBackstop
@@ -81,7 +81,11 @@ def test_force_of_the_coil_is_that_of_the_law() -> None:
 
 
 @pytest.mark.slow
-def test_a_burst_costs_what_the_pack_absorbs_and_no_less_than_the_bound() -> None:
+def test_a_burst_costs_what_the_pack_absorbs_and_no_less_than_the_bound(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # The problem has many local minima: with three starts, rounding decides which of them a search finds.
+    monkeypatch.setattr(search, "_TRIES", 10)
     found = ph.least_work(hammers.crude(), dots=2)
     ledger, work = found.ledger, found.work
     assert found.motion.ok
@@ -100,11 +104,7 @@ def test_a_burst_costs_what_the_pack_absorbs_and_no_less_than_the_bound() -> Non
         for contact, dot in zip(found.contacts, found.motion.dots, strict=True)
     ]
     assert shares == pytest.approx([1.0 - 3.7 / 12.0] * 2, rel=1e-6)
-    assert found.bound_ratio <= found.positive_ratio < 1.5 * found.bound_ratio
-    # The problem has many local minima, and rounding selects: one search of a few nears the bound.
-    alike = (found.hammer.replace({"mass": found.hammer.mass * (1.0 + k)}) for k in (2e-16, -2e-16, 1e-15))
-    searches = itertools.chain([found], (ph.least_work(each, dots=2) for each in alike))
-    assert any(each.positive_ratio < 1.2 * each.bound_ratio for each in searches)
+    assert found.bound_ratio <= found.positive_ratio < 1.2 * found.bound_ratio
     # The same work from a plain sum over a dense output.
     time = np.linspace(0.0, found.motion.end, 200_001)
     x, v = found.motion.at(time)
