@@ -31,10 +31,10 @@ from printhammer.support.arrays import BoolArray
 MAX_CURRENT: Final = 2.0  # Default limit on the coil current of a train, A: the range of the paper's Fig. 2
 
 FORCES: Final = (0.3, 0.95)
-"""Range of peak forces that count, as fractions of the single-pulse force; arbitrary."""
+"""Range of acceptable peak forces, as fractions of the single-pulse force; arbitrary."""
 
 FEWEST: Final = 6
-"""Smallest number of consecutive dots, without a backstop touch, that is buzz printing; arbitrary."""
+"""Smallest number of consecutive dots, without a backstop touch, accepted as buzz printing; arbitrary."""
 
 _PULSES: Final = 9  # Number of pulses of a train, as in the paper
 _PERIODS: Final = 96  # Number of trial periods of trains at a constant rate; arbitrary
@@ -140,7 +140,7 @@ def find_buzz_train(
     fewest : int, optional
         Number of consecutive dots required.
     forces : tuple of float, optional
-        Range of the peak forces that count, as fractions of the single-pulse force.
+        Range of acceptable peak forces, as fractions of the single-pulse force; other dots do not count.
     max_current : float, optional
         Largest sum of the currents of overlapping pulses, A.
 
@@ -212,9 +212,10 @@ def delayed_trains(
     hopeless: Callable[[DotTable, list[int]], BoolArray] | None = None,
     **options: Any,
 ) -> list[tuple[float, ...]]:
-    """Compute firing times [s] of many trains whose firings follow the pack contacts after a delay.
+    """Compute the firing times [s] of many trains that fire at a delay after each pack contact ends.
 
-    Each hammer has its own delay, s; see `delayed_train`. One ensemble per firing simulates all trains.
+    Each hammer has its own entry of `delays` [s]; see `delayed_train`. The trains are extended by one firing
+    at a time, and one ensemble simulates all trains.
 
     `patience` is the longest time [s] to wait after each firing for the end of the pack contact, and `pulses`
     the number of firings of a complete train. The trains start from rest, or from `states`: displacement, m,
@@ -321,7 +322,10 @@ class _Search:
         return self.best is not None and self.best.clear and self.best.count >= self.fewest
 
     def _scan(self, grid: np.ndarray, trial: Callable[[Sequence[float]], list[BuzzTrain]]) -> None:
-        """Simulate a grid of trains; add finer grids around the best trains unless the search is done."""
+        """Simulate the trains of a grid of periods or delays [s]; refine the grid around the best trains.
+
+        `trial` simulates the trains for given grid values. The refinement ends when the search is done.
+        """
         trains = {train.interval: train for train in trial(grid.tolist())}
         step, known = float(grid[1] - grid[0]), set(grid.tolist())
         for _ in range(_ZOOMS):
@@ -350,7 +354,11 @@ class _Search:
         intervals: Sequence[float],
         trains: Sequence[tuple[float, ...]],
     ) -> list[BuzzTrain]:
-        """Simulate trains; return the trains with a dot in the force range and a current within the limit."""
+        """Simulate trains; return the trains with a dot in the force range and a current within the limit.
+
+        `intervals` are the periods or, for the kind "delayed", the delays of the trains, s; `trains` are
+        their firing times, s.
+        """
         self.tried += len(trains)
         judged = []
         for interval, times in zip(intervals, trains, strict=True):

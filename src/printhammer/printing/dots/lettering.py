@@ -31,7 +31,7 @@ from printhammer.support.arrays import BoolArray
 NAME: Final = "nine-wire"
 WIRES: Final = 9  # Number of wires of the built-in font, by definition of the font file
 ADVANCE: Final = 6
-"""Character pitch, by definition of the font: columns from the start of a character to the next start."""
+"""Character pitch of the built-in font: columns from the start of a character to the start of the next."""
 
 _COLUMNS: Final = 5  # Number of columns of a character
 _STEP: Final = 7  # Number of columns from character to character in the text of the font file
@@ -115,7 +115,10 @@ def _opened(path: Path, size: int) -> FreeTypeFont:
 
 @lru_cache(maxsize=16)
 def _load_fitted(path: Path, wires: int, marks: str) -> tuple[FreeTypeFont, int]:
-    """Load the font at the largest size that fits the wires; return font and height above the baseline."""
+    """Load a font at the largest size at which the characters `marks` fit on the wires.
+
+    Return the font, and the number of wires above the baseline.
+    """
     for size in range(_LARGER * wires, 0, -1):
         font = _opened(path, size)
         boxes = [font.getbbox(mark, mode="1", anchor="ls") for mark in marks]

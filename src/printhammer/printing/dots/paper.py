@@ -112,7 +112,10 @@ class Paper(Declared):
         return np.asarray(np.clip(off, -_WIDEST, _WIDEST))
 
     def hammers(self, hammer: Hammer, slots: int, pitch: float) -> tuple[Hammer, ...]:
-        """Return one hammer per slot, with the pack of that slot, for a slot `pitch` [m]."""
+        """Return one hammer for each of `slots` slots, with the pack stiffness and front at that slot.
+
+        `pitch` is the distance between neighbouring slots, m.
+        """
         spread = {"pack.stiffness": self.stiffness, "pack.front": self.front}
         for key, value in spread.items():
             if value and key not in hammer.constants:
@@ -255,7 +258,7 @@ def simulate_pieces(
 
 
 def _merge(first: Contact, then: Contact) -> Contact:
-    """Merge the two records of a contact that extends over two segments."""
+    """Merge the two records of a contact that extends over two segments of a simulation."""
     higher = then if then.depth > first.depth else first
     return replace(
         first,

@@ -113,8 +113,8 @@ def settle(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float
 def undisturbed_rate(hammer: Hammer) -> float:
     """Return a rate [Hz] up to which the armature is exactly at rest at each pulse; 0 without such a rate.
 
-    A device with a rigid backstop and a driver that ends its current is at rest to the last bit some time
-    after a pulse. Pulses further apart than that time give equal dots.
+    With a rigid backstop, and a driver that brings the current to zero, the device is at rest to the last bit
+    some time after a pulse. Pulses further apart than that time give equal dots.
     """
     pulse = pulse_of(hammer, None)
     motion = simulate(hammer, PulseTrain(pulse), duration=2.0 * wait_of(hammer, pulse), points=_SAMPLES)
@@ -157,7 +157,11 @@ def rebounds(motion: Motion, position: float) -> list[Rebound]:
 
 
 def settled_from(away: BoolArray) -> int:
-    """Return the index after the last True of a mask of samples away from rest."""
+    """Return the index of the first sample from which the armature remains at rest.
+
+    `away` is the mask of the samples away from rest. If the last sample is away from rest, the index is the
+    number of samples.
+    """
     places = np.flatnonzero(away)
     return int(places[-1]) + 1 if places.size else 0
 

@@ -78,8 +78,8 @@ def de_bruijn(order: int = SLOTS) -> BoolArray:
 def cycle_with_lead_in(order: int = SLOTS, lead_in: int = LEAD_IN) -> BoolArray:
     """Return one period of the de Bruijn cycle, preceded by the last `lead_in` slots of the cycle.
 
-    The run begins at rest with the lead-in, so that every evaluated slot, from index `lead_in` onward, has
-    the same last `lead_in` slots before it as in an endless cycle.
+    A simulation of the pattern begins at rest with the lead-in. Every evaluated slot, from index `lead_in`
+    onward, is therefore preceded by the same `lead_in` slots as in an endless cycle.
     """
     cycle = de_bruijn(order)
     return np.concatenate([np.resize(cycle[::-1], lead_in)[::-1], cycle])
@@ -91,7 +91,10 @@ def slots_of(pattern: npt.ArrayLike) -> tuple[int, ...]:
 
 
 def slot_times(slots: Sequence[int] | IntArray, rate: float, first: float = FIRST_SLOT) -> FloatArray:
-    """Compute the times of slots [s] from slot indices of any shape and a slot rate [Hz]."""
+    """Compute the times [s] of slots from their indices, of any shape, and the slot rate [Hz].
+
+    `first` is the time of slot 0, s.
+    """
     return first + np.asarray(slots, dtype=np.float64) / rate
 
 

@@ -37,7 +37,10 @@ class Case(NamedTuple):
 
 
 class Trial(Declared):
-    """Dots of all patterns in all cases (hammer and rate); members are ordered by case, then by pattern."""
+    """Dots of all patterns in all cases (hammer and rate).
+
+    The ensemble members, one for each pattern in each case, are ordered by case, then by pattern.
+    """
 
     cases: tuple[Case, ...] = part("hammers and rates")
     patterns: tuple[tuple[int, ...], ...] = part("indices of the slots with a dot")
@@ -117,7 +120,10 @@ def attempt(
 
 
 def fired_of(strategy: Strategy, hammer: Hammer, drive: Drive) -> Waveform:
-    """Return the pulse whose width sets the simulation time: from the strategy, the hammer or the drive."""
+    """Return the pulse whose width determines the simulation time.
+
+    The pulse is the waveform of the strategy, else of the hammer, else the longest waveform of the drive.
+    """
     own = getattr(strategy, "waveform", None)
     return own if isinstance(own, Waveform) else hammer.waveform or longest_of(drive)
 

@@ -68,7 +68,10 @@ def read_pattern(path: str | Path, wires: int | None = None) -> tuple[str, BoolA
 
 
 def pattern_from_toml(text: str, source: str = "pattern") -> tuple[str, BoolArray]:
-    """Parse the text of a pattern file; `source` is the name used in error messages."""
+    """Parse the text of a pattern file; return the name of the pattern and its dots.
+
+    `source` is the name of the file in error messages.
+    """
     try:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -266,7 +269,7 @@ class Pattern(Declared):
         Parameters
         ----------
         path : path
-            The file.
+            Path of the file.
         wires : int, optional
             Number of wires. For a bitmap, 9 by default; a pattern file states its own number, which must
             match.

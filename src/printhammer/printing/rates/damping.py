@@ -141,7 +141,7 @@ _ROUNDS: Final = 5  # Number of refinements; arbitrary
 class DampingStudy(Result):
     """Safe rate and settling of a hammer by backstop and pack material, at equal print force.
 
-    The numbers are NaN unless `status` is "ok" or "current limit".
+    The numbers of a material are NaN unless its `status` is "ok" or "current limit".
     """
 
     hammer: Hammer = part("hammer under study")
@@ -353,10 +353,10 @@ def damping_study(
 
 
 def tuned(hammers: Sequence[Hammer], force: float, effort: Effort) -> FloatArray:
-    """Solve for the amplitude factors with which single pulses print with a given force, N.
+    """Solve for the factors on the waveform amplitudes with which single pulses print with a given force, N.
 
-    The search covers `LEAST` to `MOST` on a grid, then ever finer grids around the crossing where the force
-    first rises through `force`; of several crossings, the crossing nearest to a factor of 1 is refined.
+    The search covers factors from `LEAST` to `MOST` on a grid, then ever finer grids around a crossing where
+    the force rises through `force`; of several crossings, the crossing nearest to a factor of 1 is refined.
     Factors are accurate to 1e-6; NaN where no crossing is bracketed.
     """
     scales = np.tile(np.linspace(LEAST, MOST, _COARSE), (len(hammers), 1))

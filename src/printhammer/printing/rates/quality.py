@@ -69,7 +69,10 @@ class Spread(Declared):
         return self.high - self.low
 
     def said(self, unit: str, single: float | None = None) -> str:
-        """Format mean, deviation and range in a unit, with the single-pulse value for comparison."""
+        """Format mean, standard deviation and peak-to-peak spread in the unit `unit`.
+
+        `single` is the value of the single-pulse dot in SI, which is added for comparison.
+        """
         if not self.count:
             return "–"
         mean, most = (quantity(each, unit, bare=True) for each in (self.mean, self.peak_to_peak))

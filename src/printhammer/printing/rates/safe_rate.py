@@ -305,7 +305,10 @@ def safe_rate(
 
 
 def _row_text(growth: float) -> str:
-    """Describe the multiplier of a row of dots in words."""
+    """Describe in words the multiplier of a row of dots.
+
+    The multiplier, `growth`, is the factor by which a small deviation changes from one dot to the next.
+    """
     more = ": dots alternate, within limits" if growth < -1.0 else ""
     return f"multiplier {growth:+.3f} from dot to dot{more}"
 
@@ -360,7 +363,10 @@ def from_rest(*, every: bool) -> list[tuple[int, ...]]:
 
 
 def _row(runs: Sequence[tuple[Trial, int]], *, long: bool) -> dict[str, Any]:
-    """Compute the columns of `SafeRate` at one slot rate from the trials at that rate."""
+    """Compute the columns of `SafeRate` at one slot rate from the trials at that rate.
+
+    `runs` pairs each trial with the index of its case; `long` states whether long patterns were simulated.
+    """
 
     def joined(name: str) -> npt.NDArray[Any]:
         return np.concatenate(
@@ -383,9 +389,9 @@ def _row(runs: Sequence[tuple[Trial, int]], *, long: bool) -> dict[str, Any]:
 
 
 def _failure(trial: Trial, case: int, *, long: bool) -> Failure:
-    """Return the failure in the earliest slot of all patterns; the first pattern wins a tie.
+    """Return the failure in the earliest slot of all patterns in a case; the first pattern wins a tie.
 
-    For long patterns, only the first pattern that does not pass is searched.
+    In a trial of the long patterns (`long`), only the first pattern that does not pass is searched.
     """
     rows, judgement = trial.rows(case), trial.judgement
     faults, slots = judgement.faults[rows], trial.slots[rows]

@@ -123,8 +123,8 @@ def changed(
 ) -> tuple[list[Hammer], list[str]]:
     """Return modified hammers and the status of each: "ok", "no hammer" or "does not rest".
 
-    Each change is a mapping as for `Hammer.replace`, with its source. Without changes, or if the constants
-    are invalid ("no hammer"), the entry is the hammer itself.
+    Each of `changes` is a pair: new values of constants and their source, both as for `Hammer.replace`. For
+    an empty mapping, or if the constants are invalid ("no hammer"), the entry is the hammer itself.
     """
     made, status = [], []
     for change, source in changes:
@@ -239,7 +239,10 @@ class Variability(Declared):
         return [drawn for _row, drawn in self.draw_rows(hammer, count, seed)]
 
     def draw_rows(self, hammer: Hammer, count: int, seed: int) -> list[tuple[FloatArray, Hammer]]:
-        """Draw hammers like `draw`; return each hammer with its deviations, in standard deviations."""
+        """Draw hammers like `draw`; return (deviations, hammer) pairs.
+
+        The deviations of the constants are in standard deviations, in the order of `constants`.
+        """
         rng = np.random.default_rng(seed)
         drawn: list[tuple[FloatArray, Hammer]] = []
         for _ in range(_TRIES):
@@ -259,7 +262,10 @@ class Variability(Declared):
         )
 
     def sigma_points(self, hammer: Hammer) -> list[Hammer]:
-        """Return the sigma points: hammers with one constant shifted by plus or minus its deviation."""
+        """Return the sigma points: hammers with one constant shifted by plus or minus its standard deviation.
+
+        Sigma points that are invalid or do not rest at the backstop are omitted.
+        """
         own = np.eye(len(self.constants(hammer)))
         points = self.hammers(hammer, np.concatenate([own, -own]))
         return [point for point in points if point is not None]

@@ -31,7 +31,7 @@ _EQUAL: Final = 1e-6
 
 
 def words_of(patterns: Iterable[Sequence[int]], gap: int) -> list[tuple[int, ...]]:
-    """Split patterns at gaps of `gap` slots or more; return the distinct words, each from slot 0."""
+    """Split patterns at gaps of `gap` slots or more; return distinct words, shifted to begin at slot 0."""
     words = set()
     for slots in patterns:
         ends = [k + 1 for k, (a, b) in enumerate(itertools.pairwise(slots)) if b - a >= gap]
@@ -64,8 +64,8 @@ def attempt_words(
     Returns
     -------
     tuple or None
-        The trial, and the number of leading cases in which every dot of the patterns is within limits.
-        None if the patterns are not split, since dots affect each other over too many slots.
+        The trial, and the number of leading cases for which the words show that every dot of the patterns is
+        within limits. None if the patterns are not split, since dots affect each other over too many slots.
     """
     if not undisturbed > 0.0:
         return None
@@ -112,5 +112,8 @@ def _shortened(word: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def _are_equal(values: FloatArray) -> BoolArray:
-    """Whether all values of a row equal its first value within `_EQUAL`; False for a row with NaN."""
+    """Whether all values of a row equal the first value of the row, for each row of an array.
+
+    The relative tolerance is `_EQUAL`; a row with NaN gives False.
+    """
     return np.asarray(np.isclose(values, values[:, :1], rtol=_EQUAL, atol=0.0).all(axis=1))
