@@ -135,7 +135,10 @@ def contacts_of(rows: FloatArray) -> list[Contact]:
 
 
 def dots_of(problem: Problem, record: Record, rows: FloatArray, increments: FloatArray) -> list[Dot]:
-    """Build the dots of all firings of a run, lost dots included, from the rows of `contact_rows`."""
+    """Build the dots of all firings of a run, lost dots included, from the rows of `contact_rows`.
+
+    `increments` is the result of `printhammer.run.energy.increments_of`.
+    """
     count = len(rows)
     works, starts, ends = np.zeros((3, count))
     steps = np.zeros(count, np.int64)
@@ -353,7 +356,10 @@ def _closings(name: str, contact: LinearContact, problem: Problem, record: Recor
 def _force_and_loss(
     contact: LinearContact, problem: Problem, record: Record, times: FloatArray
 ) -> tuple[float, float]:
-    """Return the largest force [N] and the loss [J] of a closing; `times` are the times [s] of its nodes."""
+    """Return the largest contact force [N] and the dissipated energy [J] of a closing.
+
+    `times` are the times [s] of the integration nodes from the start to the end of the closing.
+    """
     starts, lengths = times[:-1, np.newaxis], np.diff(times)[:, np.newaxis]
     points, weights = np.polynomial.legendre.leggauss(_POINTS)
     places, shares = np.tile(0.5 * (points + 1.0), (len(starts), 1)), np.tile(0.5 * weights, (len(starts), 1))
@@ -363,7 +369,7 @@ def _force_and_loss(
         shares[-1], places[-1] = 2.0 * places[-1] * shares[-1], 1.0 - places[-1] ** 2
 
     def motion(at: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Compute indentations [m] and their rates [m/s] at given times [s]."""
+        """Compute the indentation [m] of the contact and its time derivative [m/s] at given times [s]."""
         states = problem.resample(record, at)
         return np.maximum(contact.sign * (states[:, 0] - contact.position), 0.0), contact.sign * states[:, 1]
 
@@ -378,10 +384,11 @@ def _force_and_loss(
 
 
 def _closed_steps(inside: FloatArray, inward: FloatArray) -> BoolArray:
-    """Return a mask of the steps with closed contact, from indentation and inward velocity at the nodes.
+    """Return a mask of the integration steps during which a contact is closed.
 
-    No step crosses the position of the contact. In a step that begins and ends at this position, the contact
-    is closed if the initial velocity points inward.
+    `inside` is the indentation [m] and `inward` the velocity [m/s] into the contact at the nodes. No step
+    crosses the position of the contact. In a step that begins and ends at this position, the contact is
+    closed if the initial velocity points inward.
     """
     first, last = inside[:-1], inside[1:]
     there = (first == 0.0) & (last == 0.0)
@@ -389,7 +396,7 @@ def _closed_steps(inside: FloatArray, inward: FloatArray) -> BoolArray:
 
 
 def named(row: Dot | Contact) -> dict[str, Any]:
-    """Return a dot or contact as a dictionary with names such as "flight_time_s"."""
+    """Return a dot or contact as a dictionary whose keys contain the units, such as "flight_time_s"."""
     units = {name: note.unit for name, note in columns_of(type(row)).items()}
     return {
         f"{key}_{units[key].replace('/', '_per_')}" if units[key] else key: value

@@ -101,7 +101,10 @@ class Effort:
             self.progress(done, total)
 
     def mapped(self, function: Callable[[A], B], items: Sequence[A], *, length: int | None = None) -> list[B]:
-        """Map a function over items in threads; see `printhammer.support.threads.mapped`."""
+        """Map a function over items in threads, in chunks of `length` items; return the values in order.
+
+        See `printhammer.support.threads.mapped`.
+        """
         return mapped(function, items, self.threads, self.progress, length=length)
 
 
@@ -168,7 +171,7 @@ def computation(function: F) -> F:
 
 
 def _with_entries(text: str, names: Sequence[str]) -> str:
-    """Return a docstring with missing parameter entries added at the end of its Parameters."""
+    """Return a docstring whose Parameters section has entries for all keywords `names`."""
     text = inspect.cleandoc(text)
     ends = [text.find(head) for head in ("\nprogress : ", "\n**firing\n", "\n\nReturns\n-", "\n\nRaises\n-")]
     end = min((place for place in ends if place >= 0), default=len(text))

@@ -104,7 +104,10 @@ def _gauss(drive: Drive, ends: FloatArray) -> float:
 
 
 def _stretches(problem: Problem, record: Record) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Split steps where the coil power changes sign; return index, start and end [s] of the pieces."""
+    """Split integration steps where the coil power changes sign.
+
+    Return three arrays with one entry for each piece: index of the step, start [s] and end [s].
+    """
     begins, finishes = record.nodes[:-1, 0], record.nodes[1:, 0]
     rows = np.flatnonzero(finishes > begins)
     begins, finishes = begins[rows], finishes[rows]
@@ -178,10 +181,11 @@ class Ledger(Declared):
 
 
 def increments_of(problem: Problem, record: Record) -> FloatArray:
-    """Integrate work (coil, drive) and losses (pack, backstop, damping) over each step, J.
+    """Integrate powers over each step of a run; return the energies [J], shape (steps, 5).
 
-    Under a voltage drive, further columns contain the supply work and the losses in coil, driver and shorted
-    turn.
+    The columns are the work of the coil, the work of the drive, and the losses in pack, backstop and damping.
+    Under a voltage drive, four more columns contain the work of the supply, and the losses in coil, driver
+    and shorted turn.
     """
     times = record.nodes[:, 0]
     return problem.quadratures(record, np.arange(len(times) - 1), times[:-1], times[1:])
@@ -203,10 +207,10 @@ def stored_energy(hammer: Hammer, x: float) -> float:
 
 
 def field_energy(problem: Problem, record: Record, row: int) -> float:
-    """Return the magnetic energy due to the current, plus the capacitor's energy, at a node, J.
+    """Return the magnetic energy due to the current, plus the energy of the supply's capacitor, J.
 
-    With the flux linkage lambda(i), the field energy is i lambda minus the integral of lambda over the
-    current from 0 to i, computed by Gauss quadrature.
+    The energies are those at the node `row` of the record. With the flux linkage lambda(i), the field energy
+    is i lambda minus the integral of lambda over the current from 0 to i, computed by Gauss quadrature.
     """
     hammer = problem.hammer
     constants = problem.constants

@@ -86,7 +86,11 @@ class Strobes(Result):
 
     @property
     def electric(self) -> FloatArray | None:
-        """Currents [A], and capacitor voltage [V], shape (members, strobes, 3); None without a circuit."""
+        """Electric state, shape (members, strobes, 3); None unless a voltage drives a member.
+
+        The last axis contains the current in the coil [A], the current in the shorted turn [A], and the
+        voltage of the supply's capacitor [V].
+        """
         parts = [part for part in (self.current, self.turn, self.reservoir) if part is not None]
         return np.stack(parts, axis=2) if parts else None
 
@@ -287,7 +291,7 @@ class Ensemble:
 
     @cached_property
     def _own_hammers(self) -> tuple[list[Hammer], IntArray]:
-        """Distinct hammer objects, and the index of each member's hammer."""
+        """Distinct hammer objects, and for each member the index of its hammer among them."""
         known = {id(hammer): hammer for hammer in self.hammers}
         places = {key: place for place, key in enumerate(known)}
         which = [places[id(hammer)] for hammer in self.hammers]
@@ -450,7 +454,10 @@ def _integrate(jobs: Sequence[Job], engine: Engine, threads: int, progress: Prog
 
 
 def _check_kind(name: str, members: Sequence[Any], kind: type, expected: str) -> None:
-    """Raise InputError for the first element that is not an instance of `kind`."""
+    """Raise InputError for the first element of `members` that is not an instance of `kind`.
+
+    `name` is the argument and `expected` the expectation in the error message.
+    """
     for member in members:
         if not isinstance(member, kind):
             raise InputError.of(name, member, expected)

@@ -131,7 +131,7 @@ class Group:
 
 
 class _Posed(NamedTuple):
-    """Distinct initial-value problems of the members; `by` is the row of each member's problem."""
+    """Distinct initial-value problems, one per row; `by` is, for each member, the row of its problem."""
 
     constants: FloatArray
     controls: FloatArray
@@ -192,7 +192,12 @@ def _scales(
     first_drive: Drive,
     states: FloatArray,
 ) -> tuple[list[tuple[float, float]], IntArray]:
-    """Return the distinct scales (m, m/s) of members of one hammer, and the index for each member."""
+    """Return the distinct scales of members with one hammer, and for each member the index of its scales.
+
+    The scales are a typical displacement [m] and speed [m/s]. `own` are the indices of these members in the
+    ensemble; `fired` and `states` contain the drives and initial states of all members of the ensemble.
+    `static` is the static force of the hammer, and `first_drive` the drive of the first of these members.
+    """
     x, v = states[own, 1], states[own, 2]
     if hammer.position is None or hammer.front is None:
         periods = [math.nan if (period := fired.drives[i].period) is None else period for i in own]
@@ -267,7 +272,7 @@ class Job:
         return self._rows(self.kept.dot_starts[:-1] + self.group.firings.counts, self.kept.extra)
 
     def _rows(self, begins: IntArray, counts: IntArray) -> Ragged:
-        """Select the recorded rows of each member, from start indices and counts."""
+        """Return recorded rows: for each member, `counts` rows from the index `begins` onward."""
         starts = starts_of(counts)
         places = np.arange(starts[-1]) + np.repeat(begins - starts[:-1], counts)
         return Ragged(self.kept.dots[places], starts)
@@ -292,9 +297,10 @@ class Job:
         return True
 
     def share_out(self, threads: int) -> int:
-        """Distribute neighbouring members over units of work; return the number of members per unit.
+        """Reorder the members so that neighbours are in different units of work; return the unit size.
 
-        Neighbouring members have similar computation times, so units of mixed members are balanced.
+        Neighbouring members have similar computation times, so the units need about the same time. The size
+        is the number of members per unit.
         """
         count = self.order.size
         pieces = threads * max(1, round(count / (_PIECE * threads)))
@@ -302,18 +308,21 @@ class Job:
         return -(-count // pieces)
 
     def prepare(self, lanes: bool) -> None:
-        """Load the machine code of the kernel in this thread, before worker threads call the kernel."""
+        """Load the machine code of the kernel in this thread, before worker threads call the kernel.
+
+        The kernel is the vector-lane kernel if `lanes`, else the kernel for single members.
+        """
         if lanes:
             self.lane_piece(0, 0)
         else:
             self._one_by_one(self.order[:0], prepare=True)
 
     def piece(self, first: int, last: int) -> None:
-        """Integrate members of the group one by one, in this thread."""
+        """Integrate members `first` to `last` - 1 of the order of work one by one, in this thread."""
         self._one_by_one(self.order[first:last])
 
     def lane_piece(self, first: int, last: int) -> None:
-        """Integrate members of the group in vector lanes, in this thread."""
+        """Integrate members `first` to `last` - 1 of the order of work in vector lanes, in this thread."""
         group = self.group
         which = self.order[first:last]
         left_over = np.empty(which.size, np.int64)

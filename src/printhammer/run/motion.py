@@ -245,17 +245,17 @@ class Motion(Result, fields=False):
         return table
 
     def at(self, t: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return displacement [m] and velocity [m/s] at times of the run, s; after a jump at its instant."""
+        """Return displacement [m] and velocity [m/s] at times `t` [s]; at a rigid impact, those after it."""
         table = self._resampled(t)
         return table[:, 0], table[:, 1]
 
     def state_at(self, t: float) -> tuple[float, ...]:
         """Return the state at a time [s] of the run, from which another run can start: see `simulate`.
 
-        Displacement [m], velocity [m/s], branch of the pack (-1 outside the pack) and memory [m]; under a
-        voltage also the currents in the coil and in its shorted turn [A], and the voltage of the supply's
-        capacitor [V]. A new run that starts from the state at a firing, and begins with that firing,
-        continues the motion, unless a pulse of an earlier firing is still active.
+        The components are displacement [m], velocity [m/s], branch of the pack law (-1 outside the pack) and
+        memory of the pack [m]; under a voltage also the currents in coil and shorted turn [A], and the
+        voltage of the supply's capacitor [V]. A new run that starts from the state at a firing, and begins
+        with that firing, continues the motion, unless a pulse of an earlier firing is still active.
 
         Raises
         ------
@@ -289,7 +289,7 @@ class Motion(Result, fields=False):
 
     @cached_property
     def contacts(self) -> Rows[Contact]:
-        """All contacts in order of touch, with any contact open at the start; a tuple, shown as a table."""
+        """All contacts in order of touch time, also any present at the start; a tuple, shown as a table."""
         return Rows(contacts_of(self._contact_rows), Contact)
 
     @cached_property
@@ -454,19 +454,19 @@ class Motion(Result, fields=False):
         }
 
     def to_xarray(self) -> xr.Dataset:
-        """Return the output grid as a Dataset along `t`, with units and provenance in the attributes."""
+        """Return the motion on the output grid as a Dataset along `t`, with units and provenance."""
         return self.to_dataset()
 
     def to_pandas(self) -> pd.DataFrame:
-        """Return the output grid as a table, units in the column names."""
+        """Return the motion on the output grid as a DataFrame, with units in the column names."""
         return self.to_dataframe()
 
     def to_csv(self, path: str | Path) -> None:
-        """Write the output grid as CSV: provenance in lines ``# key: value``, units in the heading."""
+        """Write the motion on the output grid as CSV; ``# key: value`` lines contain the provenance."""
         write_csv(self.to_pandas(), path)
 
     def to_parquet(self, path: str | Path) -> None:
-        """Write the output grid as Parquet with provenance; needs the extra `tables`."""
+        """Write the motion on the output grid as Parquet with provenance; needs the extra `tables`."""
         write_parquet(self.to_pandas(), path)
 
     def write(self, path: Path) -> None:

@@ -75,7 +75,10 @@ class Record(Declared):
 
 
 class Stretch(Declared):
-    """Section of a record, up to a pause or the end of the run; the next stretch overwrites its arrays."""
+    """Consecutive nodes and contacts of a run, up to a pause or the end of the run.
+
+    The next stretch of the run overwrites the arrays.
+    """
 
     status: int = part("code of the status; PAUSED for every stretch except the last")
     nodes: FloatArray = part(
@@ -240,7 +243,8 @@ class Problem:
     def started(self, state: tuple[float, float], start: float) -> Problem:
         """Return a problem of the same hammer and drive that starts at another state and time.
 
-        The state is outside the pack, and without current.
+        `state` is the displacement [m], which must be outside the pack, and the velocity [m/s] at the time
+        `start` [s]; the coil current is zero at this time.
         """
         made = copy(self)
         made.state, made.start, made.beyond = state, start, AT_REST
@@ -315,7 +319,11 @@ class Problem:
         contacts: FloatArray,
         state: FloatArray,
     ) -> tuple[int, int, int, int]:
-        """Integrate to time `end` [s] or to a pause, from the start or from `state`."""
+        """Integrate to time `end` [s] or to a pause, from the kernel's carry array `state`.
+
+        The arrays `nodes`, `contacts` and `state` are overwritten. Return the status, the numbers of nodes
+        and contacts of the record, and the number of steps.
+        """
         status, used, touched, steps = self.kernel.run(
             (drive, self.constants, self.control, self.bounds, max_steps),
             float(end),
@@ -353,7 +361,7 @@ class Problem:
                 contacts[0] = contacts[touched - 1]
 
     def resample(self, record: Record, times: FloatArray) -> FloatArray:
-        """Return states and forces at ascending times [s], shape (times, `columns`), from the kernel."""
+        """Evaluate states and forces at ascending times [s] with the kernel; shape (times, `columns`)."""
         out = np.empty((times.size, self.columns))
         self.kernel.resample(times, record.nodes, self.drive_arrays(), self.constants, out)
         return out
@@ -365,7 +373,11 @@ class Problem:
         return out
 
     def quadratures(self, record: Record, steps: Any, starts: FloatArray, ends: FloatArray) -> FloatArray:
-        """Integrate work (coil, drive), losses (pack, backstop, damping) over intervals, J, shape (n, 5)."""
+        """Integrate powers over intervals; return the energies [J], shape (n, 5).
+
+        Each interval, from `starts` to `ends` [s], lies in the integration step with the index in `steps`.
+        For the columns, and four more under a voltage drive, see `printhammer.run.energy.increments_of`.
+        """
         out = np.empty((len(steps), 9 if self.laws.circuit else 5))
         self.kernel.quadratures(
             np.ascontiguousarray(steps, np.int64),

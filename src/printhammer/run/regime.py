@@ -376,7 +376,7 @@ def waveform_of(hammer: Hammer, waveform: Waveform | None) -> Waveform:
 
 
 def read_phase(phase: float) -> float:
-    """Parse a phase, a fraction of the period."""
+    """Check that a phase is a fraction of the period in [0, 1), and return the phase."""
     part = read_number(phase, "1", "phase")
     if not 0.0 <= part < 1.0:
         raise InputError.of("phase", phase, "a fraction of the period from 0 up to but not including 1")

@@ -102,9 +102,10 @@ class SchemeProblem(Problem):
     def strobed(
         self, moments: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray, str]:
-        """Return time, displacement, velocity, mode and memory at given times [s] and the status.
+        """Return the states at given times [s], and the status of the run.
 
-        After a failure of the scheme, these values are NaN, and the mode is -1.
+        The result contains, in this order: time [s], displacement [m], velocity [m/s], mode of motion, memory
+        of the pack [m], and status. After a failure of the scheme, the values are NaN and the modes -1.
         """
         run = self.integrate(float(moments[-1]), moments)
         t, x, v, memory = np.full((4, moments.size), np.nan)
@@ -148,7 +149,11 @@ class SchemeProblem(Problem):
         return nodes
 
     def resample(self, record: Record, times: FloatArray) -> FloatArray:
-        """Return states and forces, shape (n, 9), at ascending times, s."""
+        """Return states and forces at ascending times [s], shape (n, 10).
+
+        The columns are, in this order: displacement [m], velocity [m/s], value of the drive [A or N], the six
+        forces of `_forces` [N], and the mode of motion.
+        """
         nodes = record.nodes
         step = np.clip(np.searchsorted(nodes[:, 0], times, side="right") - 1, 0, max(len(nodes) - 2, 0))
         end = np.minimum(step + 1, len(nodes) - 1)
@@ -168,7 +173,12 @@ class SchemeProblem(Problem):
         return np.ascontiguousarray(table)
 
     def _forces(self, x: float, v: float, value: float, mode: float, peak: float) -> tuple[float, ...]:
-        """Return magnet, spring and pack force, elastic and viscous backstop force, and 0 for damping, N."""
+        """Return the forces on the armature, N.
+
+        The forces are, in this order: magnet, spring, pack, elastic part of the backstop, viscous part of the
+        backstop, and 0 for damping. `value` is the value of the drive [A or N], `mode` the mode of motion,
+        and `peak` the largest displacement in the present contact with the pack [m].
+        """
         packed = self._packed
         position, front = self.hammer.position, self.hammer.front
         current = 0.0 if self.laws.force_drive else value
@@ -187,7 +197,11 @@ class SchemeProblem(Problem):
         return magnet, self._law("spring_force")(packed["spring"], x), pack, elastic, viscous, 0.0
 
     def peaks(self, record: Record) -> FloatArray:
-        """Return time [s], depth [m] and force [N] at the deepest step end of each contact, shape (m, 3)."""
+        """Return time [s], depth [m] and force [N] of the peak of each contact, shape (m, 3).
+
+        Time and depth are those of the step end with the largest depth; the force is the largest at any step
+        end of the contact.
+        """
         nodes = record.nodes
         out = np.zeros((len(record.contacts), 3))
         table = self.resample(record, nodes[:, 0])
@@ -211,7 +225,10 @@ class SchemeProblem(Problem):
         starts: FloatArray,
         ends: FloatArray,
     ) -> FloatArray:
-        """Integrate work (coil, drive), losses (pack, backstop, damping) over intervals, J, shape (n, 5)."""
+        """Integrate powers over intervals from `starts` to `ends` [s]; return the energies [J], shape (n, 5).
+
+        For the columns see `printhammer.run.energy.increments_of`.
+        """
         points, weights = _GAUSS
         half = 0.5 * (np.asarray(ends) - np.asarray(starts))
         times = (np.asarray(starts) + half)[:, None] + half[:, None] * points

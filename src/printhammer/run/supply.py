@@ -93,7 +93,7 @@ def inductance(hammer: Hammer, x: float, current: float) -> float:
 
 
 def emf(hammer: Hammer, x: float, current: float) -> float:
-    """Return the derivative of the main-path flux linkage with respect to displacement, Wb/m."""
+    """Return the back-EMF per velocity: the derivative of main-path flux linkage by displacement, Wb/m."""
     if hammer.magnet is None or not winding_of(hammer).back_emf:
         return 0.0
     law = _law(hammer, "magnet_emf")

@@ -84,7 +84,7 @@ def windows_of(
 
 
 def longest_waveforms(drives: Sequence[Drive]) -> list[Waveform]:
-    """Return the waveform with the longest duration of each drive."""
+    """Return, for each drive, its waveform with the longest duration."""
     if isinstance(drives, PulseTrains):
         return [drives.pulses[number].waveform for number in drives.pulse_of.tolist()]
     return [longest_of(drive) for drive in drives]

@@ -155,7 +155,10 @@ def has_flight(hammer: Hammer) -> bool:
 
 
 def _reach(hammer: Hammer, nodes: FloatArray, way: float) -> float:
-    """Return the largest distance from rest in a record, m; `way` is the typical displacement, m."""
+    """Return the largest distance of the armature from its rest position at the nodes of a record, m.
+
+    The result is at least a small fraction of `way`, the typical displacement, m.
+    """
     return max(float(np.abs(nodes[:, 1] - hammer.rest).max()), _LEAST_REACH * way)
 
 
@@ -172,7 +175,10 @@ def _single(hammer: Hammer, drive: Drive, end: float) -> Single:
 
 
 def is_enough(hammer: Hammer, seen: Single, wait: float) -> bool:
-    """Whether a window spans `FLIGHTS` flight times and ends with the armature at rest."""
+    """Whether a window spans `FLIGHTS` flight times and ends with the armature at rest.
+
+    `seen` is the outcome of a single pulse at the end of the window `wait` [s].
+    """
     rest, front = hammer.rest, hammer.front
     if not math.isnan(seen.reach):
         front = rest + seen.reach
@@ -211,7 +217,7 @@ def unsettled(problem: Problem, record: Record) -> str:
 
 
 def moves_on(hammer: Hammer, nodes: FloatArray) -> bool:
-    """Whether an armature away from rest still moves at the end of a record: a longer run may help."""
+    """Whether the armature still moves at the end of a record, so that it may settle in a longer run."""
     (start, *_), (end, x, v, *_) = nodes[0], nodes[-1]
     return bool(abs(v) * (end - start) > _STILL * abs(x - hammer.rest))
 
@@ -219,7 +225,8 @@ def moves_on(hammer: Hammer, nodes: FloatArray) -> bool:
 def stays_away(hammer: Hammer, waveform: Waveform | None = None) -> str:
     """Describe in one sentence an armature that is away from rest after a single pulse; empty if at rest.
 
-    The default is the hammer's waveform. The state is that at the end of the window of the device.
+    The pulse is by default the hammer's waveform. The sentence describes the state at the end of the window
+    of the device.
     """
     pulse = hammer.waveform if waveform is None else waveform
     if pulse is None or not has_window(hammer, pulse) or not has_flight(hammer):
@@ -237,7 +244,7 @@ def stays_away(hammer: Hammer, waveform: Waveform | None = None) -> str:
 
 
 def is_held(mode: float) -> bool:
-    """Whether a mode, by its code in `printhammer.kernel.model.modes`, is held by dry friction."""
+    """Whether dry friction holds the armature, by the mode code (`printhammer.kernel.model.modes`)."""
     return HELD < mode <= HELD_FREE
 
 

@@ -91,8 +91,8 @@ def numbers_of(hammer: Hammer) -> Numbers:
     """Return the constants of a hammer as input arrays of the entry points `constants` and `rest`.
 
     The arrays are `body`, one array for each part, named after its role, and `limits`, whose first two
-    elements are an output of `constants`. When the user changes a constant, the page replaces every element
-    with the key of that constant; the positions of backstop and front occur twice.
+    elements are computed by the entry point `constants`. When the user changes a constant, the page replaces
+    every element with the key of that constant; the positions of backstop and front occur twice.
     """
     place, front = hammer.position, hammer.front
     missing = math.nan

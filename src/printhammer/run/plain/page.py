@@ -77,7 +77,7 @@ CURRENT, FORCE, VOLTAGE = 0.0, 1.0, 2.0
 """Codes of the driven quantity."""
 
 FITS, WEAK_HOLD, FALLING_LINKAGE = range(3)
-"""Outcomes of `supply`: valid; hold current out of reach; flux linkage that does not increase."""
+"""Outcomes of `supply`: valid; hold current out of reach; flux linkage does not increase with current."""
 
 
 def fill_constants(
@@ -127,8 +127,9 @@ def fill_constants(
 def statics_at(constants: Any, limits: Any) -> Statics:
     """Build the functions and constants of the static force from the constants of a hammer.
 
-    `limits` are the range of the law of the magnet, m, the position of the platen and the thickness of the
-    pack, m, NaN if missing, and the mass, kg.
+    `limits` contains, in this order: the smallest and the largest displacement for which the laws of magnet
+    and spring are valid [m]; the position of the platen [m], NaN without a platen; the thickness of the pack
+    [m], NaN if not stated; and the mass [kg].
     """
     rigid, rigid_front, memory, has_magnet = False, False, False, False
     if RIGID:
@@ -176,10 +177,8 @@ def find_rest(constants: Any, limits: Any, grid: Any, points: Any, found: Any, o
         Constants of the hammer.
     limits : float64 array, shape (5,)
         See `statics_at`.
-    grid : float64 array, shape (8192,)
-    points : float64 array, shape (2, 24576)
-    found : float64 array, shape (24576, 3)
-        Working space.
+    grid, points, found : float64 arrays, shapes (8192,), (2, 24576) and (24576, 3)
+        Working space, whose contents are overwritten.
     out : float64 array, shape (2,)
         Rest position [m]; for a refusal, the numbers in its message.
 
@@ -220,8 +219,9 @@ def fill_supply(constants: Any, limits: Any, about: Any, out: Any) -> int:
     about : float64 array, shape (14,)
         Numbers about the pulse; see `printhammer.drive.tables.pulse`.
     out : float64 array, shape (4,)
-        For a weak hold: hold current and largest current [A], voltage [V], resistance, ohm. For a falling
-        linkage: inductance of the coil and least inductance, H, displacement, m.
+        Numbers in the message of a refusal. `WEAK_HOLD`: hold current [A], largest current that the voltage
+        sustains [A], voltage [V] and resistance [ohm]. `FALLING_LINKAGE`: inductance of the coil [H],
+        inductance that it has to exceed [H], and displacement [m].
 
     Returns
     -------
@@ -263,7 +263,7 @@ def fill_scales(
     tolerance: float,
     out: Any,
 ) -> None:
-    """Write the step-size control and the bounds of a run.
+    """Compute the step-size control of a run and the bounds of its displacement.
 
     Parameters
     ----------
@@ -279,8 +279,9 @@ def fill_scales(
     tolerance : float
         Tolerance of the run.
     out : float64 array, shape (8,)
-        Control: scales, m and m/s, and tolerances of the two error estimates. Bounds: range of the law of the
-        magnet, origin, and distance of a runaway, m.
+        In this order: typical displacement [m] and speed [m/s]; tolerances of the two error estimates; lower
+        and upper end of the displacement range of the laws [m]; origin [m]; and distance from the origin
+        beyond which the motion is a runaway [m].
     """
     s = statics_at(constants, limits)
     current, push = largest, 0.0
@@ -294,9 +295,11 @@ def fill_scales(
 
 
 def begin_window(about: Any, rest: float, front: float, out: Any) -> int:
-    """Write the smallest window of a device, s; return whether a single pulse has to confirm the window.
+    """Write the smallest window [s], from the last firing to the end of a run, to the array `out`.
 
-    `about` are the numbers about the pulse, `rest` and `front` positions [m]; `front` is NaN without a pack.
+    Return whether a single pulse has to confirm that the window is long enough. `about` are the numbers about
+    the pulse (`printhammer.drive.tables.pulse`), `rest` is the rest position [m], and `front` the front of
+    the pack [m], NaN without a pack.
     """
     support = about[tables.SUPPORT]
     out[0] = least_window(support, about[tables.REPLACES] != 0.0)
@@ -313,9 +316,10 @@ def judge_window(status: int, contacts: Any, nodes: Any, places: Any, wait: floa
     contacts, nodes : float64 arrays
         Record of the run; see `printhammer.kernel.single.record`.
     places : float64 array, shape (5,)
-        Rest position and front of the pack, m; scales of the run, m and m/s; smallest window, s.
+        In this order: rest position of the armature [m], front of the pack [m], typical displacement [m],
+        typical speed [m/s], and smallest window [s].
     wait : float
-        Window, s: the end of the run.
+        Window to check, which is the end time of the run, s.
     out : float64 array, shape (1,)
         Flight time of the single pulse, s; NaN without a dot.
     """

@@ -60,13 +60,16 @@ PART: Final = 1.0 / 6.0
 
 
 def is_the_paper(position: float, front: float) -> bool:
-    """Whether backstop and pack have the positions stated in Hendriks (1983), m; NaN for a missing part."""
+    """Whether backstop position and pack front [m] are those of Hendriks (1983); False if either is NaN."""
     near = abs(position - PAPER_BACKSTOP) <= SAME * max(abs(position), PAPER_BACKSTOP)
     return near and abs(front - PAPER_FRONT) <= SAME * max(abs(front), PAPER_FRONT)
 
 
 def part_of_window(position: float, front: float) -> float:
-    """Return the half-widths of the strobe window as a fraction of the scales of a hammer."""
+    """Return the ratio of the half-widths of the strobe window to the scales of a hammer.
+
+    The scales are a typical displacement and speed; the ratio is 1 without a backstop or without a pack.
+    """
     return 1.0 if math.isnan(position) or math.isnan(front) else PART
 
 
@@ -121,7 +124,9 @@ def sustained_current(
 ) -> tuple[float, float]:
     """Return the currents [A] that a voltage can sustain in a coil with and without the limit of a chopper.
 
-    `upper` is the current at which the chopper switches off, A, NaN without a chopper.
+    `series` is the resistance of the supply in series with the coil, ohm; `upper` is the current at which the
+    chopper switches off, A, NaN without a chopper. Without resistance, the current is the current reached
+    within the time `support` [s] of the pulse, but at most `SHORT`, at the displacement `origin` [m].
     """
     resistance = coil.resistance + series
     if resistance > 0.0:
@@ -133,7 +138,7 @@ def sustained_current(
 
 
 def linkage_scale(origin: float, current: float, coil: Coil) -> float:
-    """Return a typical flux linkage [Wb] of a coil at its typical current [A]."""
+    """Return a typical flux linkage [Wb]: that due to the coil current [A] at displacement `origin` [m]."""
     span = abs(main_linkage(origin, current, coil) - main_linkage(origin, 0.0, coil))
     if not (math.isfinite(span) and span > 0.0):
         span = coil.inductance * current
@@ -142,6 +147,8 @@ def linkage_scale(origin: float, current: float, coil: Coil) -> float:
 
 def falling_place(low: float, high: float, current: float, coil: Coil) -> tuple[float, float]:
     """Find a displacement at which the flux linkage does not increase with the current.
+
+    The search covers displacements from `low` to `high` [m] and coil currents from 0 to `current` [A].
 
     Returns
     -------
@@ -162,7 +169,7 @@ def falling_place(low: float, high: float, current: float, coil: Coil) -> tuple[
 
 
 def largest_force(x: float, current: float, push: float, s: Statics) -> float:
-    """Return the larger of the absolute static forces without and with a current, plus `push`, N."""
+    """Return the larger of the absolute static forces at `x` without and with the current, plus `push`, N."""
     largest = 0.0
     for i in (0.0, current):
         size = abs(free_force(x, i, s))
@@ -177,7 +184,8 @@ def typical_scales(
     """Return a typical displacement [m] and speed [m/s]; see `printhammer.run.problem.scales_of`.
 
     `current` and `push` are the largest current [A] and force [N] of the drive; `period` is the drive's
-    period [s], NaN without a period.
+    period [s], NaN without a period. `mass` is in kg, `state` is the initial displacement [m] and velocity
+    [m/s], and `s` the static force of the hammer.
     """
     origin = origin_of(s)
     if s.position > -math.inf and s.front < math.inf:
@@ -203,18 +211,25 @@ def typical_scales(
 
 
 def allowances(tolerance: float) -> tuple[float, float]:
-    """Return the tolerances of the error estimates of orders 6 and 7, from the tolerance of the method."""
+    """Return the tolerances of the two error estimates, of orders 6 and 7, for the tolerance of a run."""
     return (10.0 * tolerance) ** (7.0 / 9.0), 10.0 * tolerance
 
 
 def least_window(support: float, replaces: bool) -> float:
-    """Return the smallest time [s] from the last firing to the end of a run, for any device."""
+    """Return the smallest time [s] from the last firing to the end of a run, for any device.
+
+    `support` is the duration of the pulse or, with a driver, the time until its supply is off, s. `replaces`
+    states whether the latest firing replaces earlier firings, as with a driver.
+    """
     lasts = support if math.isfinite(support) else 0.0
     return CYCLE + lasts if replaces else max(CYCLE, lasts)
 
 
 def last_window(least: float, way: float, speed: float) -> float:
-    """Return the window [s] at which doubling stops, from smallest window, typical displacement and speed."""
+    """Return the window [s] at which the search by doubling stops.
+
+    `least` is the smallest window [s]; `way` and `speed` are a typical displacement [m] and speed [m/s].
+    """
     return least + min(LONGEST * way / speed, LAST)
 
 

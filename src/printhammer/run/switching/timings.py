@@ -88,7 +88,7 @@ _Span = tuple[float, float, float]  # Times of switch-on, switch-off (may be inf
 
 
 def _firings(drive: Drive, record: Record) -> Iterator[tuple[int, _Span]]:
-    """Yield index and times of the firings of a run."""
+    """Yield, for each firing of a run, its index and its times of switch-on, switch-off and end [s]."""
     first, last = float(record.nodes[0, 0]), float(record.nodes[-1, 0])
     times = [float(time) for time in drive.times]
     fired = getattr(drive, "waveforms", None) or (drive.waveform,) * len(times)
@@ -108,7 +108,11 @@ def _timing(
     problem: Problem,
     record: Record,
 ) -> Timing:
-    """Compute the switching times of one contact in one firing."""
+    """Compute the switching times and forces of one contact after one firing.
+
+    `number` is the index of the firing, and `span` its times of switch-on, switch-off and end, s; `closings`
+    are those of the contact.
+    """
     on, off, end = span
     makes = contact.side == "front"
     closed = [each.t_in for each in closings if not each.initial]
@@ -175,14 +179,17 @@ def _lost(closings: Sequence[Closing]) -> str:
 
 
 def _is_held(timing: Timing) -> bool:
-    """Whether a contact is still switched at the end of the firing, although the drive is finite."""
+    """Whether a contact has operated but not released by the end of a firing with a finite drive."""
     switched = timing.operate_time is not None and timing.release_time is None
     is_pressed = timing.final_force > 0.0
     return timing.switched_off is not None and switched and is_pressed == (timing.kind == "make")
 
 
 def _phrase(verb: str, event: str, times: Sequence[tuple[float | None, float | None]]) -> str:
-    """Describe the first switchings after an event, and the bounce times."""
+    """Describe when a contact first switches after an event, and for how long it bounces.
+
+    `times` lists, for each firing, the time from the event to the first switching, and the bounce time, s.
+    """
     known = [(time, bounce) for time, bounce in times if time is not None and bounce is not None]
     if not known:
         return f"never {verb} after {event}"
