@@ -31,7 +31,7 @@ from printhammer.support.arrays import BoolArray
 NAME: Final = "nine-wire"
 WIRES: Final = 9  # Number of wires of the built-in font, by definition of the font file
 ADVANCE: Final = 6
-"""Character pitch of the built-in font: columns from the start of a character to the start of the next."""
+"""Character pitch, by definition of the font: columns between the starts of adjacent characters."""
 
 _COLUMNS: Final = 5  # Number of columns of a character
 _STEP: Final = 7  # Number of columns from character to character in the text of the font file
