@@ -57,7 +57,7 @@ def spring_energy(c: Any, x: float) -> float:
 
 
 def spring_level(c: Any, k: float) -> float:
-    """Return infinity: the force of the spring has no kink."""
+    """Return infinity as the position of kink `k`: the spring force has no kink."""
     return math.inf
 
 
@@ -132,25 +132,34 @@ def backstop_rebound(c: Any, v_in: float) -> float:
 
 
 def magnet_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants of a law that has no packing function: all values except the range."""
+    """Write the packed constants of a magnet law without a packing function to `c`; return their count.
+
+    The constants are the values `q` of the part except the last two, which are the displacement range.
+    """
     for k in range(len(q) - 2):
         c[k] = q[k]
     return max(len(q) - 2, 0)
 
 
 def magnet_domain(q: Any, ends: Any) -> None:
-    """Write the displacement range [m] of a law without a domain function: the last two of its values."""
+    """Write the displacement range [m] of a magnet law without a domain function to `ends`.
+
+    The range is the last two of the values `q` of the part; with fewer than two values it is unlimited.
+    """
     ends[0], ends[1] = -math.inf, math.inf
     if len(q) > 1:
         ends[0], ends[1] = q[len(q) - 2], q[len(q) - 1]
 
 
 def spring_domain(q: Any, ends: Any) -> None:
-    """Leave the displacement range as it is: the law of the spring holds everywhere."""
+    """Leave the displacement range `ends` as it is: the law of the spring holds everywhere."""
 
 
 def _copy(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants of a law that has no packing function: the unchanged values of the part."""
+    """Write the packed constants of a law without a packing function to `c`; return their count.
+
+    The constants are the values `q` of the part, unchanged.
+    """
     for k in range(len(q)):
         c[k] = q[k]
     return len(q)

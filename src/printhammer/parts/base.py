@@ -56,10 +56,10 @@ class Part(BaseModel):
         __init__.__pydantic_base_init__ = True
 
     def packed(self, origin: float) -> tuple[float, ...]:
-        """Return the constants, SI, that the law functions read from `c`, in the order stated by the module.
+        """Return the constants [SI] that the law functions read from `c`, in the order stated by the module.
 
-        `origin` is the position of the backstop, b of equation (4), or 0 without a backstop, m. By default
-        the function ``<role>_packed(q, origin, c)`` of the module writes the constants from the `numbers`.
+        `origin` is the position [m] of the backstop, b of equation (4), or 0 without a backstop. By default,
+        the function ``<role>_packed(q, origin, c)`` of the module computes the constants from `numbers`.
         """
         pack = self.function(f"{self.role}_packed")
         if pack is None:
@@ -69,13 +69,16 @@ class Part(BaseModel):
 
     @classmethod
     def function(cls, name: str) -> Any:
-        """Return a law function that the module of the class or of a base class defines; None if missing."""
+        """Return the law function `name` of the module of the class or of a base class; None if missing."""
         modules = (vars(sys.modules[base.__module__]) for base in cls.__mro__ if issubclass(base, Part))
         return next((module[name] for module in modules if name in module), None)
 
     @classmethod
     def names(cls) -> tuple[str, ...]:
-        """Return the names of the fields in `numbers`: physical constants, then options, as declared."""
+        """Return the names of the fields in `numbers`: first physical constants, then options.
+
+        Both are in the order in which the class declares them.
+        """
         further = (name for name, kind in options(cls).items() if kind is bool or get_origin(kind) is Literal)
         return (*quantities(cls), *further)
 
@@ -121,9 +124,10 @@ class MagnetPart(Part):
 
 
 class CoilPart(Part):
-    """Coil circuit of the magnet, with the law of `printhammer.kernel.model.circuit`.
+    """Base class of coil circuits, with the law of `printhammer.kernel.model.circuit`.
 
-    The constants are in the order of the kernel's parameter array; see `printhammer.kernel.model.layout`.
+    The packed constants have the order of the kernel's parameter array; see
+    `printhammer.kernel.model.layout`.
     """
 
     role: ClassVar[str] = "coil"
@@ -191,7 +195,7 @@ class BackstopPart(Part):
 
 
 class DampingPart(Part):
-    """Base class of dampers of the armature at every displacement.
+    """Base class of dampings, which act on the armature at every displacement.
 
     A subclass defines `damping_force(c, v)`, a smooth function of v.
     """
@@ -237,7 +241,7 @@ def laws(role: str) -> tuple[str, ...]:
 
 @cache
 def _fields(part: type[Part]) -> tuple[tuple[str, tuple[Any, ...] | None], ...]:
-    """List the fields in `Part.numbers`: name, and allowed words of an option with text values, else None."""
+    """List the fields in `Part.numbers` as pairs: name, and allowed words of a text option, else None."""
     kinds = options(part)
     words = {name: get_args(kind) for name, kind in kinds.items() if get_origin(kind) is Literal}
     return tuple((name, words.get(name)) for name in part.names())

@@ -34,12 +34,15 @@ REFERENCE: Final = 20.0
 
 
 def warm_resistance(resistance: float, temperature: float) -> float:
-    """Return the resistance [ohm] of a copper winding at a temperature [degC]."""
+    """Return the resistance [ohm] of a copper winding at a temperature [degC].
+
+    `resistance` is the resistance at 20 degC, ohm.
+    """
     return resistance * (1.0 + COPPER * (temperature - REFERENCE))
 
 
 def coil_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants from the values of the part; return their count."""
+    """Write the packed constants to `c` from the part's values `q`; return their count."""
     c[0] = 0.0 if math.isnan(q[0]) else warm_resistance(q[0], q[2])
     c[1] = q[1]
     c[2] = 0.0 if math.isnan(q[3]) else q[3]

@@ -24,7 +24,7 @@ def damping_force(c: Any, v: float) -> float:
 
 
 def damping_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants (coefficient,) from the values of the part; return their count."""
+    """Write the packed constants (coefficient,) to `c` from the part's values `q`; return their count."""
     c[0] = q[0]
     return 1
 

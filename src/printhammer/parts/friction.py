@@ -37,7 +37,7 @@ def friction_force(c: Any, k: float) -> float:
 
 
 def damping_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants, which are the values of the part; return their count."""
+    """Write the packed constants, which are the part's values `q`, to `c`; return their count."""
     for k in range(3):
         c[k] = q[k]
     return 3
@@ -58,7 +58,9 @@ class DryFriction(DampingPart):
 
 
 def with_friction(damping: DampingPart | None, frictions: Iterable[Friction]) -> DryFriction:
-    """Build the damping part of a hammer with a viscous damping, if any, and dry friction.
+    """Build the damping part of a hammer from its viscous damping, if any, and its dry frictions.
+
+    The kinetic friction forces are added, and so are the static friction forces.
 
     Raises
     ------

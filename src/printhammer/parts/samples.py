@@ -28,7 +28,7 @@ def cell_of(c: Any, first: int, knots: int, at: float) -> int:
 def end_slope(h0: float, h1: float, m0: float, m1: float) -> float:
     """Return the slope of a shape-preserving cubic at the end of a curve.
 
-    The arguments are the widths h and the secant slopes m of the outermost cell and of its neighbour.
+    The outermost cell has the width `h0` and the secant slope `m0`, its neighbour `h1` and `m1`.
     """
     slope = ((2.0 * h0 + h1) * m0 - h0 * m1) / (h0 + h1)
     if slope * m0 <= 0.0:
@@ -39,9 +39,9 @@ def end_slope(h0: float, h1: float, m0: float, m1: float) -> float:
 
 
 def inner_slope(h0: float, h1: float, m0: float, m1: float) -> float:
-    """Return the slope of a shape-preserving cubic between two cells of widths h and secant slopes m.
+    """Return the slope of a shape-preserving cubic at a sample inside a curve; 0 at an extremum.
 
-    The slope is 0 at an extremum of the samples.
+    The cells to the left and right have the widths `h0` and `h1` and the secant slopes `m0` and `m1`.
     """
     if m0 == 0.0 or m1 == 0.0 or (m0 < 0.0) != (m1 < 0.0):
         return 0.0
@@ -50,17 +50,17 @@ def inner_slope(h0: float, h1: float, m0: float, m1: float) -> float:
 
 
 def width_at(c: Any, first: int, k: int) -> float:
-    """Return the width of cell `k`."""
+    """Return the width of cell `k` of a curve, between its abscissas c[first + k] and c[first + k + 1]."""
     return float(c[first + k + 1] - c[first + k])
 
 
 def secant_at(c: Any, first: int, n: int, k: int) -> float:
-    """Return the slope of the straight line across cell `k`."""
+    """Return the slope of the straight line across cell `k` of a curve of `n` samples from c[first] on."""
     return float((c[first + n + k + 1] - c[first + n + k]) / width_at(c, first, k))
 
 
 def slope_at(c: Any, first: int, n: int, k: int) -> float:
-    """Return the slope of the shape-preserving cubic at sample `k`."""
+    """Return the slope of the shape-preserving cubic through `n` samples, from c[first] on, at sample `k`."""
     if n == 2:
         return secant_at(c, first, n, 0)
     inside = min(max(k, 1), n - 2)
@@ -74,7 +74,11 @@ def slope_at(c: Any, first: int, n: int, k: int) -> float:
 
 
 def curve_at(c: Any, first: int, n: int, straight: bool, x: float) -> float:
-    """Return the ordinate of a curve at `x`, inside its range."""
+    """Return the ordinate at `x` of the curve through `n` samples from c[first] on.
+
+    If `straight`, the curve consists of straight lines, otherwise of shape-preserving cubics. `x` lies within
+    the range of the abscissas.
+    """
     k = cell_of(c, first, n, x)
     h, m, past = width_at(c, first, k), secant_at(c, first, n, k), x - c[first + k]
     if straight:
@@ -85,7 +89,11 @@ def curve_at(c: Any, first: int, n: int, straight: bool, x: float) -> float:
 
 
 def integral_to(c: Any, first: int, n: int, straight: bool, x: float) -> float:
-    """Return the integral of a curve from its first sample to `x`, inside its range."""
+    """Return the integral, from the first sample to `x`, of the curve through `n` samples from c[first] on.
+
+    If `straight`, the curve consists of straight lines, otherwise of shape-preserving cubics. `x` lies within
+    the range of the abscissas.
+    """
     last = cell_of(c, first, n, x)
     total = 0.0
     for k in range(last + 1):

@@ -22,12 +22,15 @@ from printhammer.support.constants import quantity
 
 
 def backstop_elastic(c: Any, w: float) -> float:
-    """Return the elastic force k w^3 [N], not negative."""
+    """Return the elastic force k w^3 [N], not negative, with w = sqrt(b - x)."""
     return float(c[0] * w * w * w)
 
 
 def backstop_viscous(c: Any, w: float, v: float) -> float:
-    """Return the viscous force -1.5 k A w v, N, cut off where the total force would be attractive."""
+    """Return the viscous force -1.5 k A w v [N], with w = sqrt(b - x).
+
+    Unless the backstop may pull, the viscous force is limited so that the total force is never attractive.
+    """
     force = -c[1] * w * v
     if c[2] == 0.0:
         least = -c[0] * w * w * w
@@ -37,20 +40,23 @@ def backstop_viscous(c: Any, w: float, v: float) -> float:
 
 
 def backstop_energy(c: Any, w: float) -> float:
-    """Return the elastic energy (2/5) k w^5, J."""
+    """Return the elastic energy (2/5) k w^5 [J], with w = sqrt(b - x)."""
     w2 = w * w
     return float(0.4 * c[0] * w2 * w2 * w)
 
 
 def backstop_switch(c: Any, w: float, v: float) -> float:
-    """Return k w^2 - 1.5 k A v, N/m^0.5, which changes sign at the cut-off of the force; 1 with `pull`."""
+    """Return k w^2 - 1.5 k A v [N/m^0.5], which changes sign at the cut-off of the force.
+
+    Return 1 if the backstop may pull, since its force is then not cut off.
+    """
     if c[2] != 0.0:
         return 1.0
     return float(c[0] * w * w - c[1] * v)
 
 
 def backstop_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants (k, 1.5 k A, pull) from the values of the part; return their count."""
+    """Write the packed constants (k, 1.5 k A, pull) to `c` from the part's values `q`; return their count."""
     c[0], c[1], c[2] = q[1], 1.5 * q[1] * q[2], q[3]
     return 3
 

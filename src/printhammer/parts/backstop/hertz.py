@@ -24,14 +24,14 @@ from printhammer.support.constants import quantity
 
 
 def backstop_elastic(c: Any, w: float) -> float:
-    """Return the Hertz force of equation (6), k w^3 [N], not negative."""
+    """Return the Hertz force of equation (6), k w^3 [N], not negative, with w = sqrt(b - x)."""
     return float(c[0] * (w * w * w))
 
 
 def backstop_viscous(c: Any, w: float, v: float) -> float:
-    """Return the viscoelastic force of equation (7), -l v w^3, N.
+    """Return the viscoelastic force of equation (7), -l v w^3 [N], with w = sqrt(b - x).
 
-    Cut off at -k w^3 where the backstop may not pull.
+    Unless the backstop may pull, the force is at least -k w^3.
     """
     rate = c[1] * v
     if rate > c[0] and c[2] == 0.0:
@@ -40,13 +40,16 @@ def backstop_viscous(c: Any, w: float, v: float) -> float:
 
 
 def backstop_energy(c: Any, w: float) -> float:
-    """Return the elastic energy of equation (6), (2/5) k w^5, J."""
+    """Return the elastic energy of equation (6), (2/5) k w^5 [J], with w = sqrt(b - x)."""
     w2 = w * w
     return float(0.4 * c[0] * w2 * w2 * w)
 
 
 def backstop_switch(c: Any, w: float, v: float) -> float:
-    """Return k - l v, N/m^1.5, which changes sign at the cut-off of the force; 1 with `pull`."""
+    """Return k - l v [N/m^1.5], which changes sign at the cut-off of the force.
+
+    Return 1 if the backstop may pull, since its force is then not cut off.
+    """
     if c[2] != 0.0:
         return 1.0
     return float(c[0] - c[1] * v)
@@ -57,7 +60,7 @@ _STIFFNESS, _DAMPING, _RESTITUTION, _SPEED, _PULL = 1, 8, 9, 10, 11
 
 
 def backstop_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants (k, l, pull) from the values of the part; return their count."""
+    """Write the packed constants (k, l, pull) to `c` from the part's values `q`; return their count."""
     c[0] = q[_STIFFNESS]
     if math.isnan(c[0]):
         c[0] = hertz_stiffness(q[2], q[3], q[4], q[5], q[6], q[7])

@@ -20,12 +20,12 @@ RIGID = True
 
 
 def backstop_rebound(c: Any, v_in: float) -> float:
-    """Return the velocity [m/s] after a bounce, not negative."""
+    """Return the velocity [m/s] after a bounce, -e v_in, not negative."""
     return float(-c[0] * v_in)
 
 
 def backstop_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants (e,) from the values of the part; return their count."""
+    """Write the packed constants (e,) to `c` from the part's values `q`; return their count."""
     c[0] = q[1]
     return 1
 

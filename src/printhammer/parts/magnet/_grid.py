@@ -32,9 +32,10 @@ class Grid:
 
 
 def gather(rows: Iterable[tuple[float, float, float]], what: str, quantity: str) -> Grid:
-    """Collect points in any order into a complete grid: displacement [m], current [A] and the quantity.
+    """Collect points, given in any order, in a complete grid.
 
-    Error messages begin with `what`.
+    A point is a displacement [m], a current [A] and the value of `quantity` in SI. Error messages begin with
+    `what`.
 
     Raises
     ------
@@ -109,11 +110,12 @@ def read_csv(path: Path, quantity: str) -> Grid:
 
 
 def bicubic(table: Grid) -> FloatArray:
-    """Return the bicubic spline of a table; coefficients by x cell, I cell, power of x, power of I.
+    """Return the coefficients of the bicubic spline through a table.
 
-    Cubic splines with not-a-knot ends along x, then along the current (with two or three points in a
-    direction: the line or the parabola through them), so that values, slopes and curvatures are continuous;
-    C. de Boor, J. Math. Phys. 41 (1962) 212. Powers are of the distances from the lower corner of a cell.
+    The axes of the result are, in this order: the x cell, the I cell, the power of x and the power of I, both
+    measured from the lower corner of the cell. The spline is a cubic spline with not-a-knot ends along x, and
+    then along the current (with two or three points in a direction, the line or the parabola through them),
+    so that values, slopes and curvatures are continuous; C. de Boor, J. Math. Phys. 41 (1962) 212.
     """
     import numpy as np
     from scipy.interpolate import CubicSpline

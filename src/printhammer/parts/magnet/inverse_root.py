@@ -29,7 +29,7 @@ from printhammer.support.constants import quantity
 
 
 def magnet_force(c: Any, x: float, current: float) -> float:
-    """Return the net magnetic force of equation (3), N; NaN for x <= 0, where the law ends."""
+    """Return the net magnetic force of equation (3), N; NaN for x <= 0, where the law does not hold."""
     if x <= 0.0:
         return math.nan
     pull = c[1] - c[2] * current
@@ -69,9 +69,9 @@ def magnet_inductance(c: Any, x: float, current: float) -> float:
 
 
 def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float:
-    """Return the current at which the magnet plus a constant series inductance reach a flux linkage, A.
+    """Return the current [A] for the flux linkage of magnet and series inductance.
 
-    NaN where the total linkage does not increase with the current.
+    The result is NaN where this linkage does not increase with the current.
     """
     if x < 0.0:
         return math.nan
@@ -83,13 +83,16 @@ def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float
 
 
 def magnet_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants (F0, Am, Bm) from the values of the part; return their count."""
+    """Write the packed constants (F0, Am, Bm) to `c` from the part's values `q`; return their count."""
     c[0], c[1], c[2] = q[0], q[1], q[2]
     return 3
 
 
 def magnet_domain(q: Any, ends: Any) -> None:
-    """Write the range of displacements in which the law is valid, m; open at 0."""
+    """Write the displacement range [m] in which the law is valid to `ends`, from the part's values `q`.
+
+    The lower end is 0 if the part states none; at x = 0 itself, the law is singular.
+    """
     ends[0] = 0.0 if math.isnan(q[3]) else q[3]
     ends[1] = math.inf if math.isnan(q[4]) else q[4]
 

@@ -40,7 +40,10 @@ def _inside(c: Any, x: float, current: float) -> bool:
 
 
 def _along_current(c: Any, x: float, j: int) -> tuple[float, float, float, float]:
-    """Return the linkage at x within a current cell as a polynomial in I: coefficients of powers 0 to 3."""
+    """Return the linkage at `x` within current cell `j` as a polynomial: coefficients of powers 0 to 3.
+
+    The variable of the polynomial is the current minus the current at the start of the cell.
+    """
     nx = int(c[0])
     i = cell_of(c, 2, nx, x)
     dx = x - c[2 + i]
@@ -54,7 +57,10 @@ def _along_current(c: Any, x: float, j: int) -> tuple[float, float, float, float
 
 
 def _slope_along_current(c: Any, x: float, j: int) -> tuple[float, float, float, float]:
-    """Return d(linkage)/dx within a current cell as a polynomial in I: coefficients of powers 0 to 3."""
+    """Return d(linkage)/dx at `x` within current cell `j` as a polynomial: coefficients of powers 0 to 3.
+
+    The variable of the polynomial is the current minus the current at the start of the cell.
+    """
     nx = int(c[0])
     i = cell_of(c, 2, nx, x)
     dx = x - c[2 + i]
@@ -68,7 +74,7 @@ def _slope_along_current(c: Any, x: float, j: int) -> tuple[float, float, float,
 
 
 def magnet_force(c: Any, x: float, current: float) -> float:
-    """Return the magnetic force derived from the linkage, N, 0 at zero current; NaN outside the table."""
+    """Return the magnetic force [N] derived from the linkage; 0 at zero current, NaN outside the table."""
     if not _inside(c, x, current):
         return math.nan
     nx = int(c[0])
@@ -176,7 +182,7 @@ class LinkageTableMagnet(GridMagnet):
     Raises
     ------
     InputError
-        The file or its grid cannot be used, or the linkage does not rise with the current.
+        The file or its grid cannot be used, or the linkage does not increase with the current.
     """
 
     law: ClassVar[str] = "linkage-table"

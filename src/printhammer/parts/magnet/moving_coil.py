@@ -42,7 +42,7 @@ def magnet_linkage(c: Any, x: float, current: float) -> float:
 
 
 def magnet_emf(c: Any, x: float, current: float) -> float:
-    """Return the back-EMF divided by the speed, k, V s/m."""
+    """Return k [V s/m], the back-EMF divided by the velocity of the armature."""
     return float(c[0])
 
 
@@ -52,12 +52,12 @@ def magnet_inductance(c: Any, x: float, current: float) -> float:
 
 
 def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float:
-    """Return the current for a flux linkage, A; NaN for a coil without inductance."""
+    """Return the current [A] for the flux linkage of magnet and series inductance; NaN without inductance."""
     return float((linkage - c[0] * x) / inductance) if inductance > 0.0 else math.nan
 
 
 def magnet_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants (k,) from the values of the part; return their count."""
+    """Write the packed constants (k,) to `c` from the part's values `q`; return their count."""
     c[0] = q[0]
     return 1
 

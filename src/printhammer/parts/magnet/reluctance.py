@@ -63,7 +63,10 @@ def _gap_slope(c: Any, x: float) -> float:
 
 
 def _unsaturated(p: float, q: float, y: float) -> float:
-    """Solve p (1 - v) + q (1 - v) / v = y for v in [0, 1]; p > 0, q >= 0, y >= 0."""
+    """Solve p (1 - v) + q (1 - v) / v = y for v in [0, 1]; p > 0, q >= 0, y >= 0.
+
+    The solution v = 1 - |Phi| / Phi_s is 1 at zero flux and 0 at saturation of the core.
+    """
     d = p - q - y
     root = math.sqrt(d * d + 4.0 * p * q)
     if d > 0.0:
@@ -120,7 +123,8 @@ def magnet_inductance(c: Any, x: float, current: float) -> float:
 def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float:
     """Return the current [A] for the flux linkage of magnet and series inductance.
 
-    NaN outside the range of the law, and, if there is no leakage, at or above the saturation flux.
+    The result is NaN outside the range of the law; without leakage and series inductance, also at or above
+    the saturation flux.
     """
     length = _gap_inductance(c, x)
     if not length > 0.0:
@@ -140,7 +144,10 @@ _CORE, _SATURATION, _LEAKAGE, _REACH, _PULL = range(6, 11)
 
 
 def magnet_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants in the order stated by the module; return their count."""
+    """Write the packed constants to `c`, in the order stated by the module; return their count.
+
+    `q` holds the values of the part.
+    """
     square = q[_TURNS] ** 2
     scale = MU0 * square
     c[0] = -1.0 if q[_PULL] == 0.0 else 1.0
@@ -157,7 +164,10 @@ def magnet_packed(q: Any, origin: float, c: Any) -> int:
 
 
 def magnet_domain(q: Any, ends: Any) -> None:
-    """Write the range of displacements in which the law is valid, m; open where the gap is -g0."""
+    """Write the displacement range [m] in which the law is valid to `ends`, from the part's values `q`.
+
+    The end at which the gap is -g0 is itself excluded.
+    """
     reach = math.inf if math.isnan(q[_REACH]) else q[_REACH]
     if q[_PULL] == 0.0:
         ends[0], ends[1] = q[_CLOSED_AT] - reach, q[_CLOSED_AT] + q[_RESIDUAL_GAP]

@@ -68,7 +68,10 @@ def magnet_energy(c: Any, x: float) -> float:
 
 
 def _linkage(c: Any, x: float, j: int) -> tuple[float, float, float]:
-    """Return the linkage at x within a current cell as a polynomial in I: coefficients of powers 0 to 2."""
+    """Return the linkage at `x` within current cell `j` as a polynomial: coefficients of powers 0 to 2.
+
+    The variable of the polynomial is the current minus the current at the start of the cell.
+    """
     nx = int(c[0])
     ni = int(c[1])
     i = cell_of(c, 2, nx, x)
@@ -176,7 +179,11 @@ class TableMagnet(GridMagnet):
 
 
 def _packed_spline(table: Grid) -> tuple[float, ...]:
-    """Return table, force spline, and its integrals along x: energy at zero current, flux linkage."""
+    """Return the packed constants, in the order stated by the module.
+
+    They contain the table, the spline of the force, and two integrals of the spline along x: the energy at
+    zero current and the flux linkage.
+    """
     import numpy as np
 
     x, current = np.array(table.x), np.array(table.current)
@@ -191,7 +198,11 @@ def _packed_spline(table: Grid) -> tuple[float, ...]:
 
 
 def _integral(x: FloatArray, slope: FloatArray) -> FloatArray:
-    """Return the integral of a cubic spline from its first knot, shape (cells, ..., 5 powers of x)."""
+    """Return the coefficients of the integral of a cubic spline from its first knot, shape (cells, ..., 5).
+
+    `slope` holds the coefficients of the spline, shape (cells, ..., 4), and `x` its knots. The last axis is
+    the power of the distance from the start of a cell.
+    """
     import numpy as np
 
     whole = np.zeros((*slope.shape[:-1], 5))

@@ -43,14 +43,20 @@ def pack_unloading(c: Any, x: float, v: float, q: float) -> float:
 
 
 def pack_switch(c: Any, x: float, v: float) -> float:
-    """Return K (x - xp) + C v, N, which changes sign at the cut-off of the force; 1 with `pull`."""
+    """Return K (x - xp) + C v [N], which changes sign at the cut-off of the force.
+
+    Return 1 if the pack may pull, since its force is then not cut off.
+    """
     if c[3] != 0.0:
         return 1.0
     return float(c[0] * (x - c[2]) + c[1] * v)
 
 
 def pack_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants (K, C, xp, pull) from the values xp, K, C, pull; return their count."""
+    """Write the packed constants (K, C, xp, pull) to `c`; return their count.
+
+    The values `q` of the part are xp, K, C and pull, in this order.
+    """
     c[0], c[1], c[2], c[3] = q[1], q[2], q[0], q[3]
     return 4
 

@@ -34,9 +34,10 @@ def pack_loading(c: Any, x: float, v: float) -> float:
 
 
 def pack_memory(c: Any, peak: float) -> float:
-    """Return q = S rmax^-8.3 of a local maximum [N], which the unloading branch needs.
+    """Return q = S rmax^-8.3 [N], the constant of the unloading branch after a local maximum at `peak` [m].
 
-    The result is 0 for an indentation below 1e-30 d, whose force would be below 1e-81 S.
+    rmax is the indentation at the local maximum divided by d. The result is 0 for an indentation below
+    1e-30 d, whose force would be below 1e-81 S.
     """
     r = (peak - c[1]) * c[2]
     if r <= 1e-30:
@@ -45,7 +46,7 @@ def pack_memory(c: Any, peak: float) -> float:
 
 
 def pack_unloading(c: Any, x: float, v: float, q: float) -> float:
-    """Return the force of the unloading branch of equation (5), -q r^11, N; 0 for x <= xp."""
+    """Return the force [N] of the unloading branch of equation (5), -q r^11; 0 for x <= xp."""
     r = (x - c[1]) * c[2]
     if r <= 0.0:
         return 0.0
@@ -55,7 +56,10 @@ def pack_unloading(c: Any, x: float, v: float, q: float) -> float:
 
 
 def pack_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants (S, xp, 1/d) from the values xp, S, d; return their count."""
+    """Write the packed constants (S, xp, 1/d) to `c`; return their count.
+
+    The first values `q` of the part are xp, S and d, in this order.
+    """
     c[0], c[1], c[2] = q[1], q[0], 1.0 / q[2]
     return 3
 

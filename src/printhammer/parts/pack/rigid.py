@@ -22,12 +22,12 @@ RIGID_FRONT = True
 
 
 def pack_rebound(c: Any, v_in: float) -> float:
-    """Return the velocity [m/s] after an impact, not positive."""
+    """Return the velocity [m/s] after an impact, -e v_in, not positive."""
     return float(-c[0] * v_in)
 
 
 def pack_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants (e,) from the values of the part; return their count."""
+    """Write the packed constants (e,) to `c` from the part's values `q`; return their count."""
     c[0] = q[1]
     return 1
 

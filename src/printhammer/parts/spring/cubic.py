@@ -31,7 +31,7 @@ def spring_energy(c: Any, x: float) -> float:
 
 
 def spring_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants (K, D, x0) from the values of the part; return their count."""
+    """Write the packed constants (K, D, x0) to `c` from the part's values `q`; return their count."""
     c[0], c[1], c[2] = q[0], q[1], q[2]
     return 3
 

@@ -61,7 +61,7 @@ def spring_force(c: Any, x: float) -> float:
 
 
 def spring_energy(c: Any, x: float) -> float:
-    """Return the sum of the potential energies, J; the energy of an open contact is zero."""
+    """Return the potential energy [J] of all forces and contacts at `x` [m]; 0 for an open contact."""
     total = 0.0
     for k in range(int(c[0])):
         row = 1 + WIDTH * k
@@ -77,7 +77,7 @@ def spring_energy(c: Any, x: float) -> float:
 
 
 def spring_level(c: Any, k: float) -> float:
-    """Return the position of contact `k`, counted from 0, m; infinity if there are fewer contacts."""
+    """Return the position [m] of contact `k`, counted from 0; infinity if there are fewer contacts."""
     left = k
     for i in range(int(c[0])):
         row = 1 + WIDTH * i
@@ -89,7 +89,10 @@ def spring_level(c: Any, k: float) -> float:
 
 
 def spring_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants to `c`, with `origin` in place of NaN positions; return their count."""
+    """Write the part's values `q` to `c`, with `origin` in place of NaN positions; return their count.
+
+    `origin` is the position of the backstop, m.
+    """
     count = 1 + WIDTH * int(q[0])
     for k in range(count):
         c[k] = origin if math.isnan(q[k]) else q[k]
@@ -110,7 +113,7 @@ class ForceSum(SpringPart):
     rows: tuple[Row, ...]
 
     def numbers(self) -> tuple[float, ...]:
-        """Return the number of rows, followed by the rows."""
+        """Return the number of rows, followed by the rows; each row is one force or contact."""
         return (float(len(self.rows)), *(number for row in self.rows for number in row))
 
     def packed(self, origin: float) -> tuple[float, ...]:

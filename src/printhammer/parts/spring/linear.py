@@ -32,9 +32,10 @@ def spring_energy(c: Any, x: float) -> float:
 
 
 def spring_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants (preload, stiffness, b) from the values of the part; return their count.
+    """Write the packed constants (preload, stiffness, b) to `c`; return their count.
 
-    The numbers are Bs, As and 0, or preload, stiffness and 1.
+    The values `q` of the part are Bs, As and 0 (law `linear`), or preload, stiffness and 1 (law `preload`);
+    `origin` is b.
     """
     c[0], c[1], c[2] = q[0], q[1] if q[2] == 1.0 else q[0] / q[1], origin
     return 3

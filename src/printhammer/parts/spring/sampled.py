@@ -53,12 +53,18 @@ def spring_force(c: Any, x: float) -> float:
 
 
 def spring_energy(c: Any, x: float) -> float:
-    """Return the sum of the potential energies, J; the energy of a sampled force is 0 at its first sample."""
+    """Return the potential energy [J] of all forces and contacts at `x` [m]; NaN beyond any force's samples.
+
+    The energy of a sampled force is 0 at its first sample.
+    """
     return energy_of_rows(c, x) - sum_of_curves(c, x, True)
 
 
 def spring_level(c: Any, k: float) -> float:
-    """Return the position of kink `k`, counted from 0, m: an inner sample or a contact; or infinity."""
+    """Return the position [m] of kink `k`, counted from 0; infinity if there are fewer kinks.
+
+    Each inner sample of a force and each contact is a kink.
+    """
     at = 1 + WIDTH * int(c[0])
     first = at + 3
     left = int(k)
@@ -72,7 +78,7 @@ def spring_level(c: Any, k: float) -> float:
 
 
 def spring_domain(q: Any, ends: Any) -> None:
-    """Narrow a displacement range [m] to the samples of all forces; `q` holds the values of the part."""
+    """Narrow the displacement range `ends` [m] to the samples of all forces; `q` holds the part's values."""
     at = 1 + WIDTH * int(q[0])
     first = at + 3
     for _ in range(int(q[at])):
@@ -83,7 +89,10 @@ def spring_domain(q: Any, ends: Any) -> None:
 
 
 def spring_packed(q: Any, origin: float, c: Any) -> int:
-    """Write the packed constants to `c`, with `origin` in place of NaN positions; return their count."""
+    """Write the part's values `q` to `c`, with `origin` in place of NaN positions; return their count.
+
+    `origin` is the position of the backstop, m.
+    """
     for k in range(rows_packed(q, origin, c), len(q)):
         c[k] = q[k]
     return len(q)
@@ -94,7 +103,7 @@ Curve = tuple[bool, tuple[tuple[float, float], ...]]
 
 
 class SampledSum(ForceSum):
-    """Sum of a hammer's spring, forces and contacts, some or all of which are sampled."""
+    """Sum of a hammer's spring, additional forces and contacts, where forces may be sampled."""
 
     law: ClassVar[str] = "sampled sum"
 
@@ -102,13 +111,16 @@ class SampledSum(ForceSum):
 
     @property
     def domain(self) -> tuple[float, float]:
-        """Range of displacements of the sampled forces, m."""
+        """Range of displacements that the samples of every sampled force cover, `(x_min, x_max)`, m."""
         ends = [-math.inf, math.inf]
         spring_domain(self.numbers(), ends)
         return (ends[0], ends[1])
 
     def numbers(self) -> tuple[float, ...]:
-        """Return the number of rows, the rows, the number of curves, and the curves."""
+        """Return the number of rows, the rows, the number of curves, and the curves.
+
+        Each row is one force or contact, each curve one sampled force.
+        """
         numbers = [*super().numbers(), float(len(self.curves))]
         for straight, samples in self.curves:
             numbers += [float(len(samples)), float(straight)]

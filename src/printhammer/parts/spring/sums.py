@@ -57,7 +57,10 @@ def spring_viscous(c: Any, x: float, v: float) -> float:
 
 
 def spring_switch(c: Any, v: float) -> float:
-    """Return a number that changes sign at each velocity `v` [m/s] at which a contact force is cut off."""
+    """Return a number that changes sign at each velocity at which a contact force is cut off.
+
+    `v` is the velocity of the armature, m/s.
+    """
     product = 1.0
     for k in range(int(c[0])):
         row = 1 + WIDTH * k
@@ -122,7 +125,10 @@ def sum_of(spring: SpringPart | None, terms: Mapping[str, Term], mass: float) ->
 
 
 def _spring_row(spring: SpringPart) -> Row:
-    """Convert a spring to a row; raise InputError unless its law is `linear`, `preload` or `cubic`."""
+    """Convert a spring to a row of packed constants.
+
+    Raises InputError unless the law of the spring is `linear`, `preload` or `cubic`.
+    """
     values = {name: getattr(spring, name) for name in spring.names()}
     if spring.law == "linear":
         return (0.0, math.nan, values["Bs"], -values["Bs"] / values["As"], 0.0)

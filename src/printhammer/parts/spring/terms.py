@@ -137,12 +137,12 @@ class SampledForce(Term):
 
     @property
     def samples(self) -> tuple[tuple[float, float], ...]:
-        """Displacements [m], ascending, and forces [N] of the samples."""
+        """Samples as pairs of displacement [m] and force [N], by ascending displacement."""
         return self._samples
 
 
 def _samples_of(path: Path) -> tuple[tuple[float, float], ...]:
-    """Read the samples of a force from a table: displacements [m], ascending, and forces [N].
+    """Read the samples of a force from a table: pairs of displacement [m] and force [N], ascending.
 
     Raises InputError if the table cannot be read, or has fewer than two samples, more than `MOST_SAMPLES`, or
     two samples at the same displacement.
@@ -188,7 +188,7 @@ class LinearContact(Term):
 
     @property
     def sign(self) -> float:
-        """Direction of motion in which the indentation grows, 1 toward the paper, or -1."""
+        """Direction of motion in which the indentation grows: 1 toward the paper, -1 away from the paper."""
         return FRONT if self.side == "front" else BACK
 
     def row(self, mass: float) -> Row:
@@ -196,7 +196,10 @@ class LinearContact(Term):
         return (self.sign, self.position, self.stiffness, self.power, self.damping or 0.0)
 
     def force(self, depth: Any, rate: Any = 0.0) -> Any:
-        """Return the contact force [N] at indentations [m] and their rates [m/s], numbers or arrays."""
+        """Return the contact force [N] at indentations `depth` [m] that grow at `rate` [m/s].
+
+        Both are numbers or arrays.
+        """
         return self.stiffness * depth**self.power * np.maximum(1.0 + (self.damping or 0.0) * rate, 0.0)
 
 
