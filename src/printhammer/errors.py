@@ -101,7 +101,10 @@ class InputError(PrinthammerError, ValueError):
 
 @contextmanager
 def located(where: object, *, file: object = None, key: str | None = None) -> Iterator[None]:
-    """Add a location, such as a file or a key, to any `InputError` raised in the context."""
+    """Add a location, such as a file or a key, to any `InputError` raised in the context.
+
+    Arguments as for `InputError.within`.
+    """
     try:
         yield
     except InputError as error:
@@ -121,7 +124,10 @@ def nearest(name: str, known: Iterable[str], otherwise: str = "") -> str:
 
 
 def missing_extra(needs: str, extra: str) -> InputError:
-    """Return the error for a package that an extra installs; the message begins with `needs`."""
+    """Return the error for a missing package that the extra `extra` installs.
+
+    The message begins with `needs`, which names the package and its purpose.
+    """
     return InputError(
         f"{needs}, which the extra printhammer[{extra}] installs: pip install 'printhammer[{extra}]'",
         key=extra,

@@ -78,7 +78,10 @@ def struck_dots(motion: Motion, problem: Problem, record: Record) -> list[Struck
 
 
 def dot_values(motion: Motion) -> FloatArray:
-    """Return the values of `DOT_QUANTITIES` for each firing, SI, shape (dots, q); NaN if missing."""
+    """Return the values of `DOT_QUANTITIES` for each firing, in SI, shape (dots, quantities).
+
+    A value that a dot lacks is NaN.
+    """
     values = np.full((len(motion.dots), len(DOT_QUANTITIES)), np.nan)
     names = list(DOT_QUANTITIES)
     for dot in motion.dots:
@@ -95,7 +98,7 @@ def dot_values(motion: Motion) -> FloatArray:
 
 
 def _touches(contacts: Sequence[Contact]) -> list[int]:
-    """Return the row index of the contact that prints each dot, in order of the firings."""
+    """Return the indices in `contacts` of the contacts that print the dots, in the order of the firings."""
     return [
         row
         for row, contact in enumerate(contacts)
@@ -104,7 +107,10 @@ def _touches(contacts: Sequence[Contact]) -> list[int]:
 
 
 def _back(contacts: Sequence[Contact], row: int) -> int | None:
-    """Return the row of the first backstop contact after a dot and its extra contacts; None if absent."""
+    """Return the row of the first contact after a dot and its extra contacts; None unless on the backstop.
+
+    `row` is the row of the contact that prints the dot.
+    """
     following = next((k for k in range(row + 1, len(contacts)) if not contacts[k].extra), None)
     return following if following is not None and contacts[following].surface == "backstop" else None
 
@@ -114,7 +120,7 @@ def _end(record: Record, contact: Contact) -> float:
 
 
 def _peak_time(problem: Problem, record: Record, contact: Contact) -> float:
-    """Refine the time [s] of largest indentation by Newton's method on the velocity."""
+    """Refine the time [s] of largest indentation in a pack contact by Newton's method on the velocity."""
     t = contact.t_peak
     for _ in range(3):
         row = problem.resample(record, np.array([t]))[0]
@@ -126,7 +132,10 @@ def _peak_time(problem: Problem, record: Record, contact: Contact) -> float:
 
 
 def _force_time(problem: Problem, record: Record, contact: Contact, t_peak: float) -> float:
-    """Return the time of the largest pack force, s; the time of touch if the force is largest then."""
+    """Return the time [s] of the largest pack force in a contact; the time of touch if it is largest there.
+
+    `t_peak` is the time of the largest indentation, s.
+    """
     from scipy.optimize import minimize_scalar
 
     t_in, t_out = contact.t_in, _end(record, contact)
@@ -158,6 +167,8 @@ def _force_time(problem: Problem, record: Record, contact: Contact, t_peak: floa
 def _stationary_time(problem: Problem, record: Record, t: float, step: float) -> float:
     """Find the time near `t` [s] at which the pack force is stationary, by the secant method.
 
+    The second initial guess lies `step` [s] earlier; the iteration stops at a correction of `step` or more.
+
     A comparison of forces would locate the time to only half of the digits.
     """
     before, rate_before = t - step, pack_push_rate(problem, record, t - step)
@@ -171,7 +182,10 @@ def _stationary_time(problem: Problem, record: Record, t: float, step: float) ->
 
 
 def _acceleration(problem: Problem, row: FloatArray, *without: int) -> float:
-    """Compute the acceleration, m/s^2, from a row of `Problem.resample`, omitting some force columns."""
+    """Compute the acceleration [m/s^2] from a row of `Problem.resample`, without some of the forces.
+
+    `without` are the columns of the forces to omit.
+    """
     forces = {k: float(row[k]) for k in range(3, 9) if k not in without}
     drive = float(row[2]) if problem.drive.quantity == "force" else 0.0
     return (math.fsum(forces.values()) + drive) / problem.hammer.mass
@@ -238,7 +252,10 @@ class _Look:
         return self.flow.states[row], self.flow.changes[row]
 
     def later(self, columns: FloatArray, surface: str, v: float) -> FloatArray:
-        """Differentiate the time [s] at which the armature passes a surface at the speed `v` [m/s]."""
+        """Return the derivatives of the time [s] at which the armature passes a surface at speed `v` [m/s].
+
+        `columns` are the derivatives of the state at a fixed time, just before the passage.
+        """
         return np.asarray(-(columns[0] - surface_moves(self.wanted)[surface]) / v)
 
     def dot(self, dot: Struck, contacts: Sequence[Contact]) -> dict[str, FloatArray]:
@@ -266,7 +283,10 @@ class _Look:
         return changes
 
     def _approach(self, contact: Contact, *without: int) -> float:
-        """Compute the acceleration at a touch, m/s^2, before an impact if the surface is rigid."""
+        """Compute the acceleration [m/s^2] at a touch, without the forces in the columns `without`.
+
+        If the surface is rigid, the acceleration is that just before the impact.
+        """
         row = self.problem.resample(self.record, np.array([contact.t_in]))[0]
         if contact.peak_force is None:
             hammer = self.problem.hammer
@@ -282,8 +302,8 @@ class _Look:
     ) -> dict[str, FloatArray]:
         """Compute the derivatives of depth, force, work, loss and contact time of a dot on a pack.
 
-        `speed` and `later` are the derivatives of touch speed [m/s] and touch time [s], and `touch` the
-        columns before the touch.
+        `speed` and `later` are the derivatives of touch speed [m/s] and touch time [s]; `touch` holds the
+        tangent columns just before the touch.
         """
         changes: dict[str, FloatArray] = {}
         state, at_peak = self.columns(dot.t_peak)

@@ -190,9 +190,9 @@ def flow(
 def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
     """Return the derivatives of the rest state at time 0 with respect to n constants, shape (3, n).
 
-    The rows: displacement [m], velocity [m/s] and latest local maximum [m]. If a pulse with a sharp edge is
-    fired at time 0, a shift of its firing changes the initial velocity. With a coil circuit, the shape is (6,
-    n), for a start without current.
+    The rows are displacement [m], velocity [m/s] and latest local maximum [m]. If a pulse with a sharp edge
+    is fired at time 0, a shift of its firing changes the initial velocity. With a coil circuit, the shape is
+    (6, n); the run starts without current, see `without_current`.
     """
     columns = np.zeros((3, len(wanted)))
     columns[0] = rest_changes(problem.hammer, wanted)
@@ -227,9 +227,10 @@ def _released(hammer: Hammer, push: float, before: float) -> float:
 def without_current(problem: Problem, wanted: Sequence[Parameter], columns: FloatArray) -> FloatArray:
     """Return the derivatives of a currentless initial state with respect to n constants, shape (6, n).
 
-    Rows 3 to 5 are the electric part of the state. The flux linkage at zero current depends on the initial
-    displacement. If a voltage is switched on at time 0, a shift of its firing changes the initial flux
-    linkage.
+    Rows 0 to 2 are `columns`, the derivatives of the mechanical state. Rows 3 to 5 are those of the flux
+    linkages of coil and shorted turn [Wb] and of the reservoir voltage [V]. The flux linkage at zero current
+    depends on the initial displacement. If a voltage is switched on at time 0, a shift of its firing changes
+    the initial flux linkage.
     """
     magnet: Any = import_module(problem.laws.magnet or problem.laws.absent)
     linkage = getattr(magnet, "magnet_linkage", None) if problem.constants[COUPLED] else None
@@ -263,7 +264,10 @@ def without_current(problem: Problem, wanted: Sequence[Parameter], columns: Floa
 
 
 def surface_moves(wanted: Sequence[Parameter]) -> dict[str, FloatArray]:
-    """Return the derivatives of the positions [m] of pack front and backstop with respect to n constants."""
+    """Return the derivatives of the positions [m] of pack front and backstop with respect to n constants.
+
+    Each entry, "pack" and "backstop", has the shape (n,).
+    """
     moves = as_arrays(wanted)["hammer"]
     return {"pack": moves[:, FRONT], "backstop": moves[:, POSITION]}
 
@@ -283,7 +287,10 @@ def pack_push_changes(
 
 
 def pack_push_rate(problem: Problem, record: Record, t: float) -> float:
-    """Return the rate of change of the pack force, N/s, at a time [s]; NaN off the loading branch."""
+    """Return the time derivative [N/s] of the pack force at the time `t` [s].
+
+    The result is NaN unless the pack is on its loading branch.
+    """
     row = problem.resample(record, np.array([t]))[0]
     if int(row[9]) != M.LOADING:
         return math.nan
@@ -297,7 +304,11 @@ def pack_push_rate(problem: Problem, record: Record, t: float) -> float:
 
 
 def _push_change(problem: Problem, moves: FloatArray, state: FloatArray, change: FloatArray) -> float:
-    """Return the derivative of the pack force [N] in the direction of a change of constants and state."""
+    """Return the directional derivative of the pack force [N] along a change of constants and state.
+
+    `moves` is the change of the packed constants; `change` is that of displacement, velocity and latest local
+    maximum in `state`.
+    """
     x, v, mode, peak = (float(number) for number in state[:4])
     dx, dv, dp = (float(number) for number in change)
     # A step must neither leave the pack nor change the indentation by much.

@@ -151,7 +151,10 @@ def _parameter(hammer: Hammer, drive: Drive, name: str) -> Parameter:
 
 
 def _spacing(drive: Drive, name: str, packed: FloatArray) -> Parameter:
-    """Build the constant "period" or "rate" of a drive; the first firing of a train stays fixed."""
+    """Build the constant `name`, "period" or "rate", of a drive; the first firing of a train stays fixed.
+
+    `packed` is the derivative of the hammer's packed constants, which is zero.
+    """
     period, count = drive.period, len(drive.times)
     if period is None or (count == 1 and not isinstance(drive.waveform, Sine)):
         raise InputError.of("constant", name, "a drive with a single period and several firings")
@@ -190,7 +193,11 @@ def _changed(waveform: Waveform, name: str, value: float) -> Waveform:
 
 
 def _table_change(made: Callable[[float], Waveform], value: float, scale: float, name: str) -> FloatArray:
-    """Compute the derivative of a segment table with respect to a constant that changes no segment kind."""
+    """Compute the derivative of the segment table of a waveform with respect to the scaled constant `name`.
+
+    `made` builds the waveform from a value of the constant. Raise InputError if a small change of the
+    constant changes the number or the kinds of segments.
+    """
     kinds = made(value).segments()[:, 1]
 
     def table(moved: float) -> FloatArray:
@@ -207,7 +214,11 @@ def _table_change(made: Callable[[float], Waveform], value: float, scale: float,
 
 
 def _difference(function: Callable[[float], FloatArray], value: float, scale: float, name: str) -> FloatArray:
-    """Differentiate an array with respect to a scaled constant, ``value / scale``; 0 for infinite entries."""
+    """Differentiate an array with respect to a scaled constant, ``value / scale``.
+
+    `function` returns the array for a value of the constant; `name` is for error messages. The derivative of
+    an entry that is not finite is 0.
+    """
     for offsets, weights in _STENCILS:
         try:
             middle = function(value)

@@ -152,7 +152,11 @@ class _Maps:
         self.current = None if strobes.electric is None else strobes.electric[:, -1]
 
     def images(self, rows: Any, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Compute the images of scaled states, shape (n, 2), of given rows, and their derivatives."""
+        """Compute the images of scaled states under the maps of given rows, and their derivatives.
+
+        `rows` are the indices of n rows of dots, and `z` holds one state for each, shape (n, 2). The images
+        have the shape (n, 2), the derivatives (n, 2, 2).
+        """
         steps = _SPACING * np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
         count, places = len(steps), np.repeat(rows, len(steps))
         floor = np.stack([self.lowest[rows] / self.scales[rows, 0], np.full(len(rows), -np.inf)], axis=1)

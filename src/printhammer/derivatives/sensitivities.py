@@ -118,16 +118,19 @@ class Sensitivities(Result):
     @property
     @derived("1", _IN_PARTS, "dot quantity constant")
     def logarithmic(self) -> FloatArray:
-        """Relative change of a dot's quantity per relative change of a constant, shape (d, q, n).
+        """Relative change of a dot's quantity per relative change of a constant.
 
-        The result is NaN for a constant that is zero.
+        The shape is (dots, quantities, constants); the entries of a constant that is zero are NaN.
         """
         return _relative(self.derivatives, self.values, self.dots)
 
     @property
     @derived("1", _IN_PARTS, "energy constant")
     def run_logarithmic(self) -> FloatArray:
-        """Relative change of each energy per relative change of a constant; NaN for zero energies."""
+        """Relative change of each energy of the run per relative change of a constant; NaN for zero energies.
+
+        The shape is (energies, constants).
+        """
         return _relative(self.run_derivatives, self.values, self.run)
 
     def spread(self, spreads: Mapping[str, float | str]) -> Spread:
@@ -168,7 +171,7 @@ class Sensitivities(Result):
         )
 
     def notes(self) -> dict[str, Any]:
-        """Return omitted constants and differentiability, as attributes of the Dataset."""
+        """Return attributes of the Dataset: differentiability of the motion, and omitted constants."""
         return {"smooth": str(self.smooth), "left_out": "; ".join(self.left_out.values())}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
@@ -228,25 +231,34 @@ class Spread(Result):
     @property
     @derived("quantity_unit", _INDEPENDENT, "dot quantity")
     def deviation(self) -> FloatArray:
-        """Standard deviation of each quantity of each dot, for independent constants, SI, shape (d, q)."""
+        """Standard deviation of each quantity of each dot, in SI, if the constants are independent.
+
+        The shape is (dots, quantities).
+        """
         return np.asarray(np.sqrt((self.dots**2).sum(axis=-1)))
 
     @property
     @derived("quantity_unit", _WORST, "dot quantity")
     def worst(self) -> FloatArray:
-        """Worst-case deviation of each quantity of each dot, SI, shape (d, q): constants at their limits."""
+        """Worst-case deviation of each quantity of each dot, in SI, with all constants at their limits.
+
+        A limit is one relative spread away from the value. The shape is (dots, quantities).
+        """
         return np.asarray(self.dots.sum(axis=-1))
 
     @property
     @derived("J", _INDEPENDENT, "energy")
     def run_deviation(self) -> FloatArray:
-        """Standard deviation of each energy of the run, for independent constants, J, shape (energies,)."""
+        """Standard deviation [J] of each energy of the run, if the constants are independent."""
         return np.asarray(np.sqrt((self.run**2).sum(axis=-1)))
 
     @property
     @derived("J", _WORST, "energy")
     def run_worst(self) -> FloatArray:
-        """Worst-case deviation of each energy of the run, J, shape (energies,): constants at their limits."""
+        """Worst-case deviation [J] of each energy of the run, with all constants at their limits.
+
+        A limit is one relative spread away from the value.
+        """
         return np.asarray(self.run.sum(axis=-1))
 
     @property
@@ -255,7 +267,7 @@ class Spread(Result):
         return self.sensitivities.provenance
 
     def notes(self) -> dict[str, Any]:
-        """Return the notes on the run, as attributes of the Dataset."""
+        """Return attributes of the Dataset: duration of the run, and the notes of the sensitivities."""
         return {"duration": self.sensitivities.duration, **self.sensitivities.notes()}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:

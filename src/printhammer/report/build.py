@@ -35,7 +35,7 @@ _PICTURE: Final = re.compile(r"figure\d\d\.(svg|pdf|png)")
 
 
 def check_place(out: str | Path) -> None:
-    """Check that a report would overwrite only files of an earlier report in a folder."""
+    """Raise InputError if a report in the folder `out` would overwrite files other than an earlier report."""
     folder = Path(out)
     pictures = folder / PICTURES
     drawn = sorted(pictures.iterdir()) if pictures.is_dir() else []
@@ -193,7 +193,11 @@ def write_report(
 
 
 def claims_json(results: list[JudgedClaim], rates: BaseRates | None = None) -> str:
-    """Return the evaluated claims as JSON: a list of objects with name, kind, value, band and verdict."""
+    """Return the evaluated claims as JSON: a list of objects with name, kind, value, band and verdict.
+
+    Each object also has `base_rate`, the fraction of random hammers for which the claim holds, from `rates`;
+    null if unknown.
+    """
     entries = []
     for result in results:
         share = rates.share(result.claim.name) if rates is not None else None
@@ -209,7 +213,11 @@ def _draw(
     folder: Path,
     written: list[Path],
 ) -> Drawing | None:
-    """Draw a figure into a folder; return None if no drawing function exists for its number."""
+    """Draw the figure `number` into a folder; return None if no drawing function exists for the number.
+
+    `says` is the entry of the figure in the list of figures of the paper, `results` are the evaluated claims.
+    The paths of the files are appended to `written`.
+    """
     from printhammer.figures import FIGURES, save
 
     if number not in FIGURES:

@@ -68,7 +68,7 @@ def words_of(name: str) -> str:
 
 
 def value_text(value: Any, unit: str, *, other: bool = True) -> str:
-    """Format a measured value, with the inch-pound value in parentheses."""
+    """Format a measured value, in SI, as text; if `other`, with the inch-pound value in parentheses."""
     if value is None:
         return "none"
     if isinstance(value, bool):
@@ -163,7 +163,10 @@ class Report(Declared):
 
     @property
     def statements(self) -> tuple[int, int]:
-        """Number of statements of the paper that hold, and of all; a panel of Fig. 11 counts as one."""
+        """Number of statements of the paper that hold, and number of all statements of the paper.
+
+        Each panel of Fig. 11 counts as one statement.
+        """
         pairs = [result.statements for result in self.results]
         return sum(held for held, _ in pairs), sum(made for _, made in pairs)
 
@@ -198,7 +201,7 @@ def cited_figures(source: str) -> set[int]:
 
 
 def linked_source(source: str, drawn: set[int]) -> Any:
-    """Return a source as HTML, with links to the drawn figures."""
+    """Return the source of a claim as HTML, with links to the drawn figures; `drawn` are their numbers."""
     from markupsafe import Markup, escape
 
     def link(match: re.Match[str]) -> str:

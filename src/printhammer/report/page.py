@@ -33,7 +33,10 @@ SAME: Final = 1e-9
 
 
 def share_view(share: Share, floor: float | None = None) -> dict[str, Any]:
-    """Return a fraction with its interval, as text and as positions in percent of a scale."""
+    """Return a fraction and its confidence interval, as texts and as positions in percent of a scale.
+
+    The scale is linear from 0 to 1; or, with a `floor`, logarithmic from `floor` to 1.
+    """
     low, high = share.interval
 
     def place(part: float) -> float:
@@ -75,9 +78,9 @@ def rates_view(report: Report) -> dict[str, Any] | None:
 
 
 def panels_view(report: Report) -> list[dict[str, Any]]:
-    """Return the panels of Fig. 11: verdict of the paper, computed verdict, fraction of random hammers.
+    """Return, for each panel of Fig. 11, the verdict of the paper and the computed verdict.
 
-    The fraction counts the random hammers whose computed verdict is that of the paper.
+    An entry also contains the fraction of random hammers whose computed verdict is that of the paper.
     """
     verdicts: list[str] = []
     for result in report.results:
@@ -163,7 +166,10 @@ def predictions_view(report: Report) -> dict[str, Any] | None:
 
 
 def failing_view(report: Report) -> list[dict[str, Any]]:
-    """Return the failing claims, each with its distance from the band, the reason, and the best hammer."""
+    """Return the failing claims, each with its distance from the band and the reason for the failure.
+
+    An entry also contains the hammer that satisfies the claim most closely, if it is known.
+    """
     search = report.search
     rows = []
     for result in report.results:
@@ -265,7 +271,10 @@ def _conclusions(family: Family) -> list[dict[str, Any]]:
 
 
 def _dots(values: Iterable[float], ends: tuple[float, float] | None = None) -> list[str]:
-    """Return positions on a scale, in percent, linear between the smallest and the largest value."""
+    """Return the positions of values on a linear scale, in percent of its length.
+
+    The scale extends between `ends`, by default the smallest and the largest value, plus a margin.
+    """
     values = list(values)
     low, high = ends or (min(values, default=0.0), max(values, default=0.0))
     span = high - low

@@ -61,7 +61,10 @@ def span(values: Any) -> str:
 
 
 def shortened(rows: Sequence[Sequence[str]], most: int = MOST_ROWS) -> list[Sequence[str]]:
-    """Shorten a table to `most` rows: first rows, a row with the number of omitted rows, last rows."""
+    """Shorten a table of more than `most` rows to its first and last rows.
+
+    A row between them states the number of omitted rows.
+    """
     hidden, half = len(rows) - most, most // 2
     if hidden <= 0:
         return list(rows)
@@ -286,10 +289,10 @@ class Declared:
         return titled(type(self).__name__, html_table(rows))
 
     def __dir__(self) -> list[str]:
-        """Return the names offered for completion: public fields, properties and methods."""
+        """Return the names offered for tab completion: public fields, properties and methods."""
         return public_names(super().__dir__())
 
 
 def public_names(names: Iterable[str]) -> list[str]:
-    """Filter the names of an object's attributes: public names, without class constants."""
+    """Return the public names among the names of an object's attributes, sorted, without class constants."""
     return sorted(name for name in names if not name.startswith("_") and not name.isupper())

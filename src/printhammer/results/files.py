@@ -79,6 +79,9 @@ def save(
 ) -> None:
     """Write a result atomically, as a Dataset or as a table, depending on the file ending.
 
+    `dataset` and `dataframe` are functions that build the Dataset and the table; only the function that the
+    format needs is called.
+
     Raises
     ------
     InputError
@@ -143,7 +146,10 @@ def reopen(path: str | Path) -> Reopened:
 
 
 def need_for(path: str | Path, kind: str = "") -> None:
-    """Check that the package for a file format is installed; `kind` is the format (default: ending)."""
+    """Raise InputError unless the package that a file format needs is installed.
+
+    `kind` is the ending of the format, such as ".zarr"; by default the ending of `path`.
+    """
     package, what, extra = _NEEDED.get(kind or Path(path).suffix.lower(), ("json", "", ""))
     if find_spec(package) is None:
         raise missing_extra(f"{path}: {what} {package}", extra)
@@ -174,7 +180,10 @@ def dataset_of(entries: Mapping[str, tuple[Column, Any]], attributes: Mapping[st
 
 
 def frame_of(dataset: xr.Dataset, attributes: Mapping[str, Any] | None = None) -> pd.DataFrame:
-    """Build a table from the arrays of a Dataset that have the dimensions of the first array."""
+    """Build a table from the arrays of a Dataset that lie over the dimensions of its first data array.
+
+    `attributes` are stored in the `attrs` of the table; by default those of the Dataset.
+    """
     first = next(iter(dataset.data_vars.values()), None)
     dims = () if first is None else tuple(map(str, first.dims))
     columns = {}
@@ -194,7 +203,7 @@ def frame(
     Parameters
     ----------
     columns : mapping
-        Dimensions, a subset of `dims`, and values, by heading.
+        Dimensions of a column, a subset of `dims`, and its values, by heading of the column.
     dims : tuple of str
         The dimensions; the last varies fastest.
     attributes : dict
@@ -250,7 +259,7 @@ def _text(value: Any) -> str:
 
 
 def _decode(value: str, starts: str = '[{"-0123456789n') -> Any:
-    """Decode an attribute encoded by `_text`."""
+    """Decode an attribute encoded by `_text`; a text that begins with none of `starts` is not JSON."""
     if value[:1] and value[0] in starts:
         with suppress(ValueError):
             decoded = json.loads(value)

@@ -245,7 +245,7 @@ class Result:
         )
 
     def __dir__(self) -> list[str]:
-        """Return the names for completion: public fields, properties and methods."""
+        """Return the names offered for tab completion: public fields, properties and methods."""
         return public_names(super().__dir__())
 
 
@@ -282,7 +282,8 @@ def stacked(results: Sequence[Result], dim: str, kind: type[Result]) -> Entries:
     Returns
     -------
     dict
-        Entries in the form of `Result.entries`, with the longest of each coordinate.
+        Entries in the form of `Result.entries`. A coordinate is that of the result in which the coordinate is
+        longest.
     """
     declared = (note for note in kind.COLUMNS.values() if note.kind in ("column", "coordinate"))
     none: Entries = {note.name: (note, np.zeros((0,) * len(note.dims))) for note in declared}

@@ -49,7 +49,7 @@ class Variable(Declared):
 
 
 class Layout(Declared):
-    """Layout of a store: arrays, attributes and identity."""
+    """Layout of a store: its arrays, its attributes, and the settings that identify the sweep."""
 
     chunks: tuple[int, ...] = part("number of members in a block, along each member dimension")
     variables: tuple[Variable, ...] = part("results and coordinates, `MARK` among the results")
@@ -100,7 +100,10 @@ class Store:
         return (self.path / _chunk(MARK, index)).exists()
 
     def write(self, index: Sequence[int], results: Mapping[str, npt.NDArray[Any]]) -> None:
-        """Write the arrays of the block at an index of the chunk grid, by name, atomically and durably."""
+        """Write a block atomically, and flush its files to disk.
+
+        `index` is the index of the block in the chunk grid; `results` are the arrays of the block, by name.
+        """
         where = tuple(
             slice(i * size, i * size + count)
             for i, size, count in zip(index, self._layout.chunks, results[MARK].shape, strict=True)
@@ -118,7 +121,7 @@ class Store:
             raise self._refusal(error) from None
 
     def finish(self, now: str) -> None:
-        """Add the time stamp of completion to a complete store, unless the stamp is already present."""
+        """Add the time stamp of completion, `now`, to a complete store, unless it already has a stamp."""
         root = _root(self.path)
         if root["attributes"].get("finished"):
             return
@@ -129,7 +132,7 @@ class Store:
             raise self._refusal(error) from None
 
     def close(self) -> None:
-        """Release the lock."""
+        """Release the lock of the store, so that another process can open it for writing."""
         if self._handle >= 0:
             os.close(self._handle)
             self._handle = -1
@@ -176,7 +179,7 @@ class Store:
         _flush([self.path.parent])
 
     def _put(self, files: Mapping[str, bytes]) -> None:
-        """Write files atomically, and flush all files to disk."""
+        """Write files, given as contents by relative path, each atomically; flush all files to disk."""
         draft = self.path / _DRAFT
         touched: set[Path] = set()
         try:
@@ -280,7 +283,10 @@ def _chunk(name: str, index: Sequence[int]) -> str:
 
 
 def _lock(folder: Path, named: Path) -> int:
-    """Lock a folder against other processes; return the file handle that holds the lock."""
+    """Lock a folder against other processes; return the file handle that holds the lock.
+
+    The handle is -1 if the operating system has no such locks. Error messages name the folder `named`.
+    """
     try:
         import fcntl
     except ImportError:

@@ -61,17 +61,17 @@ def interval(values: npt.NDArray[Any], unit: str) -> str | None:
 
 
 def styled(style: Style, said: object) -> str:
-    """Mark a text with a display style, such as "strong"."""
+    """Mark the text `said` with a display style, such as "strong"."""
     return f"⟪{style} {said}⟫"
 
 
 def judged(good: bool, said: object, otherwise: Style = "poor") -> str:
-    """Return a text marked with the style "good" if `good`, else with the style `otherwise`."""
+    """Return the text `said` marked with the style "good" if `good`, else with the style `otherwise`."""
     return styled("good" if good else otherwise, said)
 
 
 def repeated(name: str, sentences: Iterable[str]) -> list[FactRow]:
-    """Return sentences as facts of a summary, with the name on the first fact only."""
+    """Return sentences as facts of a summary; only the first fact bears the name `name`."""
     return [("" if row else name, sentence) for row, sentence in enumerate(sentences)]
 
 
@@ -93,7 +93,10 @@ def sign(name: str) -> str:
 
 
 def shown(value: float, unit: str, name: str, digits: str) -> str:
-    """Format a quantity, SI, as a number in a display unit, without the unit symbol."""
+    """Format a quantity, `value` in the SI unit `unit`, as a number in the display unit `name`.
+
+    The text does not contain the unit symbol; `digits` is the format of the number, such as ".3f".
+    """
     from printhammer.units import from_si
 
     text = format(from_si(value, unit, name), digits)
@@ -238,7 +241,7 @@ def _plain_head(column: Cells, system: System) -> str:
 
 
 def _align(rows: Sequence[Sequence[str]], sides: str) -> list[str]:
-    """Format rows as lines with aligned columns."""
+    """Format rows as lines with aligned columns; `sides` has one character per column, "<" or ">"."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return [
         "  ".join(

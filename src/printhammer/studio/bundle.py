@@ -38,12 +38,15 @@ def page_files() -> dict[str, bytes]:
 
 
 def merged(wanted: str) -> str:
-    """Return a module of the page and its dependencies as one script without imports, for web workers."""
+    """Return the module `wanted` and its dependencies as one script without imports, for web workers."""
     return "\n".join(_EXPORT.sub("", _IMPORTS.sub("", text)) for _, text in sources(wanted))
 
 
 def sources(wanted: str) -> list[tuple[str, str]]:
-    """Return a module and its dependencies in order of import, as pairs of path and text."""
+    """Return the page's module `wanted` and its dependencies, as pairs of path and text.
+
+    Each module follows the modules that it imports.
+    """
     ordered: dict[str, str] = {}
 
     def add(name: str) -> None:
@@ -69,8 +72,9 @@ def deltas(content: bytes) -> bytes:
     Returns
     -------
     bytes
-        Blocks of: number of literals, the literals, length and distance of a copy. Numbers are stored with
-        seven bits per byte, least significant first; ``unpack`` in ``web/engine/shelf.js`` is the decoder.
+        Blocks, each of which contains the number of literal bytes, the literal bytes, and length and distance
+        of a copy. Numbers are stored with seven bits per byte, least significant first; ``unpack`` in
+        ``web/engine/shelf.js`` is the decoder.
     """
     places: dict[bytes, int] = {}
     packed = bytearray()

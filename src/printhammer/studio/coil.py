@@ -99,7 +99,7 @@ def _inductance(hammer: Hammer) -> float:
 
 
 def _pulse(hammer: Hammer) -> tuple[float, float]:
-    """Return peak [A] and width [s] of the current pulse of a hammer, or the default `_PULSE`."""
+    """Return peak [A] and width [s] of a hammer's nominal current pulse; without such a pulse, `_PULSE`."""
     waveform = hammer.waveform
     width = getattr(waveform, "width", None)
     if waveform is None or waveform.quantity != "current" or width is None:

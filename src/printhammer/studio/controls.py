@@ -80,7 +80,11 @@ _PUSHES: Final = {
 
 
 def _shaken(amplitude: float, angular: float, phase: float, low: float, high: float) -> dict[str, Any]:
-    """Build the initial page state of an oscillator under a sinusoidal force; frequencies in rad/s."""
+    """Build the initial page state of an oscillator under a sinusoidal force.
+
+    The force has the amplitude `amplitude` [N], the phase `phase` [rad] and the angular frequency `angular`
+    [rad/s]. `low` and `high` are the ends of the frequency axis of the map, rad/s.
+    """
     wave = {"shape": "sine", "amplitude": amplitude, "phase": phase, "quantity": "force"}
     rates = {"rate": angular, "low": low, "high": high}
     return {"waveform": wave, "pulses": 20} | {
@@ -256,7 +260,10 @@ def units_of(hammer: Hammer) -> dict[str, list[dict[str, Any]]]:
 
 
 def vocabulary() -> dict[str, Any]:
-    """Return the pulse shapes with their constants, the names of the drivers, and the current decay paths."""
+    """Return the pulse shapes with their constants, the names of the drivers, and the kinds of current decay.
+
+    A kind of decay is the path that the coil current takes after switch-off.
+    """
     shapes = {name: [_field(shape, field) for field in quantities(shape)] for name, shape in SHAPES.items()}
     # The frequency of a continuous force is the rate.
     shapes[Sine.shape] = [_field(Sine, field) for field in SINE]

@@ -65,7 +65,10 @@ def read_start(written: str) -> tuple[dict[str, Any] | str, Hammer | None]:
 
 
 def _hammer_inside(text: str, where: str) -> Hammer:
-    """Parse a hammer file embedded in another file; a reference to further files is refused."""
+    """Parse a hammer file embedded in a state file; raise InputError if it refers to further files.
+
+    `where` names the embedded text in error messages.
+    """
     # The parse time of a key grows with the square of the number of its dots.
     dots = max(part.count(".") for part in re.split(r"[\n,=\[\]{}]", text))
     if len(text) > LARGEST_FILE or dots > MOST_DOTS:

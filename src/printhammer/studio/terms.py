@@ -45,10 +45,11 @@ _ROWS: Final[dict[str, dict[int, _Template]]] = {
 
 
 def sums_of(hammer: Hammer) -> dict[str, list[tuple[int, list[Product]]]]:
-    """Return the numbers of spring and damping as sums of products of constants: index and products, by role.
+    """Return the numbers of spring and damping as sums of products of constants, by role.
 
-    The result is empty for a hammer without forces and contacts. Numbers that no constant of the hammer file
-    sets are left out.
+    An entry consists of the index of a number and the products whose sum is the number. Numbers that no
+    constant of the hammer file determines are omitted; the result is empty for a hammer without forces and
+    contacts.
     """
     sums: dict[str, list[tuple[int, list[Product]]]] = {}
     if isinstance(hammer.spring, ForceSum):
@@ -69,7 +70,10 @@ def _numbers_of_rows(hammer: Hammer) -> Iterator[tuple[int, list[Product]]]:
 
 
 def _product(hammer: Hammer, entry: str, template: _Template) -> Product | None:
-    """Insert the keys of an entry in a template; None if a constant other than `acceleration` is missing."""
+    """Insert the keys of an entry of the hammer file into the template of a product.
+
+    Return None if a constant other than `acceleration` is missing.
+    """
     factor, *roles = template
     keys: list[list[str]] = []
     for names in roles:
@@ -96,7 +100,7 @@ def _numbers_of_friction(hammer: Hammer) -> list[tuple[int, list[Product]]]:
 
 
 def contacts_of(hammer: Hammer) -> list[dict[str, Any]]:
-    """Return name, side and position [m] of the contacts of a hammer."""
+    """Return name, side and position [m] of each ``[[contact]]`` of a hammer."""
     return [
         {"name": key.partition(".")[2], "side": contact.side, "position": contact.position}
         for key, contact in hammer.terms.items()

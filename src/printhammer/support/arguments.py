@@ -41,8 +41,8 @@ class _Argument(NamedTuple):
 def check_objects(function: F) -> Callable[[tuple[Any, ...], dict[str, Any]], None]:
     """Build a function that checks the arguments of another function.
 
-    A parameter is checked if its annotation is a union of classes in `_KINDS` and None. Objects are compared
-    by the names of their classes, so that no class has to be imported.
+    A parameter is checked if its annotation names only classes in `_KINDS`, and possibly None. Objects are
+    compared by the names of their classes, so that no class has to be imported.
 
     Returns
     -------

@@ -15,13 +15,15 @@ def identifier(text: str) -> str:
 
 
 def comment(text: str) -> str:
-    """Return a text that is safe inside a C comment: printable ASCII without "*/"."""
+    """Convert a text for use inside a C comment: printable ASCII, without "*/" and backslashes."""
     plain = text.encode("ascii", "replace").decode().replace("*/", "* /").replace("\\", "/")
     return "".join(letter if letter.isprintable() else " " for letter in plain)
 
 
 def guarded(guard: str, body: str) -> str:
-    """Return a C header with an include guard that contains a checksum of the body.
+    """Return a C header with the text `body` and the include guard `guard`, a macro.
+
+    The value of the macro is a checksum of the body.
 
     Two headers with one name and different contents stop the compiler; without the checksum, the guard would
     skip the second header without a message.
@@ -42,7 +44,7 @@ def guarded(guard: str, body: str) -> str:
 
 
 def numbers(values: npt.ArrayLike) -> str:
-    """Format integers as C source, ten per line."""
+    """Format integers as C source, separated by commas, ten per line."""
     texts = [str(int(value)) for value in np.asarray(values).tolist()]
     return ",\n".join("    " + ", ".join(texts[at : at + 10]) for at in range(0, len(texts), 10))
 
@@ -57,6 +59,6 @@ def nested(values: npt.ArrayLike) -> str:
 
 
 def table(kind: str, name: str, values: npt.ArrayLike) -> str:
-    """Format the definition of a two-dimensional C array."""
+    """Format the definition of a two-dimensional C array with elements of the type `kind`."""
     whole = np.asarray(values)
     return f"static const {kind} {name}[{whole.shape[0]}][{whole.shape[1]}] = {nested(whole)};\n"

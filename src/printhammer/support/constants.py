@@ -154,7 +154,7 @@ def invalid(
     Parameters
     ----------
     error : ValidationError
-        From validating `model`.
+        Error from the validation of `model`.
     model : type of BaseModel
         The model class.
     prefix : str

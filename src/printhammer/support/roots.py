@@ -115,6 +115,8 @@ def find_roots(function: Any, about: Any, grid: Any, count: int, places: Any, va
 def with_probes(function: Any, about: Any, grid: Any, count: int, places: Any, values: Any) -> int:
     """Evaluate a function on a grid and at probes on both sides of grid points that are roots.
 
+    The points are written to `places`, and the values of the function to `values`.
+
     Returns
     -------
     int
@@ -140,7 +142,11 @@ def with_probes(function: Any, about: Any, grid: Any, count: int, places: Any, v
 def in_stretch(
     function: Any, about: Any, places: Any, values: Any, begin: int, last: int, found: Any, count: int
 ) -> int:
-    """Append the roots in an index range without NaN values; return the new number of roots."""
+    """Append the roots between the points `begin` and `last` to `found`; return the new number of roots.
+
+    `begin` and `last` are indices in `places` and `values`, between which no value is NaN; `count` is the
+    previous number of roots.
+    """
     k = begin
     while k <= last:
         x, value = places[k], values[k]
@@ -174,11 +180,12 @@ def dip_of(
 ) -> tuple[float, float]:
     """Search for a dip to zero between two points at which the function has the same sign.
 
+    The height is the value of the function times its sign at the two points.
+
     Returns
     -------
     tuple of float
-        Point with the smallest height, and the height, i.e. the value times the sign of the function at the
-        ends; positive if the function does not reach zero.
+        Point with the smallest height, and this height: positive if the function does not reach zero.
     """
     sign = sign_of(at_low)
     step = _SLOPE * (high - low)
@@ -204,7 +211,7 @@ def dip_of(
 
 
 def put_root(found: Any, count: int, x: float, before: float, after: float) -> int:
-    """Append a root with the signs on both sides; return the new number of roots."""
+    """Append a root, with the signs of the function on both sides, to `found`; return the new root count."""
     found[count, 0], found[count, 1], found[count, 2] = x, before, after
     return count + 1
 

@@ -52,7 +52,8 @@ def mapped(
 ) -> list[B]:
     """Map a function over items in threads; return the values in input order.
 
-    Further arguments as for `in_threads`; `threads` defaults to the number of cores.
+    `threads` is the number of threads, by default the number of cores; `progress` is as for `in_threads`, and
+    `length` is the number of items that a thread fetches at a time.
     """
     values: dict[int, B] = {}
 

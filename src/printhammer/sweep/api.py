@@ -118,8 +118,9 @@ def sweep(
 def _member_table(result: xr.Dataset) -> pd.DataFrame:
     """Convert a sweep to a table with one row per member.
 
-    The columns are the status in words and the elements of every other array, one column for each firing or
-    time. The other cells of a member that was not run are empty.
+    The columns are the axis values, the status in words, and the elements of every other array, with one
+    column for each firing or output time. For a member that was not run, only axis values and status are
+    filled in.
     """
     wide = result[["status"]]
     for name, variable in result.data_vars.items():

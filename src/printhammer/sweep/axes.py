@@ -70,8 +70,9 @@ def read_axis(
 ) -> Axis:
     """Parse one `[[axis]]` table of a sweep spec.
 
-    `own_waveform` is the waveform table of the drive, if any; `named` are the waveforms of a sequence, by
-    name. An axis of a grid has values or a range, an axis of a Latin hypercube only a range.
+    `where` names the table in error messages. `own_waveform` is the waveform table of the drive, if any;
+    `named` are the waveforms of a sequence, by name. `grid` states whether the sweep is a grid: an axis of a
+    grid has values or a range, an axis of a Latin hypercube only a range.
 
     Raises
     ------

@@ -51,8 +51,8 @@ def run_dask(
 
     The scheduler repeats a task whose worker is killed. A task that has killed several workers is abandoned
     by the scheduler; it is postponed until all other tasks are done, then computed alone on the cluster, in
-    ever smaller pieces; a member that still kills its worker is recorded as lost. The arguments are those of
-    `run_local`, and a `distributed.Client` of the scheduler.
+    ever smaller pieces; a member that still kills its worker is recorded as lost. `client` is a
+    `distributed.Client` of the scheduler; the other arguments are those of `run_local`.
 
     Raises
     ------
@@ -85,7 +85,10 @@ class _Tasks:
     def side_by_side(
         self, todo: Sequence[Index], write: Callable[[Index, Results], None], tell: Callable[[float], None]
     ) -> list[Index]:
-        """Compute blocks concurrently; return the blocks that killed several workers."""
+        """Compute blocks concurrently; return the indices of the blocks that killed several workers.
+
+        The arguments are those of `run_local`.
+        """
         left = deque(todo)
         suspects: list[Index] = []
         while left or self._futures:
@@ -102,7 +105,10 @@ class _Tasks:
         return suspects
 
     def alone(self, rows: FloatArray) -> Results:
-        """Compute members one task at a time; if members kill the worker, split the task recursively."""
+        """Compute the members with the axis values `rows` in one task, and return their results.
+
+        If the task kills its worker, it is split recursively; the pieces are computed one at a time.
+        """
         import numpy as np
 
         self._submit(rows, ())
@@ -193,7 +199,10 @@ class _Tasks:
 
 
 def _task(base: Base, outputs: Outputs, rows: FloatArray, wanted: dict[str, str]) -> Results | str:
-    """Compute a block on a worker; return the results, or an error message if software versions differ."""
+    """Compute a block on a worker; return the results, or an error message if the computation fails.
+
+    `rows` are the axis values of the members, and `wanted` the software versions that the worker must have.
+    """
     for name, version in versions().items():
         if version != wanted[name]:
             return f"a worker of the cluster has {name} {version}: expected {wanted[name]}"

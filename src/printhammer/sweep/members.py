@@ -43,9 +43,10 @@ class Member:
 
 
 class Members(NamedTuple):
-    """Several runs of a sweep: the fields of `Member`, one entry per run; `states`: shape (members, 2).
+    """Several runs of a sweep: the fields of `Member`, with one entry per run.
 
-    `windows` are the windows that set the ends of the runs; None if the spec states a duration.
+    `states` has the shape (members, 2). `windows` are the windows that determine the ends of the runs; None
+    if the spec states a duration.
     """
 
     hammers: list[Hammer]
@@ -84,7 +85,7 @@ class Maker:
     Raises
     ------
     InputError
-        From `member`: the values yield no valid hammer or drive, or a hammer without a rest state.
+        Raised by `member` if the values yield no valid hammer or drive, or a hammer without a rest state.
     """
 
     base: Base
@@ -102,7 +103,7 @@ class Maker:
         return Member(hammer, drive, end, self._state(row, hammer))
 
     def members(self, rows: FloatArray, threads: int | None = None) -> tuple[IntArray, Members]:
-        """Return the indices of the rows that yield valid members, and the members."""
+        """Return the indices of the rows of axis values that yield valid members, and these members."""
         which: list[int] = []
         hammers: list[Hammer] = []
         states: list[tuple[float, float]] = []
@@ -206,7 +207,10 @@ class Maker:
         return tomllib.loads(document(head, tables))
 
     def _standard(self, hammer: Hammer) -> tuple[Waveform | None, Hashable]:
-        """Return the waveform to fire with a hammer, and a key that is equal for equal waveforms; cached."""
+        """Return the waveform that the drive fires with a hammer, and a hashable key of the waveform; cached.
+
+        Equal waveforms have equal keys. The waveform is that of the drive, by default that of the hammer.
+        """
         if id(hammer) not in self._standards:
             fired = self.base.waveform if self.base.waveform is not None else hammer.waveform
             does = None if fired is None else (fired.quantity, fired.segments().tobytes())

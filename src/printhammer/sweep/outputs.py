@@ -47,7 +47,7 @@ class Output:
 
     @property
     def fill(self) -> Any:
-        """Fill value of missing entries."""
+        """Fill value of entries of the array that have no result."""
         return {"f": np.nan, "b": False, "i": -1 if self.name in _CODES else 0}[np.dtype(self.dtype).kind]
 
     @property
@@ -133,7 +133,7 @@ class Outputs(Declared):
         return any(output in self.arrays for output in outputs)
 
     def length(self, output: Output) -> tuple[int, ...]:
-        """Return the shape of an output array for one member: () for a scalar."""
+        """Return the shape of an output array for one member, such as (firings,); () for a scalar output."""
         return {"": (), FIRING: (self.firings,), TIME: (self.times.size,)}[output.dim]
 
     def empty(self, members: int) -> dict[str, Any]:

@@ -43,7 +43,10 @@ def latin_hypercube(members: int, seed: int, axes: int) -> FloatArray:
 
 
 def between(share: FloatArray, low: float, high: float, geometric: bool) -> FloatArray:
-    """Interpolate a range at given fractions, 0 to 1, on a linear or geometric scale."""
+    """Interpolate the range from `low` to `high` at the fractions `share`, from 0 to 1.
+
+    The scale is logarithmic if `geometric`, otherwise linear.
+    """
     values: FloatArray
     if geometric:
         values = np.exp(np.log(low) + share * (np.log(high) - np.log(low)))
@@ -267,7 +270,7 @@ def make_plan(spec: Spec) -> Plan:
     Raises
     ------
     InputError
-        There are too many members, names collide, or three test members are all invalid.
+        There are too many members, or the first, the middle and the last member are all invalid.
     """
     if spec.grid:
         dims, shape = tuple(axis.name for axis in spec.axes), tuple(len(axis.values) for axis in spec.axes)

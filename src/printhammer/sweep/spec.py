@@ -175,7 +175,10 @@ def _drive_tables(source: dict[str, Any] | str, folder: Path) -> tuple[dict[str,
 
 
 def _checked_drive(base: Base, own: Mapping[str, Any] | None) -> Base:
-    """Validate a drive independently of the axes; parse its waveform unless an axis changes the waveform."""
+    """Validate the drive of `base` without the axes; parse its waveform unless an axis changes the waveform.
+
+    `own` is the waveform table of the drive; None without such a table.
+    """
     kinds = [name for name in KINDS if name in base.drive]
     if len(kinds) != 1 or not isinstance(base.drive[kinds[0]], Mapping):
         tables = ", ".join(f"[drive.{name}]" for name in KINDS)

@@ -50,7 +50,10 @@ ManyQuantities = Annotated[Any, WithJsonSchema(_MANY)]
 
 
 def read_quantity(written: Any, si: str, where: str) -> float:
-    """Parse a quantity into SI: "1.2 kHz", { value = 1.2, unit = "kHz" }, or a dimensionless number."""
+    """Parse a quantity into SI: "1.2 kHz", { value = 1.2, unit = "kHz" }, or a dimensionless number.
+
+    `si` is the SI unit of the quantity; `where` is its key in the spec, for error messages.
+    """
     with located(where, key=where):
         if isinstance(written, str):
             return parse(written, si)
@@ -68,7 +71,10 @@ def read_quantity(written: Any, si: str, where: str) -> float:
 
 
 def read_quantities(written: Any, si: str, where: str) -> list[float]:
-    """Parse several quantities into SI: a list of quantities, or values with a common unit."""
+    """Parse several quantities into SI: a list of quantities, or values with a common unit.
+
+    Arguments as for `read_quantity`.
+    """
     values: Iterable[Any] = written if isinstance(written, list) else ()
     if isinstance(written, Mapping):
         with located(where, key=where):

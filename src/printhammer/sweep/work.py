@@ -49,7 +49,7 @@ def run_chunk(
     threads: int = 1,
     progress: Callable[[float], None] | None = None,
 ) -> Results:
-    """Integrate the members of a block, one per row of axis values, SI; return arrays by name.
+    """Integrate the members of a block, one per row of axis values in SI; return the output arrays by name.
 
     A member that is invalid or stops early is a row with a status. `progress` is called from time to time
     with the fraction done; an exception that it raises stops the work.

@@ -38,7 +38,7 @@ class Share(Declared):
 
     @property
     def rate(self) -> float:
-        """Fraction of hammers, from 0 to 1."""
+        """Fraction of the measured hammers for which the statement holds, from 0 to 1."""
         return self.holds / self.measured
 
     @property

@@ -109,7 +109,10 @@ def is_unit_row(cells: list[str]) -> bool:
 
 
 def headings(rows: list[list[str]], width: int, separator: str) -> list[Heading]:
-    """Build the headings of columns from a row of names, a row of units, or both."""
+    """Build the headings of `width` columns from a row of names, a row of units, or both.
+
+    Without rows, the headings are empty. With tabs as `separator`, headings of LTspice obtain their units.
+    """
     units = [""] * width
     names = rows[-1][:width] if rows else [""] * width
     if rows and is_unit_row(names):
@@ -309,7 +312,10 @@ def _is_data(row: list[str], words: Collection[str]) -> bool:
 
 
 def _width(data: list[Row], above: list[Row]) -> int:
-    """Return the number of columns: the length of the heading, or else of the longest row."""
+    """Return the number of columns: the length of the heading, or else of the longest row of numbers.
+
+    `data` are the rows of numbers, `above` the rows above them.
+    """
     last = above[-1][1] if above else []
     if any(map(_is_named, last)) or is_unit_row(last):
         facts = (k for k, cell in enumerate(last) if _key(cell) in _CLOCK or _is_clock_entry(cell))
@@ -319,13 +325,17 @@ def _width(data: list[Row], above: list[Row]) -> int:
 
 
 def _is_clock_entry(cell: str) -> bool:
-    """Whether a cell states the sampling, such as "t0 = -1 ms"."""
+    """Whether a cell states the start or the interval of the samples, such as "t0 = -1 ms"."""
     match = _ASSIGNED.fullmatch(cell)
     return match is not None and _key(match[1]) in _CLOCK
 
 
 def _commented(notes: list[tuple[int, str]], separator: str, width: int, first: int) -> list[Row]:
-    """Return the heading from the last comment above the numbers, as `numpy.savetxt` writes headings."""
+    """Return the heading in the last comment above the numbers, where `numpy.savetxt` writes the heading.
+
+    The result is empty unless the comment has `width` cells. `notes` are line numbers and texts of comments;
+    `first` is the line of the first numbers.
+    """
     above = [
         (line, spaced(note).split() if separator == " " else note.split(separator))
         for line, note in notes
@@ -335,7 +345,7 @@ def _commented(notes: list[tuple[int, str]], separator: str, width: int, first: 
 
 
 def _heading_rows(where: str, above: list[Row], width: int) -> list[Row]:
-    """Return the rows of names and units, up to two, from the rows above the numbers."""
+    """Return the rows with the names and units of columns, at most two, from the rows above the numbers."""
     if not above or len(above[-1][1]) < width:
         return []
     line, last = above[-1]
@@ -358,7 +368,10 @@ def _is_named(cell: str) -> bool:
 
 
 def _without_facts_beside(rows: list[Row]) -> tuple[list[Row], dict[str, list[str]]]:
-    """Separate metadata columns left of the numbers, as in files of older Tektronix oscilloscopes."""
+    """Separate the rows of numbers from metadata columns on their left; return the rows and the metadata.
+
+    Files of older Tektronix oscilloscopes have such columns.
+    """
     first = rows[0][1]
     if not first[0].strip() or is_reading(first[0].strip()):
         return rows, {}
@@ -421,7 +434,11 @@ def _fact(facts: dict[str, list[str]], keys: Collection[str], default: list[str]
 def _clock(
     where: str, facts: dict[str, list[str]], columns: list[Heading], rows: list[list[str]], *, numbered: bool
 ) -> Clock | None:
-    """Derive the sample times from metadata: start and step, or step and the index of time zero."""
+    """Derive the sample times from metadata: start and step, or step and the index of time zero.
+
+    Return None if the metadata do not determine the times. `numbered` states whether the metadata stand
+    beside the numbers; above them, a start without a unit may be a sample index.
+    """
     written = _fact(facts, _START, [""])[0]
     # Above the numbers, a start without a unit may be a sample index.
     plain = not numbered and is_number(written) and not any(key in facts for key in _START[:-2])
@@ -443,7 +460,7 @@ def _clock(
 
 
 def _stated(where: str, name: str, text: str, si: str) -> float | None:
-    """Parse a number of the metadata, in SI or with its unit; None for an empty text."""
+    """Parse a number of the metadata, in the SI unit `si` or with its unit; None for an empty text."""
     if not text:
         return None
     with located(f"{where}: {name}", file=where, key=name):

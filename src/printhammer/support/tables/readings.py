@@ -62,7 +62,7 @@ class Readings:
         return len(self.lines)
 
     def check_times(self, *, least: int = 2) -> None:
-        """Raise InputError, with the line number, for too few rows or for times that do not ascend."""
+        """Raise InputError for fewer than `least` rows, or at the first line whose time does not ascend."""
         times, where = self.values["time"], str(self.path)
         if len(times) < least:
             raise InputError(
@@ -80,7 +80,7 @@ class Readings:
             )
 
     def check_before(self, times: FloatArray, name: str) -> None:
-        """Check that the drive signal in a column starts at time 0, the time of firing, and not earlier.
+        """Check that the signal of the drive in the column `name` does not start before time 0, the firing.
 
         Raises
         ------
@@ -206,7 +206,11 @@ def assigned(
     columns: Columns | None,
     option: bool,
 ) -> tuple[dict[str, Source], dict[str, int]]:
-    """Assign columns to quantities and words, by the declaration or else by the heading."""
+    """Assign columns to quantities and words, by the declaration `columns` or else by the heading.
+
+    Return the sources of the quantities and the indices of the columns of words, by name; `wanted` states the
+    possible columns in messages.
+    """
     if columns is None:
         return _by_heading(table, numbers, text, wanted, option)
     for name, source in columns.sources.items():
@@ -268,7 +272,7 @@ def _levels(table: Table) -> set[int]:
 def _by_heading(
     table: Table, numbers: Mapping[str, str], text: Mapping[str, tuple[str, ...]], wanted: str, option: bool
 ) -> tuple[dict[str, Source], dict[str, int]]:
-    """Assign columns to quantities by the names in the heading, or by a unit that occurs once."""
+    """Assign columns by names in the heading, or by a unit that occurs once; result as for `assigned`."""
     where = f"{table.where}: {_line(table)}".rstrip(": ")
     sources: dict[str, Source] = {}
     words: dict[str, int] = {}

@@ -141,7 +141,11 @@ def spaced(line: str) -> str:
 
 
 def _without_comments(text: str, comments: dict[str, str], notes: list[tuple[int, str]]) -> Iterator[str]:
-    """Yield the lines, with empty lines in place of comments; store the comments that have a key."""
+    """Yield the lines of a text, with empty lines in place of comments.
+
+    Comments with a key are stored in `comments`; line number and text of every comment are appended to
+    `notes`.
+    """
     for number, line in enumerate(io.StringIO(text), 1):
         if not _COMMENT.match(line):
             yield line
