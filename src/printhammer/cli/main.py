@@ -135,7 +135,11 @@ def program_of(names: Iterable[str] = MODULES) -> typer.Typer:
 def build_program(
     name: str, text: str, example: str, verbs: Iterable[Verb], groups: Mapping[str, tuple[str, str | None]]
 ) -> typer.Typer:
-    """Build the typer program from verbs; `groups` holds help and example of each group of verbs."""
+    """Build the typer program `name` from verbs.
+
+    `text` and `example` are the help and the example of the program; `groups` holds help and example of each
+    group of verbs, by group name.
+    """
     program = typer.Typer(
         name=name,
         help=text,

@@ -99,12 +99,15 @@ class Files(Option):
 
 
 def files(what: str, *endings: str, many: bool = True, **more: Any) -> Files:
-    """Declare an option for output files: pictures, and files with the given endings."""
+    """Declare an option for output files: pictures, and files with the given endings; `what` is the help."""
     return Files(what, "FILE", type=Path, many=many, endings=endings, **more)
 
 
 def results(what: str, *more: str, **options: Any) -> Files:
-    """Declare an option for files of a result: data, a picture, or an ending in `more`; `what` names it."""
+    """Declare an option for output files of a result, such as "the orbits", which `what` names in the help.
+
+    The files are data, pictures, or files with an ending in `more`.
+    """
     endings = (*DATA, *more)
     kinds = f"Output file for {what} ({', '.join(endings)}; SI)"
     return files(f"{kinds} or a picture (.svg, .png, .pdf); repeatable.", *endings, **options)
@@ -252,7 +255,10 @@ def read_span(written: str, name: str) -> tuple[str, str, int]:
 
 
 def between(span: tuple[str, str, int] | None, si: str, name: str) -> list[float]:
-    """Return the evenly spaced values of a range in the unit `si`; an empty list for None."""
+    """Return the evenly spaced values of a range, in the SI unit `si`; an empty list for None.
+
+    `name` is the option in error messages.
+    """
     import numpy as np
 
     from printhammer.drive.input import read_number
@@ -273,7 +279,10 @@ def given(**options: Any) -> dict[str, Any]:
 
 
 def check_one_spacing(options: Mapping[str, object], example: Callable[[], str]) -> None:
-    """Check that exactly one of `period` and `rate` is set."""
+    """Raise InputError unless exactly one of the options `period` and `rate` is set.
+
+    The message ends with the text that `example` returns, such as "--period '1.05 ms'".
+    """
     if (options.get("period") is None) == (options.get("rate") is None):
         raise InputError(f"--period and --rate: expected one of them, such as {example()}", key="--period")
 

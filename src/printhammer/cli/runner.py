@@ -320,7 +320,7 @@ def _values(job: Job, options: Mapping[str, Option], texts: dict[str, Any]) -> d
 def load_hammer(name: str, *, fired: bool) -> Hammer:
     """Load a hammer for a simulation and print its warnings.
 
-    Raises InputError for an unknown hammer, without a rest state, or, if `fired`, without a waveform.
+    Raises InputError if the hammer is unknown or has no rest state, or, if `fired`, has no waveform.
     """
     from printhammer.hammer.hammer import load
 
@@ -338,7 +338,10 @@ def load_hammer(name: str, *, fired: bool) -> Hammer:
 
 
 def tables_beside(path: Path, *names: str | None) -> list[Path]:
-    """Return the paths of the tables that a file refers to; their names are relative to its folder."""
+    """Return the paths of the tables to which the file `path` refers by `names` relative to its folder.
+
+    Names that are None are ignored.
+    """
     return [path.parent / name for name in names if name]
 
 
@@ -361,7 +364,10 @@ def check_endings(paths: Iterable[Path], endings: Sequence[str], option: str = "
 
 
 def ended_early(statuses: Iterable[object], total: int | None = None) -> list[str]:
-    """Return a list of one warning, with run count and statuses, if any status is not "ok"; else empty."""
+    """Return a list of one warning if any status of a run is not "ok"; else an empty list.
+
+    The warning states the other statuses, and how many of the `total` runs (default: all) have them.
+    """
     every = [str(status) for status in statuses]
     failed = [status for status in every if status != "ok"]
     kinds = ", ".join(sorted(set(failed)))
@@ -402,9 +408,9 @@ def firing_of(
     """Extract the firing options from `passed`; return them as keywords of `Regime.of`.
 
     If `timed`, exactly one of period and rate is required; a drive file may replace period and rate: a
-    continuous periodic force, or pulses at a constant rate. Error messages suggest a `period` [s],
-    scaled to the device. Raises InputError for a hammer without a waveform, any other drive file, or
-    superfluous options.
+    continuous periodic force, or pulses at a constant rate. If none is set, the error message suggests
+    `period` [s], scaled to the device, a drive file, and the options in `more`. Raises InputError for a
+    hammer without a waveform, any other drive file, or superfluous options.
     """
     file: Path | None = passed.pop("drive", None)
     train = {name: passed.pop(name, None) for name in ("period", "rate", "overlap")}

@@ -79,10 +79,10 @@ def warn(sentence: str) -> None:
 
 
 class Counted(Protocol):
-    """Callback of a progress bar: steps done, total steps, and name of the current step."""
+    """Callback of a progress bar, called with steps done, total steps, and name of the present step."""
 
     def __call__(self, done: int, total: int, what: str = "", /) -> None:
-        """Update the progress bar."""
+        """Update the progress bar to `done` of `total` steps; `what` names the present step."""
 
 
 @contextmanager
@@ -114,6 +114,8 @@ def progress_bar(name: str, *, remaining: bool = True) -> Iterator[Counted]:
 def pace_of(done: float, total: float | None, seconds: float | None) -> str:
     """Return the rate of the steps and the time left as text; empty before the first step.
 
+    `done` of `total` steps have taken `seconds`; without a total, the text contains the rate only.
+
     The rate is the average since the start, because parallel steps finish in bursts.
     """
     if not done or not seconds:
@@ -128,7 +130,10 @@ def pace_of(done: float, total: float | None, seconds: float | None) -> str:
 
 @contextmanager
 def status_line(first: str = "…") -> Iterator[Callable[[str], None]]:
-    """Show a status line for a computation of unknown length; yield a function that sets its text."""
+    """Show a status line for a computation of unknown length; yield a function that sets its text.
+
+    `first` is the initial text.
+    """
     from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 
     with _shown(SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn()) as line:

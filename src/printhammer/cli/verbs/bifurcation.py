@@ -57,8 +57,8 @@ def bifurcation(
     rate: str | None = _of("RATE", "Firings per second, if the parameter is neither period nor rate."),
     direction: str = opt.choice(
         "from-rest|up|down|both",
-        "Initial state of a train: rest, or the final state of the preceding train in rising (up) or falling"
-        " (down) order.",
+        "Initial state of a train: rest, or the final state of the preceding train in order of rising (up) or"
+        " falling (down) parameter.",
         default="from-rest",
     ),
     firings: int = opt.whole("Number of firings at each parameter value.", default=1000),

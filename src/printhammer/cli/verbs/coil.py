@@ -226,7 +226,10 @@ def duty(
 
 
 def _heat(hammer: Hammer, passed: dict[str, Any]) -> Any:
-    """Return the heat argument of `thermal_duty`, from the hammer, or from --heat and --feed."""
+    """Return the heat of a hammer's coil, as an argument of `thermal_duty`.
+
+    Raises InputError if `passed` contains the option --feed, since a hammer has its own driver.
+    """
     from printhammer.control.duty import heat_of
 
     if "feed" in passed:

@@ -349,7 +349,10 @@ def _keys(text: str) -> list[str]:
 
 
 def _earlier_fits(tables: dict[str, Path], known: Hammer, robust: bool) -> list[Fit]:
-    """Fit the tables of magnet, spring, pack and backstop; the hammer supplies all other constants."""
+    """Fit the tables of magnet, spring, pack and backstop; the hammer `known` supplies all other constants.
+
+    If `robust`, outliers are rejected.
+    """
     from printhammer.identify.fitting import fit
 
     rest = dict(tables)
@@ -367,7 +370,12 @@ def _earlier_fits(tables: dict[str, Path], known: Hammer, robust: bool) -> list[
 def _run_fit(
     job: Job, hammer: str | None, strict: bool, fitted: Callable[[Hammer | None], Fit], zero: str = ""
 ) -> Answer:
-    """Run a fit; return its summary and files. `zero` is a remark that defines time 0 of the records."""
+    """Run a fit; return its summary and files.
+
+    `fitted` performs the fit with the known constants of the hammer in the file `hammer`, if any. If
+    `strict`, the exit status is 1 if the data reject the law. `zero` is a remark that defines time 0 of the
+    records.
+    """
     from printhammer.hammer.hammer import load
     from printhammer.support.files import write_file
 

@@ -78,7 +78,11 @@ def sweep(
 
 
 def ended(result: xr.Dataset, new: float, seconds: float) -> str:
-    """Format the outcome of a sweep: numbers of members by status and not at rest, and computation time."""
+    """Format the outcome of a sweep: number of members by status, and of members that end not at rest.
+
+    The text also states the number `new` of members that this process has computed, and the duration of the
+    computation.
+    """
     from collections import Counter
 
     from printhammer.sweep.outputs import STATUSES
@@ -152,7 +156,10 @@ class SweepProgress:
 
 
 def progress_text(done: float, before: int, members: int, seconds: float) -> str:
-    """Format the progress: members done, rate, and time left."""
+    """Format the progress of a sweep: members done, rate, and time left.
+
+    `before` members were done before this run, which has taken `seconds`.
+    """
     text = f"{int(done)} of {members} members"
     new = done - before
     if new <= 0.0 or seconds <= 0.0:

@@ -26,7 +26,11 @@ def tuned_along(
     options: dict[str, Any],
     units: Units,
 ) -> Answer:
-    """Tune a table for each value of an axis, such as 'rail 90 V, 110 V, 3'; show and save the result."""
+    """Tune a table for each value of an axis, such as 'rail 90 V, 110 V, 3'; show and save the result.
+
+    `header` holds the arguments for writing a C header, `budget` is the limit on the size of its arrays in
+    bytes, and `options` are those of the tuning.
+    """
     from printhammer.control.axes import tune_along
 
     axis, values = _read(along)
@@ -46,7 +50,7 @@ def tuned_along(
 
 
 def _show_table(job: Job, made: Any, header: dict[str, Any], budget: int | None, units: Units) -> None:
-    """Check the size of a table's C header, and show the summary of the table."""
+    """Show the summary of a table; raise InputError if its arrays in a C header exceed `budget` bytes."""
     made.to_header(budget=budget, **header)
     size = f", {made.size(**header)} bytes in a C header"
     job.show(*render(job.worded(made.summary()), units), note=f"tuned in {job.seconds:.2g} s{size}")
@@ -112,11 +116,13 @@ def tune(
     budget: int | None = opt.whole("Maximum size of the arrays in the C header, in bytes."),
     along: str | None = opt.text(
         "AXIS LOW, HIGH, N",
-        "Additional axis of the table, with its range, e.g. 'rail 90 V, 110 V, 3': rail (voltage),"
-        " temperature (of the coil), gap (added distance of the pack) or forms (relative change of the pack"
-        " thickness).",
+        "Additional axis of the table: name, lower bound, upper bound and number of values, e.g. 'rail 90 V,"
+        " 110 V, 3'. Names: rail (voltage), temperature (of the coil), gap (increase of the distance to the"
+        " pack), forms (relative change of the pack thickness).",
     ),
-    variability: bool = opt.switch("Minimise the RMS deviation over the production spread of the constants."),
+    variability: bool = opt.switch(
+        "Minimise the RMS deviation of the dots over the production spread of the constants."
+    ),
     tolerance: float | None = opt.TOLERANCE,
     threads: int | None = opt.THREADS,
     units: Units = opt.UNITS,
@@ -176,7 +182,10 @@ def tune(
 
 
 def save_table(made: CompensationTable, header: dict[str, Any], path: Path) -> None:
-    """Write the table to a file; a C header states times in ticks of the timer."""
+    """Write the table to a file; a C header states times in ticks of the timer.
+
+    `header` holds the arguments for writing a C header, such as the tick.
+    """
     from printhammer.support.files import write_file
 
     if path.suffix.lower() == ".h":
@@ -242,7 +251,8 @@ def learn(
     ),
     signal: str | None = opt.choice(
         "current|voltage",
-        "Estimate the impact time from samples of coil current or voltage, instead of a sensor.",
+        "Signal from which to estimate the impact time: samples of coil current or voltage (default: an"
+        " impact-time sensor).",
         panel=_PANEL,
     ),
     signal_noise: str | None = opt.text(
@@ -332,7 +342,10 @@ def learn(
 
 
 def _from_coil(job: Job, hammer: Hammer, signal: Any, noise: str | None) -> dict[str, float]:
-    """Compute the errors of impact times estimated from coil samples: noise, offset, fraction missed."""
+    """Compute the errors of impact times estimated from coil samples: noise, offset, fraction missed.
+
+    The result contains the nonzero errors, as keywords of `ImpactSensor`; `noise` is that of a coil sample.
+    """
     from dataclasses import asdict
 
     from printhammer.control.impact_time import impact_time
