@@ -5,7 +5,7 @@ pulses at gradually rising rates.
 
 Computed and measured maps are Datasets of the same layout. The variable `displacement` [m] has the dimensions
 `rate` [Hz] and `time` [s, from the first firing]; the dots have the dimensions `rate` and `firing`, and exist
-in computed maps only. A missing number is NaN.
+in computed maps only. Missing values are NaN.
 """
 
 from __future__ import annotations
@@ -63,10 +63,11 @@ def map_dataset(
     attributes: Mapping[str, Any],
     notes: Mapping[str, Mapping[str, str]] | None = None,
 ) -> xr.Dataset:
-    """Build the Dataset of a map over rates [Hz] and times from the first firing, s.
+    """Build the Dataset of a map over firing rates [Hz] and times since the first firing [s].
 
-    `variables` are arrays in SI by name, including `displacement`, with the dimensions of `LAYOUT`.
-    `attributes` belong to the Dataset; `notes` are attributes of single variables, by name.
+    `variables` maps the names of variables, including `displacement`, to arrays in SI units with the
+    dimensions listed in `LAYOUT`. `attributes` are the attributes of the Dataset; `notes` maps the name of a
+    variable to the attributes of that variable.
     """
     more = notes or {}
     values: dict[str, Any] = {"rate": rates, "time": times, **variables}
@@ -79,7 +80,7 @@ def map_dataset(
 
 
 def places_of(chart: xr.Dataset) -> dict[str, float]:
-    """Return the positions [m] of backstop, pack and platen stated in a map, by surface."""
+    """Return the positions [m] of backstop, pack and platen that a map states, keyed by surface."""
     return {name: float(chart.attrs[key]) for name, key in PLACES.items() if key in chart.attrs}
 
 
@@ -109,7 +110,10 @@ def hammer_attributes(hammer: Hammer) -> dict[str, Any]:
 
 
 def matching(chart: xr.Dataset, other: xr.Dataset) -> tuple[IntArray, IntArray]:
-    """Return the row indices, in two maps, of the rates that agree to a relative difference of 1e-9."""
+    """Find the firing rates that two maps share, up to a relative difference of 1e-9.
+
+    Returns the row indices of these rates in `chart` and in `other`.
+    """
     here, there = chart["rate"].values, other["rate"].values
     nearest = np.abs(here[:, np.newaxis] - there).argmin(axis=1)
     same = np.isclose(here, there[nearest], rtol=1e-9, atol=0.0)
@@ -117,14 +121,18 @@ def matching(chart: xr.Dataset, other: xr.Dataset) -> tuple[IntArray, IntArray]:
 
 
 def on_times(chart: xr.Dataset, row: int, times: FloatArray) -> FloatArray:
-    """Interpolate the displacement [m] at one rate at given times [s]; NaN in gaps and outside the record."""
+    """Interpolate one row of a map, the displacement [m] at one firing rate, at given times [s].
+
+    The result is NaN in gaps of the row, and before its first and after its last time.
+    """
     return interpolated(chart["time"].values, chart["displacement"].values[row], times)
 
 
 def interpolated(at: npt.ArrayLike, values: npt.ArrayLike, times: FloatArray) -> FloatArray:
-    """Interpolate samples linearly at given times; NaN outside, and next to a NaN sample.
+    """Interpolate the samples `values`, taken at the ascending times `at` [s], linearly at `times` [s].
 
-    The samples are taken at ascending times `at` [s]. At the time of a sample, the result equals the sample.
+    At the time of a sample the result equals the sample. It is NaN before the first and after the last
+    sample, and between two samples if one of the two is NaN.
     """
     known, samples = np.asarray(at, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if known.size == 0:
@@ -158,7 +166,7 @@ TAIL: Final = 1e-3
 """Default time simulated after the last firing at the lowest rate, s; longer for slow devices. Arbitrary."""
 
 MOST_CELLS: Final = 200_000_000
-"""Largest number of cells of a map, to catch typing errors in rates and times; arbitrary."""
+"""Largest number of rates times times of a map, to catch typing errors in rates and times; arbitrary."""
 
 
 @computation
@@ -241,7 +249,7 @@ def frequency_map(
 
 
 def tail_of(hammer: Hammer, waveform: Waveform) -> float:
-    """Return the default time to simulate after the last firing at the lowest rate of a map, s.
+    """Return the default time [s] for which a map continues after the last firing at its lowest rate.
 
     For a slow device the time is extended to cover the response to the last firing.
     """
@@ -250,19 +258,20 @@ def tail_of(hammer: Hammer, waveform: Waveform) -> float:
 
 
 def rms_difference(computed: xr.Dataset, measured: xr.Dataset) -> tuple[FloatArray, FloatArray]:
-    """Compute the RMS difference between two maps at each common rate, at the times of the coarser map.
+    """Compute the RMS difference in displacement between two maps, at each firing rate that they share.
 
     Parameters
     ----------
     computed, measured : xarray.Dataset
-        Maps to compare; displacements are interpolated linearly at the times of the coarser map.
+        Maps to compare. Displacements are interpolated linearly at the times of the map with the larger time
+        spacing.
 
     Returns
     -------
     rates : array, shape (n,)
         Rates common to both maps, Hz.
     difference : array, shape (n,)
-        Root mean square of the difference of their displacements [m] over the times at which both are
+        Root mean square of the difference of the two displacements [m], over the times at which both are
         known; NaN if no such time exists.
     """
     rows, others = matching(computed, measured)
@@ -277,7 +286,10 @@ def rms_difference(computed: xr.Dataset, measured: xr.Dataset) -> tuple[FloatArr
 
 
 def summary_of(chart: xr.Dataset, beside: xr.Dataset | None = None) -> Summary:
-    """Summarise a map: size, dots, first lost dot, status, and the RMS difference from a measured map."""
+    """Summarise a computed map: its size, its dots, the first lost dot, and the status of the runs.
+
+    If a measured map `beside` is given, the summary includes the RMS difference between the two maps.
+    """
     rates, time = chart["rate"].values, chart["time"].values
     fired = np.isfinite(chart["fired_at"].values)
     lost = fired & ~chart["struck"].values
@@ -318,7 +330,11 @@ def _spacing(times: FloatArray) -> float:
 
 
 def default_rates(hammer: Hammer, waveform: Waveform | None = None, count: int = RATES) -> FloatArray:
-    """Return the default rates of a map [Hz], evenly spaced: 500 Hz to 2 kHz, lower for a slower device."""
+    """Return the default firing rates of a map [Hz], `count` evenly spaced values.
+
+    The rates extend from 500 Hz to 2 kHz; for devices slower than the hammer of the paper both ends are
+    lower.
+    """
     lowest, highest = (scaled_rate(hammer, rate, waveform) for rate in (LOWEST, HIGHEST))
     return np.linspace(lowest, highest, count)
 

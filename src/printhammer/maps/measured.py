@@ -73,9 +73,10 @@ def read_records(path: Path, columns: str | None = None) -> list[RateRecord]:
 def checked(
     what: str, rate: float, times: FloatArray, displacement: FloatArray, places: Sequence[str]
 ) -> RateRecord:
-    """Validate the samples at one rate, SI, in any order; return a record in ascending order of time.
+    """Validate the samples at one firing rate [Hz]; return them as a record sorted by time.
 
-    Error messages name the file, `what`, and the line or row of a sample, from `places`.
+    The samples are displacements [m] at `times` [s], in any order. `what` is the name of the file and
+    `places` the line or row of each sample in the file; both appear in error messages.
 
     Raises
     ------
@@ -176,9 +177,9 @@ def load_measured_map(
         the dimension `rate` and a second dimension; `time` has only the second dimension, or both if the
         rates have different times.
     times : array, optional
-        Times from the first firing, s, ascending, at which the records are interpolated linearly. By default
-        the sample times if all rates share them; otherwise evenly spaced times, with the smallest sample
-        spacing of any record.
+        Times since the first firing [s], ascending, at which the records are interpolated linearly. By
+        default the sample times, if they are the same for all rates; otherwise evenly spaced times, with the
+        smallest median sample spacing of any record.
     columns : str, optional
         Declaration of the columns of a CSV file, such as "time=1, 500 Hz=2*50 um/V"; by default the
         declaration in a companion file, or else the heading of the table; see
@@ -187,8 +188,8 @@ def load_measured_map(
     Returns
     -------
     xarray.Dataset
-        `displacement` [m, float32] over `rate` [Hz] and `time` [s]; NaN in gaps, and before and after a
-        record. The Dataset contains no dots.
+        `displacement` [m, float32] over `rate` [Hz] and `time` [s]; NaN in gaps of a record, and before its
+        start and after its end. The Dataset contains no dots.
 
     Raises
     ------
