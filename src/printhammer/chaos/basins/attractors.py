@@ -68,25 +68,33 @@ class Cloud(NamedTuple):
 
     @classmethod
     def of(cls, points: FloatArray) -> Cloud:
-        """Build a cloud from successive points, shape (n, 2); distances between its halves set the radius."""
+        """Build a cloud from the states of one train at successive firings, shape (n, 2).
+
+        The radius is a quantile of the distances from the states of the second half to the nearest state of
+        the first half.
+        """
         half = len(points) // 2
         apart, _ = cKDTree(points[:half]).query(points[half:])
         return cls(cKDTree(points), float(np.quantile(apart, REACH)))
 
     def holds(self, points: FloatArray) -> BoolArray:
-        """Return the mask, shape (...), of trains whose points, shape (..., n, 2), lie on the attractor."""
+        """Return the mask of the trains that lie on the attractor.
+
+        `points`, shape (..., n, 2), are n states of each train; the mask has the shape (...).
+        """
         apart, _ = self.tree.query(points, distance_upper_bound=self.reach)
         return np.asarray(np.isfinite(apart).mean(axis=-1) >= INSIDE)
 
     def equals(self, other: Cloud) -> bool:
-        """Whether the points of each of two clouds lie within the radius of the other: same attractor."""
+        """Whether two clouds are equal: the points of each lie within the radius of the other."""
         return bool(self.holds(other.tree.data) and other.holds(self.tree.data))
 
 
 class Attractors:
     """Attractors of the trains examined up to now, in order of discovery.
 
-    Differences of displacement, velocity, memory and current are divided by the `scales`, shape (4,).
+    To compare two states, the differences in displacement, velocity, memory and current are divided by the
+    four `scales`.
     """
 
     def __init__(self, regime: Regime, scales: FloatArray, tolerance: float) -> None:
@@ -98,7 +106,7 @@ class Attractors:
         self._noise: dict[int, float] = {}
 
     def at(self, tolerance: float) -> Attractors:
-        """Return a copy with the same known attractors, for trains simulated at another tolerance."""
+        """Return a copy with the same known attractors, for trains simulated at the tolerance `tolerance`."""
         other = Attractors(self.regime, self.scales, tolerance)
         other.found, other._clouds, other._noise = list(self.found), dict(self._clouds), dict(self._noise)
         other._attempts = ATTEMPTS
@@ -126,10 +134,11 @@ class Attractors:
         return np.stack([x, v], axis=-1) / self.scales[:2]
 
     def _match_settling(self, points: FloatArray, q: int) -> IntArray:
-        """Match slowly settling trains to orbits in `found`, or locate new orbits; return indices.
+        """Match slowly settling trains to orbits in `found`, or locate new orbits by Newton's method.
 
-        The scaled states, shape (n, points, 2), agree q firings apart, but do not prove a period of q. The
-        index of a train is -1 if no orbit is found.
+        `points`, shape (n, m, 2), are the scaled states of n trains at m firings. States q firings apart
+        agree, which alone does not prove the period q. Returns the index in `found` of the orbit of each
+        train, -1 if no orbit is found.
         """
         places = np.full(len(points), -1, np.int64)
         left = list(range(len(points)))
@@ -152,7 +161,7 @@ class Attractors:
         return places
 
     def _periodic(self, orbits: FloatArray) -> IntArray:
-        """Match orbits of q firings, shape (n, q, 2), to `found`; append new orbits; return indices."""
+        """Return the indices in `found` of orbits of q firings, shape (n, q, 2); append new orbits to it."""
         q = orbits.shape[1]
         places = self._known(orbits)
         while (left := np.flatnonzero(places < 0)).size:
@@ -163,7 +172,7 @@ class Attractors:
         return places
 
     def _known(self, orbits: FloatArray) -> IntArray:
-        """Match orbits of q firings, shape (n, q, 2), to `found`; return indices, -1 for new orbits."""
+        """Return the indices in `found` of orbits of q firings, shape (n, q, 2); -1 for a new orbit."""
         places = np.full(len(orbits), -1, np.int64)
         for place, attractor in enumerate(self.found):
             if attractor.period == orbits.shape[1]:
@@ -172,7 +181,11 @@ class Attractors:
         return places
 
     def _strange(self, columns: Columns, rows: IntArray, places: IntArray) -> None:
-        """Match aperiodic trains to strange attractors; identify new attractors from unmatched trains."""
+        """Match the aperiodic trains in `rows` of the columns to strange attractors, known or new.
+
+        Some of the trains that match no known attractor are followed to find new attractors. The indices of
+        the attractors are written to `places`, which has one entry per train.
+        """
         points = self._scaled(columns.x, columns.v)
         left = rows
         for place in self._clouds:
@@ -192,7 +205,10 @@ class Attractors:
                     break
 
     def _within(self, points: FloatArray, rows: IntArray, place: int, places: IntArray) -> IntArray:
-        """Match trains to the strange attractor with index `place`; return the rows without a match."""
+        """Match the trains in `rows` to the strange attractor with index `place`; return the unmatched rows.
+
+        The index is written to the entries of `places` that belong to matching trains.
+        """
         if not rows.size:
             return rows
         lies = self._clouds[place].holds(points[rows])
@@ -200,10 +216,11 @@ class Attractors:
         return np.asarray(rows[~lies])
 
     def _follow(self, columns: Columns, row: int) -> int | None:
-        """Continue one train to its attractor; return the index of the attractor, None if undecided.
+        """Continue the train in `row` of the columns to its attractor; return the index of the attractor.
 
         The train is continued until its points lie on a known strange attractor, or until two successive sets
-        of points agree. Otherwise every train that converges slowly would define an attractor of its own.
+        of points agree. Otherwise every train that converges slowly would define an attractor of its own. The
+        result is None if the attractor stays undecided.
         """
         begin, before, settling = columns.last[row : row + 1], None, SETTLING
         while True:
@@ -240,7 +257,11 @@ class Attractors:
 
 
 def _agree(orbits: FloatArray, known: FloatArray) -> BoolArray:
-    """Return the mask of orbits, shape (n, q, 2), that equal a known orbit up to a cyclic shift."""
+    """Return the mask, shape (n,), of the orbits that equal a known orbit, shape (q, 2), at some phase.
+
+    `orbits`, shape (n, q, 2), contains the scaled states of n orbits of q firings. All q cyclic shifts of the
+    known orbit are equivalent.
+    """
     count = len(known)
     # The point nearest to the first point gives the shift.
     shift = np.abs(known - orbits[:, :1]).max(axis=2).argmin(axis=1)

@@ -80,15 +80,16 @@ def basin_entropy(labels: npt.ArrayLike, *, box: SupportsIndex = BOX) -> BasinEn
     Parameters
     ----------
     labels : int array, shape (n, m)
-        Number of the attractor of each cell, counted from 1; cells of unknown attractor, 0 or negative, are
-        excluded.
+        Number of the attractor of each cell, counted from 1. Cells of unknown attractor, whose label is 0 or
+        negative, are excluded.
     box : int, optional
         Number of cells along the side of a box; cells beyond the last whole box are excluded.
 
     Raises
     ------
     InputError
-        The labels are not a two-dimensional array of integers, or the box is not from 1 to the shorter side.
+        The labels are not a two-dimensional array of integers, or the side of a box is not between 1 cell and
+        the shorter side of the plane.
     """
     plane = np.asarray(labels)
     if plane.ndim != 2 or not plane.size or plane.dtype.kind not in "iu":
@@ -122,13 +123,14 @@ def basin_entropy(labels: npt.ArrayLike, *, box: SupportsIndex = BOX) -> BasinEn
 
 
 def uncertainty_exponent(labels: npt.ArrayLike) -> float:
-    """Estimate the uncertainty exponent a: the fraction of uncertain cells at distance e grows as e^a.
+    """Estimate the uncertainty exponent of the basin boundaries from a plane of attractor labels.
 
-    The exponent is the slope of the logarithm of this fraction against log e, for distances e of 1, 2, 4, ...
-    cells along either side, up to an eighth of the plane. The dimension of the boundary is 2 - a, so that a
-    is 1 for a smooth boundary and less for a fractal boundary (S. W. McDonald, C. Grebogi, E. Ott and J. A.
-    Yorke, Physica D 17 (1985) 125). Cells without an attractor do not count. NaN if the fraction is nonzero
-    for fewer than three distances.
+    Two cells at a distance e lead to different attractors in a fraction of all pairs that grows as e^a; a is
+    the uncertainty exponent. It is fitted as the slope of the logarithm of this fraction against log e, for
+    distances of 1, 2, 4, ... cells in either direction, up to an eighth of the shorter side. The dimension of
+    the boundary is 2 - a, so that a is 1 for a smooth boundary and less for a fractal boundary (S. W.
+    McDonald, C. Grebogi, E. Ott and J. A. Yorke, Physica D 17 (1985) 125). Cells without a known attractor
+    are ignored. The result is NaN if the fraction is nonzero for fewer than three distances.
     """
     plane = np.asarray(labels)
     distances = [2**k for k in range(16) if 2**k <= min(plane.shape) // 8]
@@ -158,7 +160,7 @@ SAMPLE: Final = 256  # Arbitrary
 """Maximum number of cells recomputed at a tenth of the tolerance; never more than an eighth of all cells."""
 
 FIRINGS: Final = 200
-"""Default number of firings between two tests of a cell for an attractor; arbitrary."""
+"""Default number of firings after which a cell is tested again for its attractor; arbitrary."""
 
 ROUNDS: Final = 20  # Arbitrary
 """Default maximum number of tests for an attractor; a cell that passes none of the tests is undecided."""
@@ -264,7 +266,10 @@ class Basins(Result, rows="v x"):
 
     @property
     def rounding(self) -> str:
-        """Sentence that states how many sampled cells change their label at a tenth of the tolerance."""
+        """Sentence on the number of sampled cells whose label changes at a tenth of the tolerance.
+
+        Empty if no cell was recomputed.
+        """
         if not self.compared:
             return ""
         share = 100.0 * self.changed / self.compared
@@ -284,10 +289,10 @@ class Basins(Result, rows="v x"):
 
     @property
     def shares(self) -> tuple[FloatArray, FloatArray]:
-        """Fraction of initial states that lead to each attractor, and its standard error, both of shape (A,).
+        """Fraction p of the initial states that lead to each attractor, and the standard error of p.
 
-        The standard error is that of n independent random states, sqrt(p (1 - p) / n). Where the boundary is
-        smooth, a regular grid is more accurate.
+        Both arrays have one entry per attractor. The standard error is that of n independent random initial
+        states, sqrt(p (1 - p) / n); for a smooth boundary the regular grid is more accurate.
         """
         count = int((self.labels != NO_STATE).sum())
         share = np.array([self.counts[k + 1] for k in range(len(self.attractors))], dtype=np.float64)
@@ -327,7 +332,7 @@ class Basins(Result, rows="v x"):
         return own
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Convert the plane to a table with one row per cell and the name of its attractor."""
+        """Convert the plane to a table with one row per cell, including the name of the cell's attractor."""
         table = super().to_dataframe()
         table.insert(3, "attractor", [self.names[label] for label in table["label"].tolist()])
         return table
@@ -413,7 +418,11 @@ def basins(
 def _decided(
     regime: Regime, cells: FloatArray, counts: tuple[int, int], effort: Effort, attractors: Attractors
 ) -> tuple[IntArray, IntArray, TextArray]:
-    """Determine the attractor of each cell; return attractor indices, firings used, and statuses."""
+    """Determine the attractor of each cell; `counts` contains the firings per round and the round limit.
+
+    Returns, for each cell, the index of its attractor (negative if unknown), the number of firings simulated,
+    and the status of the run.
+    """
     firings, most = counts
     places = np.full(len(cells), UNDECIDED - 1, np.int64)
     used = np.zeros(len(cells), np.int64)
@@ -440,7 +449,10 @@ def _decided(
 
 
 def _sample(decided: IntArray, count: int) -> IntArray:
-    """Select the rows of a sample of decided cells, spread evenly by multiples of the golden ratio."""
+    """Select an evenly spread sample of the decided cells, to be recomputed at a finer tolerance.
+
+    The sample size depends on `count`, the number of all cells.
+    """
     size = min(SAMPLE, max(count // 8, 1), len(decided))
     shares = (np.arange(1, size + 1) * _GOLDEN) % 1.0
     return np.unique(decided[(shares * len(decided)).astype(np.int64)]) if size else decided[:0]
@@ -453,7 +465,10 @@ def _key(attractor: Attractor) -> tuple[int, float, float]:
 
 
 def read_axis(entry: Any, name: str, unit: str) -> FloatArray:
-    """Parse the bounds of an axis and its number of values; raise InputError if they are invalid."""
+    """Parse the entry of an axis: lower bound, upper bound, number of values; return the values, SI.
+
+    Raises InputError, with the name of the axis, if the entry is invalid.
+    """
     if not isinstance(entry, tuple | list) or len(entry) != 3:
         raise InputError.of(name, entry, "least value, largest value and number of values")
     low, high = (read_number(end, unit, name) for end in entry[:2])
@@ -464,6 +479,6 @@ def read_axis(entry: Any, name: str, unit: str) -> FloatArray:
 
 
 def check_cells(across: int, up: int) -> None:
-    """Raise InputError if a plane has more than `MOST_CELLS` cells."""
+    """Raise InputError if a plane of `across` times `up` cells has more than `MOST_CELLS` cells."""
     if across * up > MOST_CELLS:
         raise InputError(f"{across} x {up} cells", key="cells", expected=f"at most {MOST_CELLS}")

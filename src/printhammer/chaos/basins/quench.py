@@ -123,7 +123,7 @@ class QuenchMap(Result):
     @property
     @derived("1", "second peak, 0 at the backstop and 1 at the pack", "gap width")
     def peak_share(self) -> FloatArray:
-        """Displacement peak after the second firing, scaled: 0 at the backstop, 1 at the pack front."""
+        """Peak displacement after the second firing, as a fraction of the way from backstop to pack front."""
         front = self.hammer.front
         assert front is not None
         return (self.peak - self.hammer.origin) / (front - self.hammer.origin)
@@ -131,13 +131,13 @@ class QuenchMap(Result):
     @property
     @derived("1", "ratio of the force of the second dot to that of the first pulse alone", "gap width")
     def force_ratio(self) -> FloatArray:
-        """Ratio of the second dot's peak force to the peak force of the first pulse alone."""
+        """Ratio of the peak pack force of the second dot to that of the first pulse fired alone."""
         return self.force / self.single_force
 
     @property
     @derived("s", "flight time of the first pulse alone minus that of the second dot", "gap width")
     def flight_gain(self) -> FloatArray:
-        """Flight time of the first pulse alone minus the flight time of the second dot, s."""
+        """Flight time of the first pulse fired alone minus the flight time of the second dot, s."""
         return self.single_flight_time - self.flight_time
 
 
@@ -151,7 +151,11 @@ class TwoPulses(Waveform):
     largest: float
 
     def segments(self) -> FloatArray:
-        """Return the segment table: zero, then the first pulse at time `apart`, the second at 2 * `apart`."""
+        """Return the segment table of the waveform.
+
+        The waveform is zero until the first pulse begins, `apart` seconds after the start; the second pulse
+        begins at twice this time.
+        """
         rows = [
             (number * self.apart + row[0], *row[1:])
             for number, pulse in enumerate((self.first, self.second), 1)
@@ -160,13 +164,16 @@ class TwoPulses(Waveform):
         return table(rows[:-1], rows[-1][0])
 
     def scaled(self, factor: float) -> Self:
-        """Return a copy with every value scaled by `factor`."""
+        """Return a copy of the waveform with both pulses multiplied by `factor`."""
         scaled = {"first": self.first.scaled(factor), "second": self.second.scaled(factor)}
         return self.model_copy(update={**scaled, "largest": abs(factor) * self.largest})
 
     @property
     def peak(self) -> float:
-        """Largest absolute value of the pulses of the map, so that all runs have the same scales."""
+        """Largest absolute value of any pulse of the quench map.
+
+        The value is the same for all runs of the map, so that all runs are integrated with the same scales.
+        """
         return self.largest
 
 
@@ -179,7 +186,11 @@ class TwoPulseDrive(Drive):
 
     @staticmethod
     def firings(apart: float, gap: float) -> FloatArray:
-        """Compute the four firing times [s]: two before the run, and the two firings that print the dots."""
+        """Compute the four firing times [s]: two before the run, and the two firings that print the dots.
+
+        `apart` is the distance of the two pulses in the waveform, `gap` the time between the last two
+        firings; both in seconds.
+        """
         return np.array([gap, apart, 2.0 * apart, 2.0 * apart + gap])
 
     @property
@@ -188,7 +199,7 @@ class TwoPulseDrive(Drive):
         return float(self._times[_FIRST])
 
     def with_firings(self, times: FloatArray) -> Self:
-        """Return a copy with new firing times [s] as computed by `firings`."""
+        """Return a copy of the drive with new firing times [s], in the form returned by `firings`."""
         result = copy(self)
         result._times = times
         return result
@@ -222,7 +233,7 @@ def quench_map(
         The first pulse, which needs a width; by default the waveform of the hammer.
     tail : float or str, optional
         Time after the second firing within which a pack contact counts as the second dot, s, or text with a
-        unit; by default 1 ms, scaled like `gaps`.
+        unit; by default 1 ms, multiplied by `time_scale` like `gaps`.
 
     Returns
     -------
@@ -278,10 +289,10 @@ def quench_map(
 
 
 def two_pulse_drives(first: Waveform, seconds: Sequence[Waveform], last: float) -> list[TwoPulseDrive]:
-    """Build one drive per second pulse: `first`, then that second pulse; runs last at most `last` s.
+    """Build one drive for each second pulse in `seconds`; each drive fires `first`, then the second pulse.
 
-    A run begins in the rest state at the time `begin` of its drive, from which times [s] are measured. The
-    second pulse is fired after half of `last`; `with_firings` sets other times.
+    A run begins in the rest state at the time `begin` of its drive, and lasts at most `last` seconds. The
+    second pulse is fired after half of this time; `TwoPulseDrive.with_firings` sets other times.
     """
     largest = max(first.peak, *(second.peak for second in seconds))
     # A power of two, so that sums of it with other times are rounded the same way everywhere.
@@ -298,7 +309,12 @@ def two_pulse_drives(first: Waveform, seconds: Sequence[Waveform], last: float) 
 def _piece(
     hammer: Hammer, drives: Sequence[TwoPulseDrive], gaps: FloatArray, tail: float, effort: Effort
 ) -> tuple[npt.NDArray[Any], ...]:
-    """Simulate a block of gaps at all widths; return dot mask, status, peak, force and flight time, SI."""
+    """Simulate all drives at a block of gaps [s]; each run ends `tail` seconds after the second firing.
+
+    Returns five arrays over the runs, in this order: whether the second firing printed a dot; the status of
+    the run; the peak displacement after the second firing [m]; the peak pack force of the second dot [N]; and
+    its flight time [s].
+    """
     begin, number = 0.0, 1
     every: list[Drive]
     if drives[0].pulses[0].replaces:
@@ -346,10 +362,11 @@ def _piece(
 
 
 def _highest(grid: FloatArray, x: FloatArray, after: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Find the largest local maximum of each sampled motion after a given time; return value and time.
+    """Find the largest local maximum of the displacement of each run after the time `after` [s] of the run.
 
-    The samples, shape (M, T), are evenly spaced; samples after the end of a run are NaN. The result is NaN
-    for a run without such a maximum.
+    The displacements `x` [m], shape (M, T), are sampled at the evenly spaced times `grid` [s]; samples after
+    the end of a run are NaN. Returns the maxima [m] and their times [s]; the maximum is NaN for a run that
+    has none.
     """
     before, here, following = x[:, :-2], x[:, 1:-1], x[:, 2:]
     bend = before - 2.0 * here + following
@@ -365,9 +382,10 @@ def _highest(grid: FloatArray, x: FloatArray, after: FloatArray) -> tuple[FloatA
 
 
 def _top(t: FloatArray, x: FloatArray, v: FloatArray) -> FloatArray:
-    """Interpolate the highest local maximum of each sampled motion [m], shape (M,); NaN without a maximum.
+    """Find the largest local maximum [m] of the displacement of each run, shape (M,), by interpolation.
 
-    The velocity, shape (M, T), is taken as linear between samples.
+    Times `t` [s], displacements `x` [m] and velocities `v` [m/s] of the samples have the shape (M, T). The
+    velocity is assumed to be linear between samples. The result is NaN for a run without a maximum.
     """
     falls = (v[:, :-1] > 0.0) & (v[:, 1:] <= 0.0)
     drop = np.where(falls, v[:, :-1] - v[:, 1:], 1.0)

@@ -24,18 +24,18 @@ def saddle_manifolds(
     Parameters
     ----------
     planes : Basins
-        Basins of attraction, which provide hammer, drive and plane.
+        Basins of attraction, which provide the hammer, the drive and the plane of initial states.
     longest : int
         Largest orbit period, firings.
     progress : callable, optional
-        Called with the number of saddles done and the total.
+        Function called with the number of saddles done and the number of all saddles.
 
     Returns
     -------
     list of Manifolds
         One entry for each saddle that lies in the plane of the states at a firing.
     int
-        Number of saddles omitted because the armature is in the pack at the firing.
+        Number of saddles omitted, because the armature is in the pack at a firing.
     """
     spans = np.array([np.ptp(planes.x), np.ptp(planes.v)]) / planes.regime.window.half_widths
     side = float(spans.max())

@@ -86,8 +86,9 @@ def bifurcation(
         Instead of periods or rates: name of a constant, such as "backstop.damping" or "waveform.amplitude",
         and its values, SI, ascending; see `printhammer.run.regime.Regime.with_`.
     firings, transient : int, optional
-        Number of firings at each value, and number of first firings to discard; by default all but the last
-        200 are discarded, but at least a third. With few firings, trains that settle slowly are undecided.
+        Number of firings at each value, and number of firings to discard from the start. By default all but
+        the last 200 firings are discarded, and at least a third of all firings. With few firings, trains that
+        settle slowly are undecided.
     direction : str, optional
         "from rest": every train begins at rest, without earlier firings. "up", "down": a train starts in the
         final state of the train at the next lower ("up") or next higher ("down") value, with earlier pulses
@@ -97,10 +98,11 @@ def bifurcation(
         Displacement [m] and velocity [m/s] that replace the rest state; pulses of earlier firings are still
         active.
     refine : int, optional
-        Number of times to halve the step between neighbours with different periods or distant orbits.
+        Number of times to halve the step between neighbouring values whose trains have different periods or
+        distant orbits.
     exponents : bool, optional
-        Whether to compute the exponents of aperiodic trains, which separate strange from undecided trains;
-        this takes many times as long.
+        Whether to compute the Lyapunov exponents of aperiodic trains, which are needed to classify a train as
+        strange; the computation then takes many times as long.
     **firing
         Firing of the hammer, as for `printhammer.Regime.of`; period or rate only if another parameter
         varies.
@@ -152,7 +154,7 @@ def bifurcation(
 
 
 def _result(builder: DiagramBuilder) -> Bifurcation:
-    """Build the diagram from all trains or, after an interrupt, from the finished trains."""
+    """Build the diagram from the trains of a builder; trains not yet run keep the status "not run"."""
     order = np.argsort(builder.values, kind="stable")
     rows = (len(builder.ways) * order + np.arange(len(builder.ways))[:, np.newaxis]).astype(np.int64)
     table = builder.table
@@ -183,7 +185,10 @@ def _parameter(
     choice: tuple[npt.ArrayLike | None, npt.ArrayLike | None, str | None, npt.ArrayLike | None],
     firing: Firing,
 ) -> tuple[str, FloatArray, Regime]:
-    """Validate the choice of parameter; return name, values, and the regime to vary."""
+    """Validate the choice of parameter, given as the arguments (periods, rates, parameter, values).
+
+    Returns the name of the parameter, its values [SI], and the regime in which it is varied.
+    """
     periods, rates, parameter, values = choice
     if sum(entry is not None for entry in (periods, rates, parameter)) != 1:
         raise InputError("periods, rates and parameter: expected one of them", key="parameter")

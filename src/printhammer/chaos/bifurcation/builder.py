@@ -88,7 +88,10 @@ class Trains:
 
 
 def strands_of(rows: Sequence[int], first: int) -> list[Strand]:
-    """Divide rows of successive trains into strands of `STRAND` trains, numbered from `first`."""
+    """Divide the table rows of successive trains into strands of `STRAND` trains.
+
+    `first` is the index of the first strand in the list of all strands.
+    """
     cut = [list(rows[k : k + STRAND]) for k in range(0, len(rows), STRAND)]
     return [Strand(part, first + k - 1 if k else -1) for k, part in enumerate(cut)]
 
@@ -102,8 +105,9 @@ def carry(
 ) -> None:
     """Run all strands in parallel; then rerun trains until every strand continues its predecessor.
 
-    `start` is the initial state of a strand. `run` runs the trains of selected rows from given states and
-    stores the results in the table; `trial` returns the results instead: columns, periods, distances.
+    `start` is the initial state of the first train of each strand. `run` runs the trains of given table rows
+    from given initial states and stores the results in the table. `trial` runs them, too, but returns the
+    results: columns, periods, and distances between states a period apart.
     """
     for k in range(max(len(strand.rows) for strand in strands)):
         long = [strand.rows for strand in strands if k < len(strand.rows)]
@@ -142,6 +146,7 @@ def carry(
 def is_same_attractor(table: Trains, row: int, columns: Columns, place: int, cycle: int) -> bool:
     """Whether a train that was run again reached the same attractor as its first run.
 
+    The first run is `row` of the table, the second run is row `place` of `columns`, with the period `cycle`.
     Two periodic trains are on the same attractor if their orbits agree within `SAME`, two aperiodic trains if
     the means of their points differ by at most half of their standard deviations, and two trains whose runs
     ended early if their statuses are equal.
@@ -185,7 +190,10 @@ class DiagramBuilder:
         self.done = self.known = 0
 
     def add(self, values: FloatArray, level: int) -> list[int]:
-        """Add table rows for trains at new parameter values; return the indices of the new values."""
+        """Add table rows for trains at new parameter values; return the indices of the new values.
+
+        `level` is the refinement level of the values: 0 for given values, k for the k-th refinement.
+        """
         first = len(self.values)
         regimes = [self.regime.with_(self.name, value) for value in values.tolist()]
         every = [regime for regime in regimes for _way in self.ways]
@@ -207,7 +215,7 @@ class DiagramBuilder:
         return list(range(first, len(self.values)))
 
     def rows(self, places: Sequence[int], way: int) -> list[int]:
-        """Return the table rows of trains in one direction, from the indices of their parameter values."""
+        """Return the table rows of trains in direction `way`, from the indices of their parameter values."""
         return [len(self.ways) * place + way for place in places]
 
     def base(self, grid: FloatArray) -> None:
@@ -223,7 +231,10 @@ class DiagramBuilder:
         carry(self.table, strands, self.begin, self.run, self.trial)
 
     def refine(self, level: int) -> None:
-        """Add and run trains midway between neighbouring parameter values whose trains differ."""
+        """Add and run trains midway between neighbouring parameter values whose trains differ.
+
+        `level` is the number of this refinement, counted from 1.
+        """
         order = np.argsort(self.values, kind="stable").tolist()
         pairs = [pair for pair in itertools.pairwise(order) if self.is_different(*pair)]
         middles = [0.5 * (self.values[low] + self.values[high]) for low, high in pairs]
@@ -246,7 +257,10 @@ class DiagramBuilder:
         self.run(rows, np.array(states))
 
     def is_different(self, place: int, neighbour: int) -> bool:
-        """Whether trains at two values differ in status or period, or have orbits more than `JUMP` apart."""
+        """Whether the trains at two parameter values, given by their indices, differ in any direction.
+
+        They differ if their statuses or periods differ, or if their orbits are more than `JUMP` apart.
+        """
         table = self.table
         for way in range(len(self.ways)):
             a, b = self.rows([place, neighbour], way)
@@ -264,7 +278,10 @@ class DiagramBuilder:
         return False
 
     def trial(self, rows: Sequence[int], states: FloatArray) -> tuple[Any, Any, Any]:
-        """Run trains of table rows from given states; return their columns, periods and repeat distances."""
+        """Run the trains of table rows from given initial states; return the results without storing them.
+
+        The results are the columns, the periods [firings], and the distances of states a period apart.
+        """
         regimes = [self.table.regimes[row] for row in rows]
         done = self.done
         effort = replace(self.effort, progress=lambda part, _all: self.report_progress(done + part))
@@ -294,7 +311,7 @@ class DiagramBuilder:
         self.done += len(rows)
 
     def is_resting(self, columns: Columns, row: int, regime: Regime) -> bool:
-        """Whether the motion of a train repeats exactly and includes a rest on the backstop."""
+        """Whether the motion in row `row` repeats exactly and includes a rest on the backstop."""
         if not is_memoryless(regime) or columns.status[row] != OK or regime.phase:
             return False
         points = np.column_stack([columns.x[row], columns.v[row]])
@@ -302,7 +319,7 @@ class DiagramBuilder:
         return bool(count and rests_of(regime, points[-count:], self.effort.tolerance))
 
     def compare(self) -> None:
-        """Mark the trains whose period changes at finer tolerances, i.e. depends on rounding errors.
+        """Mark the trains whose period changes at a finer tolerance and thus depends on rounding errors.
 
         An armature that comes to rest on the backstop forgets its past, but between two rests a small error
         may grow to the size of the motion.
@@ -323,7 +340,7 @@ class DiagramBuilder:
             self.sensitive[rows] |= cycles != table.cycles[rows]
 
     def report_progress(self, done: int) -> None:
-        """Report the number of finished trains, not counting the trains that were rerun to join strands."""
+        """Report `done` finished trains; trains that were rerun to join strands are not counted again."""
         self.effort.report(min(done, self.known), self.known)
 
     def measure(self) -> None:

@@ -66,7 +66,7 @@ class Columns(Declared):
         return len(self.x)
 
     def handed(self, row: int) -> State:
-        """Return the final state of the train in a row, from which the next train starts."""
+        """Return the final state of the train in row `row`, from which the next train starts."""
         return tuple(self.last[row].tolist())
 
 
@@ -84,7 +84,7 @@ def blank_columns(count: int, points: int) -> Columns:
 
 
 def put(columns: Columns, rows: Sequence[int] | IntArray, others: Columns) -> None:
-    """Copy the rows of `others` into the given rows of `columns`."""
+    """Copy all rows of `others`, in order, into the rows `rows` of `columns`."""
     where = np.asarray(rows, dtype=np.int64)
     for name, values in vars(others).items():
         getattr(columns, name)[where] = values
@@ -93,12 +93,13 @@ def put(columns: Columns, rows: Sequence[int] | IntArray, others: Columns) -> No
 def run_columns(
     regimes: Sequence[Regime], states: FloatArray, firings: int, transient: int, effort: Effort
 ) -> Columns:
-    """Simulate many trains and store their states at the last `firings` - `transient` firings.
+    """Simulate many trains over `firings` firings; return their states after the first `transient` firings.
 
-    Initial states, shape (M, 7), are displacement, velocity, branch of the pack (negative: derived from the
-    state), memory, and, with a voltage drive, the electric part of the state
-    (`printhammer.run.start.Beyond`). They apply at the first firing, with pulses of earlier firings still
-    active; a row of NaN is a train from rest without earlier firings (`FROM_REST`).
+    `states`, shape (M, 7), are the initial states of the M trains. A row contains, in this order: the
+    displacement [m]; the velocity [m/s]; the branch of the pack's force law, negative if it is to be derived
+    from displacement and velocity; the memory of the pack [m]; and three electric variables, used with a
+    voltage drive only (`printhammer.run.start.Beyond`). Initial states apply at the first firing, with pulses
+    of earlier firings still active. For a train from rest without earlier firings, the row is `FROM_REST`.
     """
     points = firings - transient
     columns = blank_columns(len(regimes), points)
@@ -120,7 +121,10 @@ def run_columns(
 def _run(
     regimes: Sequence[Regime], states: FloatArray, firings: int, transient: int, effort: Effort
 ) -> Columns:
-    """Simulate trains that all start at rest, all inside the pack, or all free; return their columns."""
+    """Simulate trains that all start from rest, all inside the pack, or all outside; return their columns.
+
+    The arguments are those of `run_columns`.
+    """
     rest = bool(np.isnan(states[0, 0]))
     # The cells of a basin share one regime; the columns of a diagram have one regime each.
     known = {id(regime): regime for regime in regimes}
@@ -171,10 +175,10 @@ def _run(
 def run_in_stretches(
     regimes: Sequence[Regime], states: FloatArray, firings: int, transient: int, effort: Effort
 ) -> Columns:
-    """Simulate memoryless trains one period at a time; arguments and result as for `run_columns`.
+    """Simulate trains without memory (`is_memoryless`) one period at a time.
 
-    The computation is slower than one long run, but the rounding error does not grow with time; see
-    `printhammer.chaos.strobe.train.STRETCH`.
+    Arguments and result are those of `run_columns`. The computation is slower than one long run, but the
+    rounding error does not grow with time; see `printhammer.chaos.strobe.train.STRETCH`.
     """
     columns = blank_columns(len(regimes), firings - transient)
     begun = [
@@ -215,7 +219,10 @@ def run_in_stretches(
 
 
 def _train(regime: Regime, firings: int, rest: bool) -> tuple[Drive, FloatArray]:
-    """Build the drive of a train; return drive and firing times [s], with one time beyond the last firing."""
+    """Build the drive of a train of `firings` firings; return the drive and the firing times [s].
+
+    One time after the last firing is included. If `rest`, no pulses are fired before the start of the run.
+    """
     if rest and regime.drive is None:
         drive = regime.pulses(firings + 2)
         return drive, drive.times[: firings + 1]
@@ -224,7 +231,7 @@ def _train(regime: Regime, firings: int, rest: bool) -> tuple[Drive, FloatArray]
 
 
 def state_or_rest(regime: Regime, state: State) -> State:
-    """Return the final state of the preceding train, or `FROM_REST` if the regime excludes that state."""
+    """Return `state`, the final state of a train, if the next train can start from it, else `FROM_REST`."""
     if math.isnan(state[0]):
         return FROM_REST
     try:
@@ -239,8 +246,8 @@ def state_or_rest(regime: Regime, state: State) -> State:
 def scales_of_columns(regimes: Sequence[Regime]) -> FloatArray:
     """Compute the scales of displacement, velocity, memory and current of each train, shape (M, 4).
 
-    The scales are the half-widths of the strobe window of the train (`printhammer.run.regime`) and a
-    typical current.
+    The scales of displacement, velocity and memory are half-widths of the strobe window of the train
+    (`printhammer.run.regime`); the scale of the current is a typical current.
     """
     known: dict[tuple[int, float], tuple[float, ...]] = {}
     rows = []
@@ -258,10 +265,11 @@ def scales_of_columns(regimes: Sequence[Regime]) -> FloatArray:
 def cycles_of(columns: Columns, fronts: FloatArray, scales: FloatArray) -> tuple[IntArray, FloatArray]:
     """Compute the periods of trains, in firings, by the rule of `printhammer.chaos.strobe.verdict`.
 
-    The period is the smallest q, at most 64 and half of the points, for which states q firings apart agree; 0
-    if there is no such q. The second array is the largest distance of states q firings apart, in half-widths
-    of the strobe window; NaN for aperiodic trains. `fronts` are the front positions of the packs, m, infinite
-    without a pack; `scales` are from `scales_of_columns`.
+    Returns two arrays with one entry per train. The first is the period: the smallest q, at most 64 and at
+    most half the number of points, for which states q firings apart agree; 0 if there is no such q. The
+    second is the largest distance of states q firings apart, in units of the scales; NaN for an aperiodic
+    train. `fronts` are the front positions of the packs [m], infinite without a pack; `scales` are from
+    `scales_of_columns`.
     """
     branch = pack_branches(columns.x, columns.branch, fronts[:, np.newaxis])
     states = np.stack([columns.x, columns.v, columns.memory, columns.current], axis=2) / scales[:, np.newaxis]
@@ -291,8 +299,8 @@ def confirm(
 ) -> None:
     """Check ambiguous periods from `cycles_of` by Newton's method; update periods and distances in place.
 
-    A period is ambiguous if the states alone do not prove the period (`printhammer.chaos.orbits.settled`); an
-    unconfirmed period becomes 0.
+    A period is ambiguous if the states alone do not prove the period (`printhammer.chaos.orbits.settled`).
+    If Newton's method does not confirm a period, it is set to 0, which stands for an aperiodic train.
     """
     doubtful: list[int] = []
     for q in np.unique(cycles[cycles > 0]).tolist():
@@ -312,10 +320,10 @@ def confirm(
 
 
 def orbit_distance(one: FloatArray, other: FloatArray) -> float:
-    """Compute the distance between two periodic orbits of the same period, minimised over the phase.
+    """Compute the distance between two periodic orbits of q firings, the smallest over all cyclic shifts.
 
-    For each cyclic shift, the distance is the largest absolute difference of a component of the scaled
-    states, shape (q, 2).
+    An orbit is given by its scaled states, shape (q, 2). For each cyclic shift of the other orbit, the
+    distance is the largest absolute difference of any component of corresponding states.
     """
     count = len(one)
     shifted = other[(np.arange(count) + np.arange(count)[:, np.newaxis]) % count]

@@ -1,9 +1,11 @@
 """Bifurcation diagram: states at the firings, windows of one classification, and routes to chaos.
 
 A window is an interval of the parameter in which all computed trains have the same classification. A value
-represents the interval that reaches halfway to its neighbours, so that the widths of the windows add up to
-the range. The diagram cannot show windows between two neighbouring values. A route is the series of windows
-before the first strange train; it shows whether period doublings lead to chaos.
+of the parameter represents the interval that extends halfway to either neighbouring value, so that the
+widths of all windows add up to the parameter range. Windows between two neighbouring values are missed.
+
+A route to chaos is the series of windows before the first strange train; it shows whether period doublings
+lead to chaos.
 """
 
 from __future__ import annotations
@@ -86,7 +88,7 @@ class Route(Declared):
         return self.worded("{:.9g}".format)
 
     def worded(self, shown: Callable[[float], str]) -> str:
-        """Describe the route to the first chaotic train; `shown` formats parameter values."""
+        """Describe the route to the first strange train; `shown` formats a parameter value."""
         values = f"With {self.way} values"
         way = ", ".join(window.verdict for window in self.before)
         if not self.complete:
@@ -100,7 +102,7 @@ class Route(Declared):
 
 
 def cells(values: FloatArray) -> FloatArray:
-    """Compute the width of the interval that each of the ascending parameter values represents."""
+    """Compute the width of the interval that each parameter value represents: halfway to its neighbours."""
     if len(values) < 2:
         return np.zeros(len(values))
     edges = np.concatenate([values[:1], 0.5 * (values[1:] + values[:-1]), values[-1:]])
@@ -108,9 +110,10 @@ def cells(values: FloatArray) -> FloatArray:
 
 
 def doublings(windows: Sequence[Window]) -> list[Window]:
-    """Find period-doubling cascades: return the first of every three windows with periods 2, 4 and 8.
+    """Find period-doubling cascades; return the first window of each.
 
-    Undecided windows are skipped, since trains take long to settle near a period doubling.
+    A cascade consists of three successive windows of periods 2, 4 and 8. Undecided windows in between are
+    skipped, since trains take long to settle near a period doubling.
     """
     decided = [window for window in windows if window.verdict != "undecided"]
     threes = zip(decided, decided[1:], decided[2:], strict=False)
@@ -226,7 +229,7 @@ class Bifurcation(Result, rows="direction column"):
         )
 
     def _value_text(self) -> tuple[Callable[[float], str], str]:
-        """Return a formatter of parameter values, precise enough to tell neighbours apart, and the unit."""
+        """Return a formatter of parameter values, precise enough to tell neighbours apart, and its unit."""
         si = self.regime.quantity(self.parameter).si
         unit = {"s": "ms", "m": "um"}.get(si, si)
         steps = np.diff(self.values)
@@ -257,7 +260,7 @@ class Bifurcation(Result, rows="direction column"):
         return Grid(columns, direction, most=12)
 
     def _undecided_reasons(self) -> list[str]:
-        """List the reasons why completed trains are undecided, one sentence per reason."""
+        """Return sentences with the reasons why completed trains are undecided, one sentence per reason."""
         undecided = (self.verdicts == "undecided") & (self.status == "ok")
         known = undecided & ~np.isnan(self.exponents)
         settling = known & (self.exponents < -SIGNIFICANT * self.standard_errors)
@@ -292,13 +295,13 @@ class Bifurcation(Result, rows="direction column"):
     @property
     @derived("", "verdict", "direction column", name="verdict")
     def verdicts(self) -> TextArray:
-        """Classification of each train, shape (D, C), as in `printhammer.chaos.strobe.verdict`.
+        """Classification of each train, by direction and parameter value, shape (directions, values).
 
         The classes are "period-q", "strange", "undecided" and, for an armature that comes to rest on the
         backstop in a cycle longer than 64 firings, "superstable".
 
         A train is undecided if its run ended early, or if it has no period and its exponent was not computed
-        or is not positive by three standard errors.
+        or is not positive by three standard errors. See also `printhammer.chaos.strobe.verdict`.
         """
         names = np.full(self.cycles.shape, "undecided", "U16")
         for q in np.unique(self.cycles[self.cycles > 0]).tolist():
@@ -314,7 +317,7 @@ class Bifurcation(Result, rows="direction column"):
         return {key: known[key] for key in known if key != "period" or self.parameter not in (PERIOD, RATE)}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return the Dataset variables: states by direction, column and firing; classifications by train."""
+        """Return the Dataset variables: states along direction, value and firing; one verdict per train."""
         own = super().entries()
         of = self.regime.quantity(self.parameter)
         note = replace(own["value"][0], unit=of.si, meaning=of.meaning, head=self.parameter)
@@ -329,10 +332,10 @@ class Bifurcation(Result, rows="direction column"):
         return self._group(self._row(direction), range(len(self.values)))
 
     def routes(self, direction: str | None = None) -> tuple[Route, Route]:
-        """Compute the routes to the first chaotic train, for rising and for falling parameter values.
+        """Compute the two routes to chaos: for rising and for falling parameter, to the first strange train.
 
-        `direction` is as for `windows`. Missing exponents of aperiodic trains are computed here, from one end
-        of the range up to the first strange train.
+        `direction` is as for `windows`. Missing Lyapunov exponents of aperiodic trains are computed here,
+        from one end of the parameter range up to the first strange train.
         """
         row = self._row(direction)
         names = self.verdicts[row].tolist()
@@ -366,7 +369,10 @@ class Bifurcation(Result, rows="direction column"):
         return self.directions.index(direction)
 
     def _group(self, row: int, order: Sequence[int]) -> list[Window]:
-        """Group neighbouring columns with the same classification into windows, in the given column order."""
+        """Group neighbouring parameter values with the same classification into windows, in the given order.
+
+        `row` is the index of the direction; `order` contains the indices of the values.
+        """
         names, cycles = self.verdicts[row].tolist(), self.cycles[row].tolist()
         widths = cells(self.values)
         windows = []
@@ -379,7 +385,10 @@ class Bifurcation(Result, rows="direction column"):
         return windows
 
     def _is_strange(self, row: int, k: int) -> bool:
-        """Whether an aperiodic train is chaotic, by the Lyapunov exponent after its last recorded firing."""
+        """Whether an aperiodic train is strange, by its Lyapunov exponent after the last recorded firing.
+
+        `row` is the index of the direction, `k` that of the parameter value.
+        """
         x, v = (float(states[row, k, -1]) for states in (self.x, self.v))
         regime = self.regime.with_(self.parameter, float(self.values[k]))
         front = regime.hammer.front
@@ -392,11 +401,12 @@ class Bifurcation(Result, rows="direction column"):
 
 
 def hysteresis(diagram: Bifurcation) -> BoolArray:
-    """Return the mask of parameter values whose attractors, for rising and falling parameter, differ.
+    """Return the mask of the parameter values at which rising and falling parameter lead to two attractors.
 
-    Periodic trains differ if their periods differ or their orbits are farther apart than
-    `printhammer.chaos.bifurcation.builder.SAME`; an aperiodic train differs from every periodic train and
-    from no aperiodic train. The shape is (C,); all False for a single direction.
+    Two periodic attractors differ if their periods differ or their orbits are farther apart than
+    `printhammer.chaos.bifurcation.builder.SAME`. An aperiodic attractor differs from every periodic
+    attractor; two aperiodic attractors are never distinguished. The mask has one entry for each value; all
+    entries are False if the diagram has a single direction.
     """
     different = np.zeros(len(diagram.values), np.bool_)
     if len(diagram.directions) < 2:
