@@ -132,12 +132,14 @@ def follow(
         bifurcation. The correction of the first point then fixes the component along `row` instead of the
         parameter.
     watch : callable, optional
-        Called with every pair of successive nodes, in the direction of travel; may end the curve.
+        Function called with every pair of successive nodes, in the direction of travel; it ends the curve
+        between the two nodes by returning a `Stop`.
 
     Returns
     -------
     Curve
-        Nodes from the lower to the upper end, with parameter, state and reason of both stops.
+        The curve: its nodes, from the end of the downward direction to the end of the upward direction, and
+        the reason for stopping at either end.
 
     Raises
     ------
@@ -188,7 +190,7 @@ def _reversed(nodes: list[Node]) -> list[Node]:
 def _half(
     follower: Corrector, start: Node, bounds: tuple[float, float], steps: Steps, watch: Watch | None
 ) -> tuple[list[Node], Stop]:
-    """Follow a curve in one direction from its start node; return the further nodes and the `Stop`."""
+    """Follow a curve from its start node along its tangent; return the later nodes and the `Stop`."""
     nodes: list[Node] = []
     here, length = start, steps.first
     home = follower.point(start)
@@ -236,7 +238,11 @@ def _half(
 
 
 def _is_joined(follower: Corrector, here: Node, ahead: Node, length: float) -> bool:
-    """Whether a corrected point is near its prediction, with a similar tangent and similar multipliers."""
+    """Whether the corrected node `ahead` continues the curve: near its prediction, and similar to `here`.
+
+    The prediction lies a step of `length` along the tangent at `here`. The nodes are similar if the angle
+    between their tangents is small and no multiplier jumps.
+    """
     predicted = follower.point(here) + length * here.tangent
     near = float(np.linalg.norm(follower.point(ahead) - predicted)) <= _FARTHEST * length
     return near and float(here.tangent @ ahead.tangent) >= _LEAST_COSINE and not _has_leap(here, ahead)
@@ -262,7 +268,7 @@ def _lost(node: Node, trouble: str, *, jumped: bool = False) -> Stop:
 
 
 def _beyond(node: Node, bounds: tuple[float, float]) -> float | None:
-    """Return the parameter bound that a node has reached or crossed heading outward, else None."""
+    """Return the parameter bound that the curve reaches or crosses, outward, at a node; else None."""
     if node.parameter <= bounds[0] and node.tangent[-1] < 0.0:
         return bounds[0]
     if node.parameter >= bounds[1] and node.tangent[-1] > 0.0:
@@ -283,7 +289,10 @@ def _bound_stop(node: Node, bound: float) -> Stop:
 
 
 def _at_parameter(follower: Corrector, here: Node, ahead: Node, parameter: float) -> Node | None:
-    """Correct a point between two nodes at a fixed parameter; the tangent is in the direction of travel."""
+    """Find the fixed point between two nodes at a given parameter; None if not found.
+
+    The tangent of the new node points in the direction of travel, from `here` to `ahead`.
+    """
     share = (parameter - here.parameter) / (ahead.parameter - here.parameter)
     begin = follower.point(here)
     z = begin + share * (follower.point(ahead) - begin)
@@ -297,7 +306,10 @@ def _at_parameter(follower: Corrector, here: Node, ahead: Node, parameter: float
 
 
 def _is_passed(follower: Corrector, here: Node, ahead: Node, home: FloatArray, start: Node) -> bool:
-    """Whether a closed curve passes through its start between two successive nodes."""
+    """Whether a closed curve passes through its start node between the nodes `here` and `ahead`.
+
+    `home` is the scaled point of the start node.
+    """
     begin = follower.point(here)
     along = follower.point(ahead) - begin
     share = float((home - begin) @ along) / float(along @ along)

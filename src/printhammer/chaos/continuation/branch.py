@@ -81,7 +81,10 @@ class BranchEvent(Declared, eq=False):
 
 
 def event_of(point: BranchPoint, phase: float = 0.0) -> BranchEvent:
-    """Convert a special point of a curve of fixed points to an event of a branch at a section phase."""
+    """Convert a special point of a curve of fixed points to an event of a branch.
+
+    `phase` is the phase of the section at which the state of the fixed point applies.
+    """
     surface, change = ("", "") if point.sides is None else _grazing_of(point)
     return BranchEvent(
         kind="grazing" if point.kind == "change" else point.kind,
@@ -99,7 +102,10 @@ def event_of(point: BranchPoint, phase: float = 0.0) -> BranchEvent:
 
 
 def _grazing_of(point: BranchPoint) -> tuple[str, str]:
-    """Return the grazed surface, and whether the contact appears, vanishes, splits or merges."""
+    """Return the surface that the orbit grazes at a contact change, and the kind of change.
+
+    The kind is "appears", "vanishes", "splits", "merges" or "several".
+    """
     assert point.sides is not None
     ordered = sorted(point.sides, key=lambda node: node.parameter)
     before, after = (node.value.extra for node in ordered)
@@ -120,7 +126,11 @@ def _grazing_of(point: BranchPoint) -> tuple[str, str]:
 
 
 def _is_parted(touches: list[Touch], length: float) -> bool:
-    """Whether two successive contacts are separated by a gap shorter than every contact, as after a split."""
+    """Whether two successive contacts of an orbit are separated by a gap shorter than every contact.
+
+    Such a gap appears when a contact splits. `touches` are the touches of one surface in a period of the
+    orbit, and `length` is the length of this period [s].
+    """
     durations = [touch.t_out - touch.t_in for touch in touches]
     if len(touches) < 2 or min(durations) == 0.0:
         return False
@@ -136,10 +146,11 @@ def _is_parted(touches: list[Touch], length: float) -> bool:
 def stable_ranges(
     along: FloatArray, stable: BoolArray, events: Sequence[BranchEvent], ends: tuple[float, float]
 ) -> list[tuple[float, float]]:
-    """Compute the ranges of the parameter over which the orbits of a branch are stable, ascending.
+    """Compute the ranges of the parameter over which the orbits of a branch are stable, in ascending order.
 
-    `ends` are the parameter values at the ends of the branch, which may lie beyond its first and last orbit.
-    A branch of asymmetric orbits turns back at a pitchfork and stays stable.
+    `along` contains the parameter value of each orbit of the branch, `stable` whether it is stable. `ends`
+    are the parameter values at the ends of the branch, which may lie beyond its first and last orbit. Where a
+    branch of asymmetric orbits turns back at a pitchfork, its orbits stay stable.
     """
     limits = [event for event in events if event.kind not in ("grazing", "section")]
     values = along.tolist()
@@ -306,7 +317,7 @@ class Branch(Result):
 
     @property
     def stable_ranges(self) -> list[tuple[float, float]]:
-        """Ranges of the parameter over which the orbits are stable, ascending."""
+        """Ranges of the parameter over which the orbits are stable, in ascending order."""
         return stable_ranges(
             self.values, self.stable, self.events, (self.stops[0].parameter, self.stops[1].parameter)
         )

@@ -11,7 +11,7 @@ of the curve:
 | period doubling | det(J + I): a multiplier is -1 |
 | Neimark-Sacker | product over pairs of mu_i mu_j - 1: a complex pair crosses the unit circle |
 | crossing | determinant of the corrector's matrix, the tangent its last row: pitchfork or transcritical |
-| change | none; the label of the motion differs |
+| change | none; the label of the motion, its sequence of contacts, differs |
 
 A product mu_i mu_j = 1 of two real multipliers, a neutral saddle, is not a bifurcation and is omitted. Two
 sign changes within one step are not detected.
@@ -134,8 +134,8 @@ def points_of(
     scales, precision
         Scales and precision with which the curve was followed.
     margin : callable, optional
-        Function that passes through 0 where the label of the motion changes. The changes are then located by
-        interpolation, without evaluating the map too close to a change.
+        Function of a node that passes through 0 where the label of the motion changes. The changes are then
+        located by interpolation of this function, without evaluating the map very close to a change.
 
     Returns
     -------
@@ -211,8 +211,9 @@ def _has_pair(node: Node) -> bool:
 def zero_between(
     follower: Corrector, here: Node, ahead: Node, test: Callable[[Node], float]
 ) -> tuple[float, Node | None]:
-    """Find the zero of a test function between two nodes; return the fraction of the step and the node.
+    """Find the zero of a test function between two nodes of a curve.
 
+    Returns the position of the zero, as a fraction of the step from `here` to `ahead`, and the node there.
     The method alternates bisection and the Illinois variant of regula falsi. The node is None if Newton's
     method finds no fixed point at a trial fraction.
     """
@@ -248,7 +249,11 @@ def zero_between(
 def _changes(
     follower: Corrector, here: Node, ahead: Node, after: int, margin: Callable[[Node], float] | None
 ) -> list[tuple[float, Kind, BranchPoint]]:
-    """Locate the contact changes between two nodes; return step fraction, kind and point of each."""
+    """Locate the contact changes between the successive nodes `here` and `ahead` of a curve.
+
+    `after` is the index of `here`. Returns one tuple per change: position as a fraction of the step from
+    `here` to `ahead`, kind of the special point, and special point.
+    """
     changes: list[tuple[float, Kind, BranchPoint]] = []
     begin, first = 0.0, here
     while first.value.label != ahead.value.label and len(changes) < _ROUNDS:
@@ -274,7 +279,11 @@ def _change(
     start: tuple[float, Node],
     margin: Callable[[Node], float] | None,
 ) -> tuple[float, tuple[Node, Node], bool]:
-    """Locate the first contact change in a step; return step fraction, nodes on both sides, and success."""
+    """Locate the first contact change in the step from `here` to `ahead`, beyond a start in this step.
+
+    `start` is a position, as a fraction of the step, and the node there. Returns the position of the change,
+    the nodes that bracket it, and whether it was located; otherwise the bracket is wide.
+    """
     low, inside = start
     high, beyond = 1.0, ahead
     m_low = m_high = math.nan
@@ -358,13 +367,17 @@ def follow_doubled(
 
 
 def _is_born(way: FloatArray, row: FloatArray, amplitude: float, node: Node) -> bool:
-    """Whether a converged orbit lies, to first order, in the critical direction of a period doubling."""
+    """Whether a converged orbit lies, to first order, in the critical direction of a period doubling.
+
+    `way` is the scaled vector from the doubling to the orbit, `row` the critical direction. The orbit must
+    also have a multiplier close to 1.
+    """
     aside = float(np.linalg.norm(way - amplitude * row))
     return aside <= _ASIDE * amplitude and float(np.abs(node.multipliers - 1.0).min()) <= _NEW_MULTIPLIER
 
 
 def birth_of(half: Corrector, here: Node, ahead: Node) -> Stop | None:
-    """Locate the period doubling at which a branch of even period ends, as a `Stop`; None if not found.
+    """Locate the period doubling at which a branch of even orbit period ends, as a `Stop`; None if not found.
 
     At the doubling, states half a period apart coincide, and the curve retraces the same orbits half a period
     later. `half` corrects points onto the curve of orbits of half the period; `here` and `ahead` are
@@ -394,7 +407,7 @@ def birth_of(half: Corrector, here: Node, ahead: Node) -> Stop | None:
 
 
 def doubling_near(follower: Corrector, node: Node) -> Node | None:
-    """Locate the period doubling near a node along its curve by the secant method; None if not found."""
+    """Locate the period doubling near a node, on its curve, by the secant method; None if not found."""
     step = 1e-3
     z = follower.point(node)
     before, value = node, doubling_test(node.value.jacobian)

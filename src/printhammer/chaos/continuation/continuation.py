@@ -66,8 +66,9 @@ def continuation(
     most : int, optional
         Maximum number of steps in each direction.
     steps : Steps, optional
-        Step sizes and maximum number of steps, replacing `most`; lengths are in half-widths of the strobe
-        window and fifths of the parameter range.
+        Step sizes and maximum number of steps, replacing `most`. Step sizes are distances in scaled
+        variables: the state divided by the half-widths of the strobe window, and the parameter divided by a
+        fifth of its range.
     **firing
         Firing of the hammer, as for `printhammer.Regime.of`; for an orbit only its phase may be given.
 
@@ -117,7 +118,11 @@ def continuation(
 def _orbit_to_start_from(
     regime: Regime, firings: int | None, effort: Effort
 ) -> tuple[Regime, FloatArray, int]:
-    """Find the starting orbit; return the regime with the section phase, the state, and the orbit period."""
+    """Find the starting orbit of `firings` firings (None: any), from a train from rest or by a search.
+
+    Returns the regime, with the phase of the section; the state of the orbit at this section; and the period
+    of the orbit in firings.
+    """
     judged = (_SETTLE // 2, _SETTLE)
     (settled,) = strobes(regime, points=1, transient=_SETTLE, firings=judged, threads=effort.threads)
     period = None if settled.verdict is None or not settled.ok else settled.verdict.period

@@ -51,10 +51,11 @@ _ASIDE: Final = 0.5  # Arbitrary
 def locate_crossing(
     follower: Corrector, here: Node, ahead: Node, test: Callable[[Node], float]
 ) -> tuple[float, Node | None]:
-    """Locate a crossing between two nodes; return the fraction of the step, and the node or None.
+    """Locate a crossing, the zero of a test function, between two nodes of a curve.
 
     Since Newton's method fails at the crossing itself, the crossing is bracketed ever more closely, and its
-    position is interpolated.
+    position is interpolated. Returns the position as a fraction of the step from `here` to `ahead`, and the
+    interpolated node; the node is None if no closer bracket was found.
     """
     low, high, one, other = 0.0, 1.0, here, ahead
     for _ in range(_ROUNDS):
@@ -115,7 +116,10 @@ def crossing_tangents(follower: Corrector, node: Node) -> tuple[FloatArray, Floa
 
 
 def crossing_kind(follower: Corrector, node: Node) -> Crossing:
-    """Classify a crossing by the tangents of its two curves: pitchfork, transcritical or branching."""
+    """Classify a crossing by the tangents of its two curves as pitchfork or transcritical.
+
+    The kind is "branching" if the tangents are undetermined.
+    """
     tangents = crossing_tangents(follower, node)
     if tangents is None:
         return "branching"

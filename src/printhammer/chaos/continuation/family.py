@@ -36,7 +36,10 @@ Surface = Literal["pack", "backstop"]
 
 
 def cyclic(surfaces: Iterable[str]) -> str:
-    """Encode touched surfaces as P (pack) or B (backstop), rotated to the alphabetically first sequence."""
+    """Encode a sequence of touched surfaces as text, with P for the pack and B for the backstop.
+
+    Of all cyclic rotations of the text, the alphabetically first is returned.
+    """
     word = "".join("P" if surface == "pack" else "B" for surface in surfaces)
     if len(word) > _MOST_TOUCHES:
         return _MANY
@@ -46,7 +49,7 @@ def cyclic(surfaces: Iterable[str]) -> str:
 class Touch(Declared):
     """Contact that begins within one period of an orbit.
 
-    Times are measured from the last firing before the section.
+    Times are measured from the last firing at or before the section at which the period begins.
     """
 
     surface: Surface = part('"pack" or "backstop"')
@@ -91,7 +94,7 @@ class Passage(Declared):
 
 
 class Course(Declared):
-    """Motion of a periodic orbit over one period: states, pack forces and energies, J."""
+    """States, peak pack forces [N] and energies [J] of a periodic orbit over one period of the orbit."""
 
     states: FloatArray = part("displacement [m] and velocity [m/s] at the sections, shape (firings, 2)")
     peak_forces: FloatArray = column(
@@ -111,7 +114,7 @@ class RegimeFamily:
         self.regime, self.name, self.firings, self.tolerance = regime, name, firings, tolerance
 
     def __call__(self, state: FloatArray, parameter: float) -> MapValue:
-        """Evaluate the iterated strobe map at a state, m and m/s, and a value of the parameter, SI."""
+        """Evaluate the iterated strobe map and its derivatives at a state (m, m/s) and a parameter [SI]."""
         try:
             regime = self.regime.with_(self.name, parameter)
             problem, end = self._problem(regime, state)
@@ -139,7 +142,10 @@ class RegimeFamily:
         return MapValue(image, jacobian, slope, passage.sequence, extra=passage)
 
     def margin(self, state: FloatArray, parameter: float) -> float:
-        """Compute the signed distance from a grazing; see `printhammer.chaos.strobe.map.Image`."""
+        """Compute the signed distance of the motion from a grazing, the margin of the image of a state.
+
+        See `printhammer.chaos.strobe.map.Image`.
+        """
         problem, end = self._problem(self.regime.with_(self.name, parameter), state)
         return margin_of(problem, problem.run(end))
 
@@ -156,7 +162,10 @@ class RegimeFamily:
         return None if beside[0] is None else np.asarray((image - beside[0]) / step)
 
     def end_of(self, state: FloatArray, parameter: float) -> FloatArray | None:
-        """Compute the image of a state, (m, m/s), without derivatives; None if the run ends early."""
+        """Compute the image of a state (m, m/s) at a parameter value, without derivatives.
+
+        None if the run ends early or the state or the parameter value is invalid.
+        """
         try:
             problem, end = self._problem(self.regime.with_(self.name, parameter), state)
         except InputError:
@@ -172,7 +181,7 @@ class RegimeFamily:
         return problem, float(moments[-1])
 
     def course(self, state: FloatArray, parameter: float) -> Course:
-        """Compute states, pack forces and energies of an orbit over one period, from its section state."""
+        """Compute states, pack forces and energies of a periodic orbit from its state at the section."""
         regime = self.regime.with_(self.name, parameter)
         problem, end = self._problem(regime, state)
         record = problem.run(end)
@@ -194,7 +203,11 @@ def has_rigid_backstop(regime: Regime) -> bool:
 
 
 def _touches(hammer: Hammer, record: Record, zero: float, length: float) -> tuple[Touch, ...]:
-    """List the touches of an orbit in a run; a contact open at the end closes in the next period."""
+    """List the touches of an orbit from a run of `length` seconds, one period of the orbit.
+
+    Times are measured from the time `zero` of the run. A contact that is open at the end of the run ends in
+    the next period, when the contact open at its start ends.
+    """
     position, front = hammer.position, hammer.front
     touches = []
     open_at_start = {int(row[0]): float(row[3]) for row in record.contacts if row[6]}

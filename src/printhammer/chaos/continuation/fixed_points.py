@@ -45,7 +45,7 @@ class MapValue(Declared):
 
     @classmethod
     def none(cls, count: int, trouble: str) -> MapValue:
-        """Build the placeholder for a map value that does not exist; `trouble` is the reason."""
+        """Build the placeholder for a map of `count` variables without a value; `trouble` is the reason."""
         nan = math.nan
         return cls(np.full(count, nan), np.full((count, count), nan), np.full(count, nan), (), trouble)
 
@@ -66,7 +66,11 @@ class Node(Declared):
 
     @property
     def multipliers(self) -> npt.NDArray[np.complex128]:
-        """Eigenvalues of the map's derivative or of the monodromy matrix, largest absolute value first."""
+        """Multipliers of the fixed point, largest absolute value first.
+
+        They are the eigenvalues of the monodromy matrix if the map provides this matrix, else those of the
+        derivative of the map.
+        """
         value = self.value
         matrix = value.jacobian if value.monodromy is None else value.monodromy
         values = np.linalg.eigvals(matrix).astype(np.complex128)
@@ -110,9 +114,10 @@ class Corrector:
         return np.asarray(rows * self.scales / self.scales[: self.count, np.newaxis])
 
     def correct(self, z: FloatArray, row: FloatArray, *, arc: float = 0.0) -> Node | None:
-        """Find the fixed point near a scaled point z, in the plane normal to `row`; None if not found.
+        """Find the fixed point near a scaled point z, in the plane through z normal to `row`.
 
-        The tangent of the node points along `row`.
+        The tangent of the resulting node points along `row`; `arc` becomes the arc length of the node. None
+        if no fixed point is found; the attribute `trouble` then contains the reason if the map has no value.
         """
         level, z = float(row @ z), z.copy()
         last = math.inf
@@ -176,10 +181,10 @@ class Corrector:
 
 
 def between(follower: Corrector, here: Node, ahead: Node, share: float) -> Node | None:
-    """Find the point of a curve at a fraction of the step between two nodes; None if not found.
+    """Find the node of a curve at the fraction `share` of the step from `here` to `ahead`; None if not found.
 
-    The fraction is measured along the tangent of the first node; the initial guess is on the cubic Hermite
-    curve through both nodes.
+    The fraction is measured along the tangent at `here`. The initial guess lies on the cubic Hermite curve
+    through both nodes.
     """
     begin, end = follower.point(here), follower.point(ahead)
     chord = float(np.linalg.norm(end - begin))
@@ -196,7 +201,10 @@ def between(follower: Corrector, here: Node, ahead: Node, share: float) -> Node 
 
 
 def on_chord(begin: Node, end: Node, share: float, arc: float) -> Node:
-    """Interpolate a node linearly at a fraction of the chord between two nodes."""
+    """Interpolate state and parameter linearly at the fraction `share` of the chord between two nodes.
+
+    The new node has the arc length `arc`; its other fields are those of `begin`.
+    """
     state = begin.state + share * (end.state - begin.state)
     return replace(
         begin, state=state, parameter=begin.parameter + share * (end.parameter - begin.parameter), arc=arc

@@ -60,7 +60,7 @@ class Flight(Declared):
 def fly(
     regime: Regime, surface: Surface, phase: float, speed: float, firings: int, tolerance: float
 ) -> Flight:
-    """Compute the flight from an impact at a given drive phase and speed [m/s], over `firings` periods."""
+    """Compute the flight that leaves a surface at a given phase and speed [m/s], over `firings` periods."""
     hammer = regime.hammer
     place = hammer.front if surface == "pack" else hammer.position
     assert place is not None
@@ -109,7 +109,10 @@ def fly(
 
 
 def _acceleration(problem: Problem, time: float) -> float:
-    """Compute the acceleration of the armature [m/s^2] at the start of a run of length `time` [s]."""
+    """Compute the acceleration of the armature [m/s^2] at the start of a problem.
+
+    The forces are taken from a run of `time` seconds.
+    """
     record = problem.run(problem.start + time)
     (row,) = problem.resample(record, np.array([problem.start]))
     push = row[2] if problem.drive.quantity == "force" else 0.0
@@ -126,7 +129,10 @@ class NearTouch(Declared):
 
 
 def near_touches(regime: Regime, state: FloatArray, firings: int, tolerance: float) -> list[NearTouch]:
-    """List turning points and rigid impacts of an orbit, in ascending order of distance from a grazing."""
+    """List the turning points and rigid impacts of an orbit, in ascending order of distance from a grazing.
+
+    `state` is the state of the orbit at the section, `firings` its period.
+    """
     train, _ = regime.train(firings + 1)
     begin, *_, end = (float(time) for time in regime.moments(train, firings))
     hammer = regime.hammer
@@ -167,7 +173,7 @@ def touch_at(
     tolerance: float,
     width: float,
 ) -> tuple[float, float] | None:
-    """Solve for touch phase and parameter of the orbit that leaves a surface at a given speed.
+    """Solve for the touch phase and the parameter of the orbit that leaves a surface at a given speed.
 
     Parameters
     ----------
@@ -182,9 +188,9 @@ def touch_at(
     speed : float
         Speed with which the orbit leaves a rigid backstop, m/s; 0 for a grazing.
     firings, tolerance
-        Firings after which the orbit repeats; error allowed in one step.
+        Number of firings after which the orbit repeats, and tolerance of the integration.
     width : float
-        Scale of the parameter, SI.
+        Scale that divides changes of the parameter in Newton's method, SI.
 
     Returns
     -------
@@ -225,12 +231,13 @@ def touch_at(
 def fading(
     regime: Regime, name: str, touch: NearTouch, firings: int, tolerance: float, width: float
 ) -> list[tuple[float, float, float]] | None:
-    """Follow an impact to its grazing; return (phase, speed in m/s, parameter) at decreasing speeds.
+    """Follow the orbits of a branch, with decreasing speed of one impact, to the grazing of this impact.
 
-    The last entry is the grazing itself; the result is None if the impact speed does not reach zero nearby.
-    In these variables the branch is smooth up to the grazing. In terms of the state at a section, the
-    curvature of the branch diverges, since the derivative of the strobe map grows as the inverse of the
-    speed. The arguments are those of `touch_at`.
+    Returns a list of tuples: phase of the impact, its speed [m/s], and parameter value [SI]. The last entry
+    is the grazing itself. The result is None if the impact speed does not reach zero nearby. In these
+    variables the branch is smooth up to the grazing. In terms of the state at a section, the curvature of the
+    branch diverges, since the derivative of the strobe map grows as the inverse of the speed. The arguments
+    are those of `touch_at`.
     """
     way = [(touch.phase, touch.speed, float(regime.value(name)))]
     speeds = [touch.speed * share for share in _SLOWER] if touch.speed else []
@@ -264,10 +271,10 @@ _ON_CURVE: Final = 1e-5
 def grazing_end(
     family: RegimeFamily, scales: FloatArray, node: Node, *, impacts: bool = False
 ) -> tuple[list[Node], float] | None:
-    """Compute the last orbits of a branch before a final grazing, and the parameter at the grazing.
+    """Compute the last orbits of a branch before the grazing that ends it, and the parameter at the grazing.
 
-    `node` is the last known orbit; if `impacts` is true, the orbit's turning points are ignored. None if the
-    orbit is not close to a grazing.
+    `node` is the last known orbit. If `impacts` is true, only its impacts on a rigid backstop are examined,
+    not its turning points. The result is None if the orbit is not close to a grazing.
     """
     regime, width = family.regime.with_(family.name, node.parameter), float(scales[-1])
     every = near_touches(regime, node.state, family.firings, family.tolerance)
@@ -292,7 +299,10 @@ def _orbits(
     node: Node,
     way: list[tuple[float, float, float]],
 ) -> list[Node] | None:
-    """Convert orbits (impact phase, impact speed, parameter value) to nodes that extend a branch."""
+    """Convert orbits to nodes that extend a branch beyond its last node `node`; None if an orbit is invalid.
+
+    `way` contains, for each orbit, the phase of its impact, the impact speed [m/s] and the parameter value.
+    """
     nodes = [node]
     place = family.regime.hammer.position
     for phase, speed, value in way:
@@ -317,9 +327,10 @@ def _orbits(
 
 
 def fades(family: RegimeFamily, scales: FloatArray) -> Callable[[Node, Node], bool]:
-    """Build a predicate of two successive nodes: whether the slowest impact fades toward a grazing.
+    """Build a predicate of two successive nodes: whether the slowest impact of the orbit fades to a grazing.
 
-    A grazing is located only if the impact speed has fallen well below the speed at the last attempt.
+    The predicate tries to locate the grazing only if the speed of the impact has fallen well below its speed
+    at the previous attempt.
     """
     tried = math.inf
 
@@ -338,6 +349,6 @@ def fades(family: RegimeFamily, scales: FloatArray) -> Callable[[Node, Node], bo
 
 
 def _slowest(node: Node) -> float:
-    """Return the speed of the slowest impact on the backstop, m/s; infinite without impacts."""
+    """Return the speed [m/s] of the slowest impact of an orbit on the backstop; infinite without impacts."""
     passage: Passage = node.value.extra
     return min((abs(touch.v_in) for touch in passage.of("backstop")), default=math.inf)

@@ -54,7 +54,7 @@ _SAME: Final = 1e-4
 class Branches(Result):
     """Branches of periodic orbits continued in the same parameter.
 
-    The list may be incomplete: further orbits may exist.
+    The list may be incomplete: further branches may exist.
     """
 
     found: tuple[Branch, ...] = part("branches, sorted by number of firings, then by order of discovery")
@@ -211,6 +211,8 @@ def follow_doublings(
 ) -> Branches:
     """Follow the branches born at period doublings and crossings of a branch, for `levels` generations.
 
+    Returns the branch itself together with all branches found.
+
     Raises
     ------
     InterruptedBranches
@@ -247,7 +249,7 @@ class _Collected:
             raise InterruptedBranches(self.result()) from None
 
     def add(self, orbits: list[Orbit]) -> None:
-        """Follow the branch through each orbit that lies on no known branch; append the new branches."""
+        """Follow the branch through each orbit that lies on no known branch; append it to `found`."""
         left = list(orbits)
         while left:
             left = [orbit for orbit in left if not self.is_known(orbit)]
@@ -274,13 +276,19 @@ class _Collected:
 
     @staticmethod
     def switch_of(branch: Branch, event: BranchEvent) -> Callable[..., Branch] | None:
-        """Return the method that follows the branch born at an event; None if no branch is born there."""
+        """Return the method that follows the new branch at an event: a period doubling or a crossing.
+
+        None if no other branch passes through the event.
+        """
         if event.kind == "period doubling":
             return branch.doubled
         return branch.crossing if event.kind in CROSSINGS else None
 
     def switch(self, level: int) -> None:
-        """Follow the branches born at period doublings and crossings of the collected branches."""
+        """Follow the new branches at period doublings and crossings of the branches in `found`.
+
+        `level` is the index of the generation, counted from 0, for messages.
+        """
         for number, branch in enumerate(list(self.found)):
             for place, event in enumerate(branch.events):
                 follow = self.switch_of(branch, event)
@@ -301,7 +309,7 @@ class _Collected:
 
 
 def _state_at(orbit: Orbit, phase: float) -> FloatArray:
-    """Compute the state of an orbit, (m, m/s), at the section with the phase `phase`."""
+    """Compute the state (m, m/s) of an orbit at the section with the phase `phase`."""
     if phase == orbit.phase:
         return orbit.section
     motion = orbit.motion()
@@ -310,7 +318,7 @@ def _state_at(orbit: Orbit, phase: float) -> FloatArray:
 
 
 def _has_end_at(branch: Branch, value: float, state: FloatArray) -> bool:
-    """Whether a branch ends in a period doubling at a given state and parameter value."""
+    """Whether a branch ends in a period doubling at the state `state` and the parameter value `value`."""
     scales = np.append(branch.regime.window.half_widths, (branch.bounds[1] - branch.bounds[0]))
     place = np.append(state, value)
     return any(

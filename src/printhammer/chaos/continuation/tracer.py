@@ -55,7 +55,10 @@ _NO_STOP: Final = Stop("section", math.nan, np.zeros(0), "the section moves")
 def read_bounds(
     regime: Regime, parameter: str, bounds: tuple[float | str, float | str]
 ) -> tuple[float, float]:
-    """Parse the bounds of a parameter, SI; raise InputError unless they are two ascending numbers."""
+    """Parse the bounds of a parameter; return two numbers in SI units.
+
+    Raises InputError unless the bounds are two ascending numbers, or texts with units.
+    """
     unit = regime.quantity(parameter).si
     try:
         low, high = bounds
@@ -87,7 +90,7 @@ class Tracer:
     def branch(
         self, state: FloatArray, firings: int, steps: Steps, progress: Progress | None = None
     ) -> Branch:
-        """Trace the branch through an orbit, in both directions."""
+        """Trace the branch through the orbit of `firings` firings near a state, in both directions."""
         family = self.family(firings)
         curve = follow(
             family,
@@ -109,9 +112,10 @@ class Tracer:
     ) -> tuple[list[tuple[RegimeFamily, list[Node]]], Stop]:
         """Continue a branch past a section change; return the new segments and the reason for stopping.
 
-        A branch is lost where an impact meets its section. Each new segment starts with the last orbit of the
+        A branch is lost where an impact meets its section. If `backward`, the branch is continued beyond the
+        first of its `nodes`, else beyond the last. Each new segment starts with the last orbit of the
         preceding segment, at the phase at which this orbit is farthest from its contacts. Orbits too close to
-        the end of the branch are removed from `nodes`.
+        the end at which the branch was lost are removed from `nodes`.
         """
         pieces: list[tuple[RegimeFamily, list[Node]]] = []
         while stop.reason in _LOST and len(pieces) < _MOST_SECTIONS and len(nodes) > 1:
@@ -152,7 +156,10 @@ class Tracer:
         return pieces, stop
 
     def before_end(self, nodes: list[Node]) -> list[Node]:
-        """Drop orbits at the end of a segment, where an impact near the section spoils the derivatives."""
+        """Drop orbits close to the first node, the end of a segment at which an impact meets the section.
+
+        The impact spoils the derivatives of the strobe map there.
+        """
         places = np.array([np.append(node.state, node.parameter) for node in nodes]) / self.scales
         away = np.linalg.norm(places - places[0], axis=1) > _CLEAR
         return nodes[min(int(np.argmax(away)) if away.any() else 0, len(nodes) - 2) :]
@@ -205,14 +212,17 @@ class Tracer:
         return Curve(nodes, (stops[0], stops[1]))
 
     def followed(self, firings: int, event: BranchEvent, most: int, threads: int | None) -> Branch:
-        """Follow the new branch at an event: born at a period doubling, or crossing at a branch point."""
+        """Follow the branch that is born at an event of a branch, or crosses the branch there.
+
+        `firings` is the orbit period of the known branch, `most` the maximum number of steps.
+        """
         if event.phase != self.regime.phase:
             return self.at_phase(event.phase).followed(firings, event, most, threads)
         way = self.doubled if event.kind == "period doubling" else self.crossed
         return way(firings, event, most, threads)
 
     def crossed(self, firings: int, event: BranchEvent, most: int, threads: int | None) -> Branch:
-        """Follow the branch that crosses the branch of `firings`-firing orbits at an event."""
+        """Follow the branch that crosses a branch of orbits of `firings` firings at an event."""
         family, steps = self.family(firings), Steps(most=most, precision=PRECISION)
         curve = follow_crossing(
             family,
@@ -260,7 +270,11 @@ class Tracer:
         return f"{self.parameter} = {value:{_DIGITS}} {self.regime.quantity(self.parameter).si}"
 
     def watch(self, firings: int, steps: Steps, effort: Effort) -> Any:
-        """Build the callback that ends the branch between two nodes: at a grazing, merger or doubling."""
+        """Build the callback of `follow` that ends a branch of orbits of `firings` firings.
+
+        The branch ends at a grazing of a rigid backstop, at a merger with orbits of fewer firings, or at the
+        period doubling that creates the branch.
+        """
         half, whole = None, self.family(firings)
         if firings % 2 == 0:
             half = Corrector(self.family(firings // 2), self.scales, steps.precision)
@@ -291,7 +305,7 @@ class Tracer:
         return watched
 
     def is_repeat(self, part: RegimeFamily, node: Node) -> bool:
-        """Whether an orbit already repeats after a fraction of its firings."""
+        """Whether an orbit already repeats after the firings of `part`, a fraction of its own firings."""
         end = part.end_of(node.state, node.parameter)
         return end is not None and bool(np.abs((end - node.state) / self.scales[:2]).max() < _SHORTER)
 
