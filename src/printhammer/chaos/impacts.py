@@ -191,7 +191,10 @@ def sections(
 def _counts(
     touches: SupportsIndex, transient: SupportsIndex, firings: SupportsIndex | None
 ) -> tuple[int, int, int]:
-    """Validate the touches to record, the firings to discard and the firing limit; return three integers."""
+    """Validate the number of touches to record, the number of firings to discard, and the firing limit.
+
+    Returns the three numbers, with the default firing limit for None.
+    """
     wanted, skipped = read_count(touches, "touches"), read_count(transient, "transient", least=0)
     room = MOST_PULSES - skipped - 1
     limit = min(_FIRINGS_A_TOUCH * wanted, room) if firings is None else read_count(firings, "firings")
@@ -309,7 +312,7 @@ class ImpactTrain(Result):
 
     @property
     def significant(self) -> float:
-        """95 % bound of the autocorrelation of n independent intervals, 1.96/sqrt(n)."""
+        """Bound that the autocorrelation of n independent intervals exceeds in 5 % of cases, 1.96/sqrt(n)."""
         return 1.96 / math.sqrt(len(self.intervals))
 
     @property
@@ -358,7 +361,7 @@ def impact_train(
     bins : int, optional
         Number of bins of the histogram, between the shortest and the longest interval.
     lags : int, optional
-        Largest lag of the autocorrelation, clipped to a quarter of the intervals.
+        Largest lag of the autocorrelation, limited to a quarter of the number of intervals.
     **firing
         Firing of the hammer: period or rate, waveform and drive, as for `printhammer.Regime.of`.
 
@@ -408,7 +411,8 @@ def autocorrelation(series: FloatArray, longest: int) -> FloatArray:
     """Compute the autocorrelation of a series for the lags from 0 to `longest`.
 
     The sums of the products of deviations are divided by the sum at lag 0 (G. E. P. Box and G. M. Jenkins,
-    Time Series Analysis, 1970, section 2.1.5). NaN if the numbers differ by no more than 1e-9 of the largest.
+    Time Series Analysis, 1970, section 2.1.5). The result is NaN if the numbers of the series are equal up to
+    1e-9 of the largest.
     """
     away = series - series.mean()
     whole = float((away**2).sum())
@@ -419,14 +423,20 @@ def autocorrelation(series: FloatArray, longest: int) -> FloatArray:
 
 
 def _range(intervals: FloatArray) -> tuple[float, float]:
-    """Return the range of the bins of the interval histogram, s; at least 0.001 of the mean interval wide."""
+    """Return the lower and upper end [s] of the histogram of intervals.
+
+    The range is at least 0.001 of the mean interval wide.
+    """
     low, high = float(intervals.min()), float(intervals.max())
     room = max(0.0, 0.5 * (1e-3 * float(intervals.mean()) - (high - low)))
     return low - room, high + room
 
 
 def _fano(times: FloatArray, length: float) -> tuple[int, float]:
-    """Divide a train into windows of a given length, s; return their number, and the Fano factor."""
+    """Divide impact times [s] into windows of a length [s]; return the number of windows and the Fano factor.
+
+    The Fano factor is the variance of the number of impacts in a window, divided by the mean number.
+    """
     # Windows start half an interval before the first impact, so that impacts of a clock avoid the edges.
     begin = times[0] - 0.5 * (times[-1] - times[0]) / (len(times) - 1)
     windows = int((times[-1] - begin) // length)

@@ -129,7 +129,7 @@ class BifurcationCurve(Result, rows="point"):
     @property
     @derived("1", "whether a stable orbit loses its stability at the point", "point")
     def limits(self) -> BoolArray:
-        """Mask, shape (N,), of the points at which a stable orbit loses its stability."""
+        """Mask of the points of the curve at which a stable orbit loses its stability."""
         if self.kind == "grazing":
             return np.asarray(np.abs(self.multipliers).max(axis=1) < 1.0)
         return np.asarray(np.abs(self.multipliers).max(axis=1) < 1.0 + SAME)
@@ -175,7 +175,7 @@ class BifurcationCurve(Result, rows="point"):
         )
 
     def at(self, name: str, value: float | str) -> list[tuple[float, float]]:
-        """Find all points of the curve at which one of the two parameters has a given value.
+        """Find all points of the curve at which one of the two parameters has a given value, in order.
 
         Parameters
         ----------
@@ -200,7 +200,10 @@ class BifurcationCurve(Result, rows="point"):
         }
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return the Dataset variables: curve along `point`, trains from rest along `value` and `main`."""
+        """Return the Dataset variables: the curve along `point`, and the periods of trains from rest.
+
+        The periods have the dimensions `value` (second parameter) and `main` (first parameter).
+        """
         own = super().entries()
         for k, (name, axis) in enumerate((("first", "main"), ("second", "value"))):
             own[name] = Column(self.units[k], self.names[k], ("point",), name=name), getattr(self, name)
@@ -236,11 +239,17 @@ def settled_plane(
     grid: tuple[int, int],
     threads: int | None,
 ) -> tuple[tuple[FloatArray, FloatArray], IntArray]:
-    """Compute the periods, in firings, of trains from rest over a grid of both parameters.
+    """Compute the periods, in firings, of trains from rest over a grid of two parameters.
 
-    The result contains the values of the first parameter, shape (m,), of the second, shape (n,), and the
-    periods, shape (n, m): 0 without a period, -1 if the run ended early. Raises InputError if a number of
-    values is negative.
+    `grid` contains the number of values of the first parameter, m, and of the second, n. Raises InputError if
+    one of these numbers is negative.
+
+    Returns
+    -------
+    tuple of array
+        Values of the first parameter, shape (m,), and of the second, shape (n,), evenly spaced in `bounds`.
+    array, shape (n, m)
+        Periods of the trains: 0 for a train without a period, -1 for a run that ended early.
     """
     if min(grid) < 0:
         raise InputError.of("grid", grid, "two numbers of values, not negative")
@@ -348,7 +357,7 @@ def _nearest(traced: Traced, value: float) -> int:
 
 
 def curve_of(plane: Plane, traced: Traced, grid: tuple[int, int], threads: int | None) -> BifurcationCurve:
-    """Build the result of a traced curve, with normal forms and the periods of trains from rest."""
+    """Build the result from a traced curve, with normal-form coefficients and a grid of trains from rest."""
     places = traced.places
     coefficients, sides = traced.coefficients, np.zeros((len(places), MOST_PERIODS + 1), np.int64)
     if traced.kind == GRAZING and traced.surface == "backstop":

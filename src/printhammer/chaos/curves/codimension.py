@@ -66,7 +66,10 @@ class CodimensionTwo(Declared):
 
 
 def point_of(kind: str, place: CurvePoint, after: int, passages: int = 1) -> CodimensionTwo:
-    """Build the point of codimension two at a node of a curve."""
+    """Build a point of codimension two from a point of the curve.
+
+    `after` is the index of the preceding node of the curve, `passages` the number of orbit periods per touch.
+    """
     multipliers = place.multipliers
     return CodimensionTwo(
         kind, place.first, place.second, place.state, place.phase, multipliers, after, passages
@@ -93,7 +96,11 @@ def _along(direction: FloatArray) -> Callable[[Node], float]:
 
 
 def _tests(kind: str, rigid: bool) -> dict[tuple[str, int], Callable[[Node], float]]:
-    """Return the test functions of codimension-two points, by kind and number of orbit periods per touch."""
+    """Return the test functions for points of codimension two on curves of the kind `kind`.
+
+    The keys are the kind of the point and the number of orbit periods per touch. `rigid` tells whether the
+    backstop is rigid, so that resonant grazings exist.
+    """
     if kind == "fold":
         return {
             ("fold-flip", 1): lambda node: _determinant(node) + 1.0,
@@ -127,10 +134,10 @@ def points_along(
     coefficients: FloatArray,
     coefficient: Callable[[CurvePoint], float],
 ) -> list[CodimensionTwo]:
-    """Locate the points of codimension two on a curve, in order.
+    """Locate the points of codimension two on a curve of the kind `kind`, in order.
 
-    `coefficients` are the normal-form coefficients of a period doubling at the nodes; `coefficient` computes
-    the coefficient at any other point.
+    `rigid` tells whether the backstop is rigid. `coefficients` are the normal-form coefficients at the nodes
+    of a curve of period doublings; `coefficient` computes this coefficient at any other point of the curve.
     """
     points: list[CodimensionTwo] = []
     tests = _tests(kind, rigid)

@@ -116,9 +116,10 @@ def grazing_sides(plane: Plane, place: CurvePoint) -> tuple[int, ...]:
 def _touching_side(matrix: FloatArray, slope: FloatArray, kick: FloatArray, periods: int) -> int:
     """Determine the side on which an orbit with one touch in `periods` periods exists: 1, -1 or 0.
 
-    In units of the square root of the depth, a touch adds the kick k. The state before the kick, u_0 = (0,
-    v), and the shift m of the parameter solve A^n (u_0 + k) + (I + A + ... + A^(n-1)) s m = u_0, with s the
-    slope of the map in the parameter. Between touches the orbit has to stay off the surface.
+    The derivative of the strobe map in the state is A (`matrix`), in the parameter s (`slope`). In units of
+    the square root of the depth, a touch adds the kick k to the state. The state before the kick, u_0 =
+    (0, v), and the shift m of the parameter solve A^n (u_0 + k) + (I + A + ... + A^(n-1)) s m = u_0, where n
+    is `periods`. Between touches the orbit has to stay off the surface.
     """
     power = np.linalg.matrix_power(matrix, periods)
     summed = sum((np.linalg.matrix_power(matrix, k) for k in range(periods)), np.zeros((2, 2))) @ slope

@@ -117,7 +117,10 @@ class StabilityChart(Result):
         )
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return the Dataset variables: trains from rest along `value` and `main`, curves along `curve`."""
+        """Return the Dataset variables: curves along `curve`, and the periods of trains from rest.
+
+        The periods have the dimensions `value` (second parameter) and `main` (first parameter).
+        """
         # At least one of each: a dimension of length 0 has another meaning in the classic NetCDF format.
         most, count = max((len(curve.first) for curve in self.curves), default=1), max(len(self.curves), 1)
         table = np.full((2, count, most), np.nan)
@@ -237,7 +240,10 @@ class _Chart:
         self.value = branch.regime.value(second)
 
     def across(self, effort: Effort) -> list[tuple[float, list[Start]]]:
-        """Locate stability limits in the second parameter; return pairs (first-parameter value, starts)."""
+        """Locate stability limits along branches in the second parameter, through orbits of the first branch.
+
+        Returns, for each of these branches, the value of the first parameter and the starts of curves.
+        """
         branch, values = self.branch, self.branch.values
         low, high = float(values.min()), float(values.max())
         # Prefer a stable orbit: its branch loses stability at its limits.
@@ -266,7 +272,10 @@ class _Chart:
         return self.value if start.other is None else start.other
 
     def curves(self, starts: list[Start], effort: Effort) -> tuple[list[BifurcationCurve], list[str]]:
-        """Trace a curve through each start that lies on no earlier curve; return curves and failures."""
+        """Trace a curve through each start that lies on no earlier curve.
+
+        Returns the curves, and the reason for each failure as a sentence.
+        """
         curves: list[BifurcationCurve] = []
         refused: list[str] = []
         left = starts

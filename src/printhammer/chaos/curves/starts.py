@@ -111,7 +111,11 @@ def _of_branch(branch: Branch, event: BranchEvent | int | str | None) -> Start:
 
 
 def _number(kinds: Sequence[str], located: list[bool], event: int | str | None, whose: str) -> int:
-    """Return the index of the event selected by index, kind or default; raise InputError if missing."""
+    """Return the index of the event selected by `event`: an index, a kind, or None for the default.
+
+    `kinds` are the kinds of all events of a branch; `located` tells which were located; `whose` names the
+    branch in error messages. Raises InputError if no event matches.
+    """
     known = ", ".join(dict.fromkeys(kinds)) or "none"
     if isinstance(event, int | np.integer):
         if not 0 <= event < len(kinds):

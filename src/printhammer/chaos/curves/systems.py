@@ -71,7 +71,7 @@ _PARTS: Final = 5.0  # Arbitrary
 
 @dataclass(frozen=True)
 class Plane:
-    """Plane of two parameters of a regime, with ranges, orbit period and tolerance."""
+    """Plane of two parameters of a regime: names and ranges, period of the orbit in firings, tolerance."""
 
     regime: Regime
     names: tuple[str, str]
@@ -91,7 +91,7 @@ class Plane:
 
 
 def check_two(first: str, second: str) -> None:
-    """Raise InputError if two parameters are the same, or are the rate and the period."""
+    """Raise InputError if two parameters are the same, or one is the rate and the other the period."""
     if second == first or {first, second} == {PERIOD, RATE}:
         raise InputError.of("second", second, f"another constant than that of the branch, {first}")
 
@@ -114,7 +114,7 @@ class CurvePoint(Declared):
 
     @property
     def multipliers(self) -> npt.NDArray[np.complex128]:
-        """Eigenvalues of the derivative, the larger absolute value first, shape (2,), complex."""
+        """Eigenvalues of the derivative of the strobe map, the larger absolute value first, shape (2,)."""
         values = np.linalg.eigvals(self.jacobian).astype(np.complex128)
         return values[np.argsort(-np.abs(values), kind="stable")]
 
@@ -127,7 +127,10 @@ class MultiplierSystem:
         self.scales = plane.scales
 
     def __call__(self, whole: FloatArray, other: float) -> MapValue:
-        """Evaluate the extended map on (state, first parameter) at a value of the second parameter."""
+        """Evaluate the extended map on `whole` at the value `other` of the second parameter.
+
+        `whole` contains the displacement [m], the velocity [m/s] and the value of the first parameter.
+        """
         plane, scales = self.plane, self.scales
         moves = SPACING * scales
         point = np.append(whole, other)
@@ -172,7 +175,7 @@ class MultiplierSystem:
 
 
 def curve_point_of(node: Node) -> CurvePoint:
-    """Return the point of the parameter plane that belongs to a fixed point of an extended map."""
+    """Return the point of the bifurcation curve that a fixed point of an extended map represents."""
     place: CurvePoint = node.value.extra
     return place
 
@@ -184,7 +187,7 @@ _IN_TRACE: Final = {"fold": -1.0, "period doubling": 1.0, "Neimark-Sacker": 0.0}
 
 
 def _flights(plane: Plane, surface: Surface, points: Iterable[FloatArray]) -> Iterator[Flight]:
-    """Compute the flights from points (phase, speed, first parameter, second parameter)."""
+    """Compute a flight for each point: drive phase, speed [m/s], first parameter, second parameter."""
     # Most neighbours of a point have its parameters, and share its regime.
     at = cache(plane.at)
     for phase, speed, first, second in points:
@@ -215,7 +218,10 @@ class GrazingSystem:
         return place, (flight.end - at) / self.plane.scales[:2]
 
     def __call__(self, whole: FloatArray, other: float) -> MapValue:
-        """Evaluate the extended map on (phase of the touch, first parameter) at a second parameter."""
+        """Evaluate the extended map on `whole` at the value `other` of the second parameter.
+
+        `whole` contains the phase of the touch and the value of the first parameter.
+        """
         steps, point = SPACING * self.scales, np.append(whole, other)
         missed = []
         for phase, first, second in [point, *(point + step for step in np.diag(steps))]:
@@ -250,7 +256,11 @@ class ImpactSystem:
         self.scales = np.array([_PHASES, *plane.scales[1:]])
 
     def __call__(self, whole: FloatArray, other: float) -> MapValue:
-        """Evaluate the extended map on (phase, velocity after the impact, first parameter)."""
+        """Evaluate the extended map on `whole` at the value `other` of the second parameter.
+
+        `whole` contains the phase of the impact, the velocity after it [m/s], and the value of the first
+        parameter.
+        """
         moves, point = SPACING * self.scales, np.append(whole, other)
         try:
             flights = list(
@@ -285,7 +295,11 @@ class ImpactSystem:
         return _IN_TRACE[self.kind]
 
     def _miss(self, flight: Flight, speed: float) -> FloatArray:
-        """Compute the scaled residuals of displacement and velocity at impact, and of the test function."""
+        """Compute the three scaled residuals of a flight that starts at an impact with the velocity `speed`.
+
+        They are those of the displacement at the next impact, of the velocity after that impact, and of the
+        test function.
+        """
         matrix, e, w = flight.jacobian, flight.rebound, float(flight.end[1])
         determinant = e * e * float(np.linalg.det(matrix))
         trace, rest = self._sign, determinant + (1.0 if self._sign else -1.0)

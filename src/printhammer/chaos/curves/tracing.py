@@ -71,7 +71,10 @@ class Traced:
         return [curve_point_of(node) for node in self.nodes]
 
     def crossings(self, which: int, value: float) -> list[CurvePoint]:
-        """Find the points where the first (`which` = 0) or the second parameter (1) has a given value."""
+        """Find the points of the curve at which one of the parameters has a given value.
+
+        `which` is 0 for the first parameter, 1 for the second.
+        """
         places: list[CurvePoint] = []
         for system, nodes in self.pieces:
             corrector = Corrector(system, system.scales, PRECISION)
@@ -102,7 +105,11 @@ class CurveTracer:
         self.rigid = has_rigid_backstop(plane.regime)
 
     def trace(self, start: Start, second: float, threads: int | None) -> Traced:
-        """Trace the bifurcation curve from an initial guess; raise InputError if Newton's method fails."""
+        """Trace the bifurcation curve through `start`, an initial guess of its first point.
+
+        `second` is the value of the second parameter at the start. Raises InputError if Newton's method
+        fails.
+        """
         system, unknown = self.begin(start, second)
         at = f"{self.kind} at {start.first} = {start.value:.9g} {start.regime.quantity(start.first).si}"
         try:
@@ -149,7 +156,10 @@ class CurveTracer:
         return Traced(self.kind, surface, nodes, (first, last), points, coefficients, pieces)
 
     def resonance(self, system: System, here: Node, beyond: Node) -> Node:
-        """Locate the resonance on a torus curve between two nodes, at which both multipliers become real."""
+        """Locate the resonance on a Neimark-Sacker curve, at which both multipliers become real.
+
+        The resonance lies between the nodes `here` and `beyond`.
+        """
         sign = float(np.sign(np.trace(curve_point_of(beyond).jacobian)))
         corrector = Corrector(system, system.scales, self.steps.precision)
         _, node = zero_between(
@@ -162,7 +172,7 @@ class CurveTracer:
         return doubling_coefficient(self.plane, place)
 
     def begin(self, start: Start, second: float) -> tuple[System, FloatArray]:
-        """Choose the extended map for a start; return the map and its initial unknowns."""
+        """Choose the extended map for a start; return the map and the initial guess of its unknowns."""
         plane, tolerance = self.plane, self.plane.tolerance
         regime = replace(plane.at(start.value, second), phase=start.regime.phase)
         near = near_touches(regime, start.state, plane.firings, tolerance)
@@ -192,7 +202,10 @@ class CurveTracer:
         return np.array([surface, unknown[1]])
 
     def watch(self, system: System) -> Watch:
-        """Build the callback that ends a curve that is lost or meets a grazing, a resonance or a bound."""
+        """Build the callback of `follow` that ends a curve.
+
+        The curve ends where it is lost, or at a grazing, a resonance or a bound of the first parameter.
+        """
         low, high = self.plane.bounds[0]
         corrector = Corrector(system, system.scales, self.steps.precision)
         place = system.scales.size - 2
@@ -231,7 +244,10 @@ class CurveTracer:
     def resumed(
         self, nodes: list[Node], stop: Stop, *, first: bool
     ) -> tuple[list[tuple[System, list[Node]]], Stop]:
-        """Continue a curve past a section change; return the new segments and the reason for stopping."""
+        """Continue a curve past a section change; return the new segments and the reason for stopping.
+
+        If `first`, the curve is continued beyond the first of its `nodes`, else beyond the last.
+        """
         pieces: list[tuple[System, list[Node]]] = []
         for _ in range(_TURNS):
             if stop.reason not in ("lost", "jump", "no value"):
@@ -273,7 +289,10 @@ class CurveTracer:
         return pieces, stop
 
     def meetings(self, nodes: list[Node], begin: int) -> list[CodimensionTwo]:
-        """Locate the points at which a fold or doubling curve meets a grazing of a compliant surface."""
+        """Locate the points at which a fold or doubling curve meets a grazing of a compliant surface.
+
+        `begin` is the index of the first of the `nodes` along the whole curve.
+        """
         if self.rigid or self.kind not in ("fold", "period doubling"):
             return []
         points = []
@@ -300,7 +319,10 @@ class CurveTracer:
         return float(np.linalg.norm(away))
 
     def grazing_near(self, place: CurvePoint, within: float) -> CurvePoint | None:
-        """Find the grazing near a curve point at which the test function is zero; None if not found."""
+        """Find the grazing near a point of the curve at which the test function of the curve is zero.
+
+        None if there is no such grazing up to the scaled distance `within` in the parameter plane.
+        """
         regime = replace(self.plane.at(place.first, place.second), phase=place.phase)
         for touch in near_touches(regime, place.state, self.plane.firings, self.plane.tolerance)[:3]:
             guess = np.array([touch.phase, place.first, place.second])
@@ -312,7 +334,11 @@ class CurveTracer:
     def with_ends(
         self, nodes: list[Node], stops: list[Stop], points: list[CodimensionTwo]
     ) -> list[CodimensionTwo]:
-        """Find the grazings at the ends of a curve; return all codimension-two points, and update `stops`."""
+        """Find the points of codimension two at which a curve ends in a grazing.
+
+        Returns `points`, the points found between the ends, together with those at the ends. The reasons in
+        `stops` are updated.
+        """
         if self.kind not in ("fold", "period doubling"):
             return points
         for end, (node, after) in enumerate(((nodes[0], -1), (nodes[-1], len(nodes) - 1))):
@@ -325,7 +351,10 @@ class CurveTracer:
         return points
 
     def end_at(self, place: CurvePoint, after: int) -> CodimensionTwo | None:
-        """Find the point of codimension two that ends a curve, near its last point; None if not found."""
+        """Find the point of codimension two at which a curve ends, near its last point `place`.
+
+        `after` is the index of the preceding node. None if no such point is found.
+        """
         speed = float(place.state[1]) / float(self.plane.scales[1])
         if self.rigid and 0.0 < speed < _SLOW:
             guess = np.array([place.phase, place.first, place.second])
@@ -345,7 +374,11 @@ class CurveTracer:
         return f"{name} = {value:.9g} {self.plane.regime.quantity(name).si}".removesuffix(" 1")
 
     def in_words(self, stop: Stop, points: list[CodimensionTwo], end: int) -> Stop:
-        """Return a `Stop` whose sentence names the parameters and any codimension-two point at the end."""
+        """Return a copy of a `Stop` whose sentence states the parameters, with units.
+
+        For an end in a grazing, the sentence names the point of codimension two at this end (0: first, 1:
+        last).
+        """
         at = self.at_value(1, stop.parameter)
         if stop.reason == "grazing" and points:
             point = points[-1 if end else 0]

@@ -1,4 +1,4 @@
-"""Correlation dimension of an attractor by the Grassberger-Procaccia algorithm, with an interval.
+"""Correlation dimension of an attractor by the Grassberger-Procaccia algorithm, with an error interval.
 
 The correlation sum C(r) is the fraction of pairs of states closer than r; on an attractor of dimension D2 it
 scales as r^D2 if r is neither so large that the shape of the attractor matters nor so small that few pairs
@@ -7,8 +7,8 @@ Theiler, Phys. Rev. A 34 (1986) 2427). The dimension is the slope of ln C agains
 widest range over which the local slope stays within a tolerance.
 
 Limitations: N states do not resolve distances below about N^(-2/D2) of the size of the attractor, and a set
-with gaps has fluctuating slopes for any number of states. The interval therefore covers every slope on the
-plateau, and the scatter between sections of the series; without a plateau no dimension is returned.
+with gaps has fluctuating slopes for any number of states. The error interval therefore covers every slope on
+the plateau, and the scatter between parts of the series; without a plateau no dimension is returned.
 """
 
 from __future__ import annotations
@@ -104,13 +104,13 @@ def correlation_dimension(
     theiler : int, optional
         Theiler window: pairs of states less than this many steps apart are excluded.
     flat : float, optional
-        Largest range of local slopes on a plateau.
+        Tolerance of the plateau: the largest difference between two local slopes on a plateau.
 
     Returns
     -------
     CorrelationDimension
-        Dimension with an interval that covers the local slopes on the plateau, widened by twice the standard
-        error from five sections of the series.
+        Dimension with an error interval: the range of the local slopes on the plateau, widened on either side
+        by twice the standard error from five parts of the series.
 
     Raises
     ------
@@ -168,9 +168,10 @@ def correlation_dimension(
 
 
 def correlation_sums(states: FloatArray, radius: FloatArray, theiler: int) -> tuple[FloatArray, int]:
-    """Compute the fraction of pairs of states within each of several distances, and the number of pairs.
+    """Compute the fraction of pairs of states that are closer than each of the distances in `radius`.
 
-    Pairs less than `theiler` steps apart in time are excluded.
+    Pairs less than `theiler` steps apart in time are excluded. The number of remaining pairs is returned,
+    too.
     """
     from scipy.spatial import cKDTree
 
@@ -185,7 +186,10 @@ def correlation_sums(states: FloatArray, radius: FloatArray, theiler: int) -> tu
 
 
 def local_slopes(radius: FloatArray, sums: FloatArray) -> FloatArray:
-    """Fit the local slope of ln C against ln r at each distance by a straight line through its neighbours."""
+    """Fit the local slope of ln C (`sums`) against ln r (`radius`) at each distance r.
+
+    The slope is that of a straight line fitted to the distance and its neighbours.
+    """
     slopes = np.full(len(radius), np.nan)
     half = _PIECE // 2
     for k in range(half, len(radius) - half):

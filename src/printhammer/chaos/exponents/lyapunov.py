@@ -311,7 +311,8 @@ def kaplan_yorke(factors: FloatArray) -> tuple[float, float]:
     Returns
     -------
     dimension, error : float
-        NaN unless the sign of the largest exponent is significant by three standard errors.
+        Dimension and its standard error; both are NaN unless the largest exponent differs from zero by three
+        standard errors.
     """
     one, two = (float(mean) for mean in factors.mean(axis=0))
     sign = _growth(one, standard_error(factors[:, 0]), True)
@@ -327,12 +328,15 @@ def kaplan_yorke(factors: FloatArray) -> tuple[float, float]:
 
 
 def cycle_of(period: int | None, firings: int) -> int:
-    """Return the period if a train covers enough whole cycles to average over, else 1."""
+    """Return the period of a train if its firings cover enough whole periods to average over, else 1."""
     return period if period is not None and firings >= _CYCLES * period else 1
 
 
 def whole_cycles(factors: FloatArray, cycle: int) -> FloatArray:
-    """Average the growth over whole cycles, shape (n // cycle, 2); an incomplete first cycle is dropped."""
+    """Average logarithmic growth factors, shape (n, 2), over each cycle of `cycle` firings.
+
+    The result has the shape (n // cycle, 2). An incomplete first cycle is dropped.
+    """
     return np.asarray(factors[len(factors) % cycle :].reshape(-1, cycle, 2).mean(axis=1))
 
 
@@ -346,7 +350,10 @@ def _growth(value: float, error: float, smooth: bool) -> str:
 
 
 def exponents_of_train(train: Train, counts: tuple[int, int], tolerance: float) -> Lyapunov:
-    """Compute the exponents of a train over a number of firings, after a number of discarded firings."""
+    """Compute the Lyapunov exponents of a train.
+
+    `counts` contains the number of firings to average over, and the number of firings to discard before.
+    """
     first = counts[1] + 1
     last = first + counts[0]
     (exponent,) = exponents_of([train], (first, last), Effort(tolerance, threads=1))
@@ -382,7 +389,10 @@ def exponents_of_train(train: Train, counts: tuple[int, int], tolerance: float) 
 
 
 def _points(train: Train, first: int, last: int, exponent: Exponent, tolerance: float) -> Strobe:
-    """Build the strobe points of the run that computed the exponents, with their classification."""
+    """Build the strobe points, from firing `first` to `last`, of the run that computed the exponents.
+
+    The strobe points include the classification of the motion.
+    """
     firing = np.arange(first, last + 1)
     x, v, mode, memory, *electric = exponent.states.T
     branch = np.where(np.isfinite(mode), np.nan_to_num(mode), -1).astype(np.int64)

@@ -119,8 +119,8 @@ def recurrence(
     Raises
     ------
     InputError
-        There are too many or too few states, they are not finite (e.g. a run ended early), both threshold and
-        rate are given, or the scales have the wrong shape.
+        There are too many or too few states, a state is not finite (e.g. because a run ended early), both
+        threshold and rate are given, or the number of scales is not that of the components of a state.
     """
     points = points_of(states, {})
     rows, units = rows_of(points, scales, MOST)
@@ -142,7 +142,11 @@ def recurrence(
 
 
 def counted(matrix: BoolArray, threshold: float, theiler: int, shortest: int) -> Recurrence:
-    """Quantify the diagonal and vertical lines of a symmetric recurrence matrix."""
+    """Quantify the diagonal and vertical lines of a symmetric recurrence matrix.
+
+    Diagonals less than `theiler` points from the main diagonal, and lines of fewer than `shortest` points,
+    are excluded; `threshold` is the distance from which the matrix was computed.
+    """
     count = len(matrix)
     # The matrix is symmetric: one half of it contains all diagonal lines.
     diagonals = np.sort(
@@ -176,7 +180,7 @@ def run_lengths(points: BoolArray) -> IntArray:
 
 
 def _distances(scaled: FloatArray) -> FloatArray:
-    """Compute the distances of all pairs of states in the maximum norm."""
+    """Compute the maximum-norm distances between all pairs of scaled states, one row per state."""
     count = len(scaled)
     distances = np.empty((count, count))
     for first in range(0, count, _ROWS):
@@ -186,7 +190,10 @@ def _distances(scaled: FloatArray) -> FloatArray:
 
 
 def _threshold(distances: FloatArray, theiler: int, rate: float) -> float:
-    """Find the smallest threshold whose recurrence rate is at least `rate`."""
+    """Find the smallest distance threshold whose recurrence rate is at least `rate`.
+
+    Pairs of states less than `theiler` steps apart are excluded.
+    """
     if not 0.0 < rate <= 1.0:
         raise InputError.of("rate", rate, "a fraction of all pairs, above 0 and up to 1")
     pairs = distances[np.triu_indices(len(distances), theiler)]
@@ -197,7 +204,10 @@ def _threshold(distances: FloatArray, theiler: int, rate: float) -> float:
 def rows_of(
     states: npt.ArrayLike | Strobe, scales: npt.ArrayLike | None, most: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the states, shape (n, m) with n up to `most`, and the scales of their components."""
+    """Return states as an array with one row per state, and the scales of their components.
+
+    Raises InputError if there are more than `most` states, a state is not finite, or the scales are invalid.
+    """
     if isinstance(states, Strobe):
         rows = np.column_stack([states.x, states.v, states.memory])
         units = states.window.half_widths[[0, 1, 0]]

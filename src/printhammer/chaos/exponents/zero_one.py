@@ -163,8 +163,8 @@ def zero_one(
         the keywords `firing`, of which a thousand strobe points are computed after a thousand firings.
     resolution : float, optional
         Amplitude below which changes are ignored, in the unit of the series. By default 1e-12 of the largest
-        absolute value; for strobe points, by default 1e-6 of the half-width of the window, the agreement that
-        a classification requires.
+        absolute value; for strobe points, by default 1e-6 of the half-width of the strobe window, the
+        distance within which two states agree in a classification.
     angles : int, optional
         Number of random angles.
     seed : int, optional
@@ -238,7 +238,11 @@ def zero_one(
 
 
 def _classify(k: float, cycle: int, rest: FloatArray, resolution: float) -> tuple[str, str]:
-    """Classify a series by K and its transient; return the class and, if undecided, the reason."""
+    """Classify a series by the median correlation `k`, and by whether changes in the series die out.
+
+    `rest` is the series minus its means over the cycle of length `cycle`. Returns the class, and the reason
+    for "undecided", else an empty text.
+    """
     if k <= REGULAR:
         return "regular", ""
     quarter = rest.size // 4
@@ -271,12 +275,12 @@ def _displacements(paths: npt.NDArray[np.complex128], resolution: float) -> Floa
 
 
 def without_cycle(numbers: FloatArray, resolution: float) -> tuple[int, FloatArray]:
-    """Estimate the cycle length of a series; return the length, and the series minus its cycle means.
+    """Estimate the cycle length q of a series; return q, and the series minus the means of every q-th value.
 
-    The cycle length q, 1 for the mean alone, minimises the criterion of G. Schwarz (Ann. Statist. 6 (1978)
-    461), n ln(residual variance) + q ln(n), and the means of every q-th value are subtracted. Changes up to
-    the resolution are ignored. If the residual is not deterministic, it is noise on a cycle, which alone
-    would look like chaos; the cycle is then not subtracted.
+    The cycle length minimises the criterion of G. Schwarz (Ann. Statist. 6 (1978) 461), n ln(residual
+    variance) + q ln(n); with q = 1 only the mean of the series is subtracted. Changes up to the resolution
+    are ignored. If the residual is not deterministic, the series is a cycle with noise. Noise alone would
+    look like chaos; therefore the cycle is then kept, and q = 1 is returned.
     """
     worth = []
     for q in range(1, min(LONGEST_CYCLE, numbers.size // _PASSES) + 1):
@@ -291,9 +295,10 @@ def without_cycle(numbers: FloatArray, resolution: float) -> tuple[int, FloatArr
 
 
 def _is_deterministic(rest: FloatArray, q: int) -> bool:
-    """Whether neighbours at the same phase of a cycle of q values remain neighbours one step later.
+    """Whether a residual series is deterministic: nearest neighbours are followed by close values.
 
-    Neighbours are determined in two ways: by the values alone, or together with the preceding values.
+    Only values at the same phase of a cycle of q values are compared. Neighbours are determined in two ways:
+    by the values alone, and by the values together with the preceding values. One of the two must succeed.
     """
     shares = []
     for before in (0, 1):
@@ -319,9 +324,11 @@ def _less_means(numbers: FloatArray, q: int) -> FloatArray:
 
 
 def mean_square_displacements(paths: npt.NDArray[np.complex128], cut: int) -> FloatArray:
-    """Compute mean |z(j + n) - z(j)|^2 over j, for n from 1 to `cut`, for each of m rows z, shape (m, cut).
+    """Compute the mean square displacement of each path at the lags from 1 to `cut`.
 
-    j runs over the first N - cut of N indices, so that all means have the same number of terms.
+    A path is a row of complex positions z(1), ..., z(N). The displacement at lag n is the mean of
+    |z(j + n) - z(j)|^2 over the first N - cut values of j, so that all means have the same number of terms.
+    The result has one row per path and one column per lag.
     """
     many, count = paths.shape
     first = count - cut
@@ -336,7 +343,7 @@ def mean_square_displacements(paths: npt.NDArray[np.complex128], cut: int) -> Fl
 
 
 def _correlations(displacements: FloatArray) -> FloatArray:
-    """Compute the correlation K_c of each row with 1, 2, ...; 0 for a constant row."""
+    """Compute the correlation K_c of each row with the numbers 1, 2, ...; 0 for a constant row."""
     count = displacements.shape[1]
     away = np.arange(count) - 0.5 * (count - 1)
     rows = displacements - displacements.mean(axis=1, keepdims=True)
