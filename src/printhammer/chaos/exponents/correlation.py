@@ -109,8 +109,8 @@ def correlation_dimension(
     Returns
     -------
     CorrelationDimension
-        Dimension with an error interval: the range of the local slopes on the plateau, widened on either side
-        by twice the standard error from five parts of the series.
+        Dimension with a symmetric error interval. Its half-width is the largest deviation of a local slope on
+        the plateau from the dimension, plus twice the standard error from five parts of the series.
 
     Raises
     ------
