@@ -23,7 +23,11 @@ _SAMPLES: Final = 2001  # Samples of a drive for a lower bound of its peak; arbi
 
 
 def spreads(motion: Motion) -> tuple[int, float | None, float | None]:
-    """Return the number of printed dots, the relative spread of forces, and the spread of flight times, s."""
+    """Return the number of printed dots of a motion, and the spreads of their peak forces and flight times.
+
+    A spread is the largest value minus the smallest: of the peak forces as a fraction of their mean, of the
+    flight times in s. Both spreads are None if fewer than two dots are printed.
+    """
     forces = [dot.peak_force for dot in motion.dots if dot.peak_force is not None]
     flights = [dot.flight_time for dot in motion.dots if dot.flight_time is not None]
     if len(forces) < 2:
@@ -47,13 +51,16 @@ def independent_at_low_rate(context: Context, claim: Claim) -> Measured:
 
 
 def rates_of(settings: Mapping[str, Any]) -> list[float]:
-    """Return the ascending grid of firing rates [Hz] that a claim's settings define."""
+    """Return the firing rates [Hz] at which a claim is tested, ascending, from the claim's settings."""
     first, last, step = (settings[name] for name in ("first_rate_Hz", "last_rate_Hz", "rate_step_Hz"))
     return [float(first + step * k) for k in range(round((last - first) / step) + 1)]
 
 
 def onsets(context: Context) -> dict[str, float]:
-    """Find the lowest rate [Hz] of each of three events: flight times vary, forces vary, a dot is lost.
+    """Find the lowest firing rate [Hz] at which flight times vary, forces vary, and a dot is lost.
+
+    Flight times or forces vary if their spread over the dots of a burst exceeds the limit in the claim's
+    settings.
 
     The keys are "flight_time", "force" and "lost"; the key of an event that does not occur up to the first
     lost dot is absent.
@@ -80,7 +87,7 @@ def onsets(context: Context) -> dict[str, float]:
 
 @measures("order_of_onset", *WHOLE)
 def order_of_onset(context: Context, _claim: Claim) -> Measured:
-    """Report the lowest rate of each of three events: flight times vary, forces vary, a dot is lost."""
+    """Measure the lowest firing rate at which flight times vary, forces vary, and a dot is lost."""
     first = context.once("onsets", lambda: onsets(context))
     lost = first.get("lost")
     value: dict[str, Any] = {"first_lost_dot_at_Hz": lost}
@@ -100,7 +107,10 @@ def order_of_onset(context: Context, _claim: Claim) -> Measured:
 
 @measures("second_dot_lost", *WHOLE)
 def second_dot_lost(context: Context, claim: Claim) -> Measured:
-    """Measure the lowest range of rates at which the peak after the second firing is below the pack."""
+    """Measure the lowest range of firing rates in which the second pulse prints no dot.
+
+    The second pulse prints no dot if the largest displacement after its firing does not reach the pack.
+    """
     settings = claim.settings
     waveform, front, _ = context.waveform, context.front, context.dot
     begins = ends = None
@@ -149,17 +159,19 @@ def _first_leaving(motion: Motion) -> float | None:
 
 
 def _exceeds(drive: Drive, limit: float) -> bool:
-    """Whether the peak absolute current or force of a drive exceeds a limit."""
+    """Whether the peak absolute value of a drive, a current [A] or force [N], exceeds `limit`."""
     # Samples give a lower bound of the peak, whose exact value is slow to compute.
     samples = np.abs(drive.value(np.linspace(0.0, drive.end, _SAMPLES)))
     return bool(samples.max() > limit) or drive.peak > limit
 
 
 def hang_up_range(context: Context) -> tuple[float | None, list[Motion], float]:
-    """Find the hang-up range; return its lowest rate [Hz], the motions from there on, the highest rate [Hz].
+    """Find the range of firing rates in which the armature hangs up (stays off the backstop).
 
-    The highest rate is the last rate of the claim, or the highest that the current limit permits. The lowest
-    rate is None if the armature does not hang up at the highest rate.
+    Returns, in this order: the lowest rate of the range [Hz]; the motions at all rates of the range, fastest
+    first; and the highest rate tested [Hz], which is the last rate of the claim's settings or the highest
+    rate that the current limit permits. The lowest rate is None if the armature does not hang up at the
+    highest rate.
     """
     settings = claims()["hang_up_at_high_rate"].settings
     step, pulses, limit = (settings[name] for name in ("rate_step_Hz", "pulses", "current_limit_A"))
@@ -181,7 +193,7 @@ def hang_up_range(context: Context) -> tuple[float | None, list[Motion], float]:
 
 @measures("hang_up_at_high_rate", *WHOLE)
 def hang_up_at_high_rate(context: Context, _claim: Claim) -> Measured:
-    """Measure the rate above which every burst hangs up, up to the rate that the current limit permits."""
+    """Measure the firing rate above which the armature hangs up in every burst, up to the current limit."""
     lowest, _, highest = context.once("hang-up", lambda: hang_up_range(context))
     value = {"hang_up_rate_Hz": lowest, "highest_rate_Hz": highest}
     if lowest is None:
@@ -191,7 +203,11 @@ def hang_up_at_high_rate(context: Context, _claim: Claim) -> Measured:
 
 @measures("weak_prints_when_hung_up", *WHOLE)
 def weak_prints_when_hung_up(context: Context, _claim: Claim) -> Measured:
-    """Measure the peak force of distinct impacts after the first dot, in bursts that hang up."""
+    """Measure the largest peak force on the pack after the first dot, in bursts that end in hang-up.
+
+    The claim concerns distinct impacts (see `later_impacts`); the largest force of all impacts is reported
+    too.
+    """
     lowest, motions, highest = context.once("hang-up", lambda: hang_up_range(context))
     if lowest is None:
         raise NotMeasurableError("The armature does not hang up")
@@ -232,7 +248,7 @@ def later_impacts(motion: Motion) -> list[tuple[float, bool]]:
 
 @measures("flight_time_spread", *WHOLE)
 def flight_time_spread(context: Context, claim: Claim) -> Measured:
-    """Measure the flight-time spread of bursts at the strobe times of the strange panels of Fig. 11."""
+    """Measure the spread of flight times in a burst, at the strobe time of each strange panel of Fig. 11."""
     settings, pulses = claim.settings, claim.settings["pulses"]
     _, _, slow = spreads(context.train(settings["rate_Hz"], pulses))
     by_panel: dict[str, Any] = {}
@@ -262,15 +278,16 @@ _SPACING: Final = 10e-6
 
 
 def sensitivity(context: Context, band: tuple[float, float], grid: float, step: float, pulses: int) -> float:
-    """Compute the RMS change of the displacement record per hertz, m/Hz, in a band of rates.
+    """Compute the RMS change of the displacement record per hertz of firing rate, m/Hz, in a band of rates.
 
-    The records at each rate of a grid and at the rate `step` Hz above are compared, in bursts of `pulses`
-    firings, from the first firing until `TAIL` after the last firing at the slower rate.
+    `band` contains the lowest and highest rate [Hz]; `grid` is the spacing of the rates in the band [Hz]. At
+    each rate, a burst of `pulses` firings is compared with a burst at a rate higher by `step` [Hz], from the
+    first firing until `TAIL` after the last firing at the lower rate.
 
     Raises
     ------
     NotMeasurableError
-        The band is narrower than a step, or a run ended early.
+        The band is narrower than `step`, or a run ended early.
     """
     low, high = band
     slower = low + grid * np.arange(math.floor((high - step - low) / grid * (1.0 + 1e-12)) + 1)
@@ -291,7 +308,11 @@ def sensitivity(context: Context, band: tuple[float, float], grid: float, step: 
 
 @measures("map_sensitivity", *WHOLE)
 def map_sensitivity(context: Context, claim: Claim) -> Measured:
-    """Measure the change of the displacement record per hertz below, inside and above the erratic band."""
+    """Measure the change of the displacement record per hertz of firing rate, in three bands of rates.
+
+    The bands are: low rates; erratic rates, from the first variation of flight times to hang-up; and rates
+    above hang-up.
+    """
     settings = claim.settings
     first = context.once("onsets", lambda: onsets(context)).get("flight_time")
     hung, _, highest = context.once("hang-up", lambda: hang_up_range(context))
@@ -335,12 +356,13 @@ def map_sensitivity(context: Context, claim: Claim) -> Measured:
 def erratic_pairs(
     struck: BoolArray, flight_time: FloatArray, settings: Mapping[str, Any]
 ) -> tuple[BoolArray, BoolArray]:
-    """Return masks of neighbouring rates between which a late dot changes, and of rates with unequal dots.
+    """Return masks of the pairs of neighbouring rates with different dots, and the rates with unequal dots.
 
-    A dot changes if it is printed at only one of the two rates, or if its flight times [s] differ by more
-    than `flight_time_change_s`; dots before `first_dot` do not count. Dots vary if one is lost, or if their
-    flight times differ by more than `flight_time_spread_s`. Both input tables have one row per rate; the
-    masks have shapes (rates - 1,) and (rates,).
+    The tables `struck` (whether a dot is printed) and `flight_time` [s] have one row per firing rate and one
+    column per dot. The first mask has one entry per pair of neighbouring rates: true if a dot is printed at
+    only one of the two rates, or if its two flight times differ by more than `flight_time_change_s`; dots
+    before number `first_dot` are ignored. The second mask has one entry per rate: true if a dot is lost, or
+    if the flight times of two dots differ by more than `flight_time_spread_s`. The limits are in `settings`.
     """
     flights = np.where(struck, flight_time, np.nan)
     change = np.abs(np.diff(flights, axis=0)) > settings["flight_time_change_s"]
@@ -354,8 +376,9 @@ def erratic_share(
 ) -> tuple[float | None, float | None]:
     """Compute the fraction of erratic pairs of rates, from the first rate with unequal dots up to hang-up.
 
-    Return the fraction and that first rate [Hz]; None if dots vary at no rate, or only above the hang-up rate
-    `hang_up` [Hz]. The masks `erratic` and `varies` are from `erratic_pairs`.
+    Return the fraction and the first rate with unequal dots [Hz]. Both are None without such a rate; the
+    fraction is None if no pair lies between this rate and the hang-up rate `hang_up` [Hz]. `erratic` and
+    `varies` are the two masks of `erratic_pairs`.
     """
     if not varies.any():
         return None, None
@@ -366,7 +389,7 @@ def erratic_share(
 
 @measures("chaotic_region", *WHOLE)
 def chaotic_region(context: Context, claim: Claim) -> Measured:
-    """Measure the fraction of pairs of neighbouring rates below hang-up that differ in a late dot."""
+    """Measure the fraction of pairs of neighbouring firing rates below hang-up that differ in a late dot."""
     rates = rates_of(claim.settings)
     pulses = claim.settings["pulses"]
     dots = context.dots([PulseTrain(context.waveform, rate=rate, pulses=pulses) for rate in rates])

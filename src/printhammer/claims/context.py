@@ -29,7 +29,7 @@ _T = TypeVar("_T")
 
 
 class NotMeasurableError(PrinthammerError):
-    """Raised if a claim concerns a component or an event that the hammer does not have."""
+    """Raised if a claim concerns a component that the hammer lacks, or an event that does not occur."""
 
 
 class Context:
@@ -83,7 +83,7 @@ class Context:
         return float(self.need("pack").front)
 
     def once(self, name: str, search: Callable[[], _T]) -> _T:
-        """Return the result of `search`, called once per name; later calls return the cached result."""
+        """Return the result of `search`, which is called only once for each `name` and then cached."""
         if name not in self._kept:
             self._kept[name] = search()
         kept: _T = self._kept[name]
@@ -98,7 +98,11 @@ class Context:
         state: tuple[float, float] | None = None,
         **options: Any,
     ) -> Motion:
-        """Simulate the hammer of the context, or another hammer, under a drive; cache the motion."""
+        """Simulate the hammer of the context, or `hammer`, for `duration` [s]; cache the motion.
+
+        `state` is the initial displacement [m] and velocity [m/s]; by default the hammer starts from rest.
+        `options` are passed to `printhammer.simulate`. A run that ends early raises no exception.
+        """
         which = self.hammer if hammer is None else hammer
         options = {"tolerance": self.tolerance, "scheme": self.scheme, **options}
         key = (which.fingerprint, drive.fingerprint, duration, state, *sorted(options.items()))
@@ -108,7 +112,7 @@ class Context:
         return self._motions[key]
 
     def run(self, drive: Drive, duration: float, **options: Any) -> Motion:
-        """Simulate the hammer of the context under a drive; raise an error if the run ends early.
+        """Simulate the hammer of the context under a drive for `duration` [s]; cache the motion.
 
         Raises
         ------
@@ -121,7 +125,9 @@ class Context:
         return motion
 
     def ensemble(self, drives: Sequence[Drive], ends: Any, **options: Any) -> EnsembleResult:
-        """Run an ensemble of drives, each until its end, s; options are as for `Ensemble.run`.
+        """Simulate the hammer of the context under each drive, from rest until its end time in `ends` [s].
+
+        `options` are passed to `Ensemble.run`.
 
         Raises
         ------
@@ -137,13 +143,13 @@ class Context:
         return result
 
     def dots(self, drives: Sequence[Drive], tail: float = TAIL) -> DotTable:
-        """Simulate many drives, each until `tail` [s] after its last firing; return the table of dots."""
+        """Simulate the hammer under each drive until `tail` [s] after its last firing; return all dots."""
         result = self.ensemble(drives, [float(drive.times[-1]) + tail for drive in drives], dots=True)
         assert result.dots is not None
         return result.dots
 
     def pulses(self, times: Iterable[float], duration: float) -> Motion:
-        """Simulate single pulses fired at given times [s], from rest."""
+        """Simulate a run from rest for `duration` [s], with a pulse fired at each of the `times` [s]."""
         return self.run(PulseTrain(self.waveform, at=list(times)), duration)
 
     def train(self, rate: float, pulses: int, tail: float = TAIL) -> Motion:

@@ -17,15 +17,18 @@ REFERENCE_TOLERANCE: Final = 1e-13
 """Tolerance of the reference motion, well below the errors of 1983; arbitrary."""
 _CYCLE: Final = 10e-3
 """Duration of the simulated single-pulse cycle, s; the motion has settled by then; arbitrary."""
-_SETTLED: Final = 0.01  # Largest final error of a scheme that works, as a fraction of the stroke; arbitrary
-_RATIO: Final = 2.0**0.25  # Ratio of successive step scales tried; arbitrary
-_LARGEST: Final = 32.0  # Largest step scale tried; arbitrary
+_SETTLED: Final = 0.01  # Largest late error of a scheme that completes the cycle, in strokes; arbitrary
+_RATIO: Final = 2.0**0.25  # Ratio of successive factors on the step sizes; arbitrary
+_LARGEST: Final = 32.0  # Largest factor on the step sizes; arbitrary
 _RUNGE_KUTTA_LIMIT: Final = math.sqrt(8.0)
 
 
 @measures("integrator_comparison", *WHOLE)
 def integrator_comparison(context: Context, claim: Claim) -> Measured:
-    """Measure the errors of both integrators at the paper's step sizes, and the step sizes that fail."""
+    """Measure the error of both integrators at the paper's step sizes, and the step sizes at which they fail.
+
+    The step sizes are given as a factor on the paper's step sizes.
+    """
     reference = context.run(PulseTrain(context.waveform), _CYCLE, tolerance=REFERENCE_TOLERANCE)
     trapezoid, runge_kutta = (_scheme(context, name, 1.0) for name in ("trapezoid", "runge-kutta-4"))
     errors = {motion: _error(motion, reference) for motion in (trapezoid, runge_kutta)}
@@ -65,7 +68,7 @@ def _scheme(context: Context, name: str, scale: float) -> Motion:
 
 
 def _error(motion: Motion, reference: Motion) -> float:
-    """Compute the largest displacement error of a motion against a reference, at the ends of steps, m."""
+    """Compute the largest displacement error of a motion at its integration steps, against a reference, m."""
     times = motion.step_times
     return float(np.abs(motion.at(times)[0] - reference.at(times)[0]).max())
 
@@ -80,7 +83,7 @@ def _completes(context: Context, motion: Motion, reference: Motion) -> bool:
 
 
 def _failing_scale(context: Context, reference: Motion, name: str) -> float:
-    """Find the smallest tested scale factor of the step sizes at which a scheme fails."""
+    """Find the smallest tested factor on the paper's step sizes at which the scheme `name` fails."""
     scale = 1.0
     while scale < _LARGEST and _completes(context, _scheme(context, name, scale), reference):
         scale *= _RATIO

@@ -121,7 +121,10 @@ class JudgedClaim(Declared):
 
     @property
     def statements(self) -> tuple[int, int]:
-        """Number of statements that hold, and of all statements; a list in a band counts one per entry."""
+        """Number of statements of the claim that hold, and number of all its statements.
+
+        A claim is one statement, unless a band is a list of texts; then each text is a statement.
+        """
         value = self.value or {}
         lists = {name: band for name, band in self.claim.band.items() if _is_texts(band)}
         if not lists:
@@ -229,12 +232,12 @@ def judge(context: Context, claim: Claim) -> JudgedClaim:
     return JudgedClaim(claim, measured.value, verdict, measured.detail, perf_counter() - start)
 
 
-_POINTS: Final = 4001  # Points of a grid; arbitrary
-_ZOOMS: Final = 6  # Refinements of the grid; arbitrary
+_POINTS: Final = 4001  # Grid points of `largest` per refinement; arbitrary
+_ZOOMS: Final = 6  # Number of successive grids of `largest`; arbitrary
 
 
 def largest(function: Callable[[FloatArray], FloatArray], start: float, end: float) -> float:
-    """Estimate the maximum of a function of time [s] over an interval by repeated grid refinement."""
+    """Estimate the maximum of a function of time from `start` to `end` [s] by repeated grid refinement."""
     best = -np.inf
     for _ in range(_ZOOMS if end > start else 1):
         grid = np.linspace(start, end, _POINTS)
@@ -251,7 +254,7 @@ def falling(values: Sequence[float]) -> bool:
 
 
 def rank_correlation(first: Sequence[float], second: Sequence[float]) -> float | None:
-    """Return Spearman's rank correlation, with mean ranks for ties; None if undefined."""
+    """Return Spearman's rank correlation of two series, with mean ranks for ties; None if undefined."""
     if len(first) < 2 or len(set(first)) < 2 or len(set(second)) < 2:
         return None
     a, b = _ranks(first), _ranks(second)

@@ -1,6 +1,8 @@
-"""Claims about the single pulse (stroke, settle-out, forces, loops, energies), two pulses and buzz printing.
+"""Claims about a single pulse, two pulses, and buzz printing.
 
-Two pulses, Fig. 6: the second pulse brakes the armature (quench), or catches it on the rise.
+Single pulse: stroke, settle-out, forces, force-displacement loops of the contacts, and energies.
+
+Two pulses, Fig. 6: the second pulse brakes the armature (quench), or accelerates the armature as it rises.
 
 Buzz printing, Fig. 7: a train that prints while the armature stays off the backstop.
 """
@@ -49,7 +51,7 @@ def single_pulse_stroke(context: Context, _claim: Claim) -> Measured:
 
 @measures("settle_out", *WHOLE)
 def settle_out(context: Context, _claim: Claim) -> Measured:
-    """Measure height and duration of the rebounds from the backstop after a single pulse."""
+    """Measure the heights and durations of the rebounds from the backstop after a single pulse."""
     motion, stroke = context.single, context.stroke
     times, x = motion.maxima
     after = x[times > context.returns[0].t_in] - context.position
@@ -88,7 +90,7 @@ def low_restitution(context: Context, _claim: Claim) -> Measured:
 
 @measures("backstop_force_dominates", *WHOLE)
 def backstop_force_dominates(context: Context, _claim: Claim) -> Measured:
-    """Measure the largest total force during and outside backstop contacts after a single pulse."""
+    """Measure the largest total force on the armature in and outside backstop contacts, after one pulse."""
     motion = context.single
 
     def total(t: FloatArray) -> FloatArray:
@@ -108,7 +110,7 @@ def backstop_force_dominates(context: Context, _claim: Claim) -> Measured:
 
 @measures("quiet_look_loud_force", *WHOLE)
 def quiet_look_loud_force(context: Context, claim: Claim) -> Measured:
-    """Measure the largest backstop force after rebounds that are too low to be seen."""
+    """Measure the largest backstop force in impacts that follow a rebound too low to be seen."""
     static = float(context.idle.forces_at(0.0)["backstop"][0])
     quiet = claim.settings["quiet_rebound_over_stroke"] * context.stroke
     late = {bounce.end for bounce in rebounds(context.single, context.position) if bounce.height < quiet}
@@ -181,7 +183,10 @@ def delivered_energy(context: Context, _claim: Claim) -> Measured:
 
 @measures("two_pulses_660us", *WHOLE)
 def two_pulses_660us(context: Context, claim: Claim) -> Measured:
-    """Measure the peak after the second of two pulses fired 660 us apart, which should print no dot."""
+    """Measure the largest displacement after the second of two pulses fired 660 us apart.
+
+    According to the paper, the second pulse prints no dot.
+    """
     _ = context.dot
     interval = claim.settings["interval_s"]
     motion = context.pulses([0.0, interval], interval + TAIL)
@@ -204,7 +209,7 @@ def two_pulses_660us(context: Context, claim: Claim) -> Measured:
 
 @measures("two_pulses_700us", *WHOLE)
 def two_pulses_700us(context: Context, claim: Claim) -> Measured:
-    """Measure dot, coil work and armature velocity for the second of two pulses fired 700 us apart."""
+    """Measure the dot, coil work and armature velocity of the second of two pulses fired 700 us apart."""
     interval = claim.settings["interval_s"]
     motion = context.pulses([0.0, interval], interval + TAIL)
     first, second = context.dot, motion.dots[1]
@@ -240,7 +245,7 @@ def two_pulses_700us(context: Context, claim: Claim) -> Measured:
 
 
 def second_coil_work(context: Context, interval: float) -> float:
-    """Compute the coil work [J] on the armature due to the second of two firings `interval` [s] apart."""
+    """Compute the coil work [J] on the armature after the second of two firings `interval` [s] apart."""
     both, first = context.pulses([0.0, interval], interval + TAIL), context.pulses([0.0], interval)
     return both.energy.coil_work - first.energy.coil_work
 
@@ -259,14 +264,17 @@ def half_rise(waveform: Waveform) -> float:
 
 
 def _requirements() -> tuple[int, tuple[float, float]]:
-    """Return the requirements of buzz printing: smallest number of dots, and range of relative forces."""
+    """Return the requirements of buzz printing: smallest number of dots, and range of their peak forces.
+
+    The peak forces are relative to the single-pulse dot.
+    """
     band = claims()["buzz_printing"].band
     limits = (band["least_force_over_single"]["at_least"], band["largest_force_over_single"]["at_most"])
     return band["dots"]["at_least"], limits
 
 
 def buzz_search(context: Context) -> BuzzSearch:
-    """Search for a train that prints in buzz mode; the context caches the result."""
+    """Search for a pulse train that prints in buzz mode; cache the result in the context."""
     fewest, forces = _requirements()
     return context.once("buzz", lambda: find_buzz_train(context.hammer, fewest=fewest, forces=forces))
 
@@ -278,7 +286,7 @@ def _described(train: BuzzTrain) -> str:
 
 @measures("buzz_printing", *WHOLE)
 def buzz_printing(context: Context, claim: Claim) -> Measured:
-    """Measure number and relative force of the dots of the best train without backstop contacts."""
+    """Measure the number and peak forces of the dots that the best train prints without backstop contact."""
     search = buzz_search(context)
     train = search.best
     if train is None or not train.count:
@@ -315,7 +323,7 @@ def buzz_printing(context: Context, claim: Claim) -> Measured:
 
 @measures("buzz_is_delicate", *WHOLE)
 def buzz_is_delicate(context: Context, claim: Claim) -> Measured:
-    """Count how many of four small changes of interval and pack front break the buzz-printing train."""
+    """Count how many of four small changes, of firing interval or pack front, make buzz printing fail."""
     train = buzz_search(context).train
     if train is None:
         return Measured({"cases_broken": None}, "There is no buzz-printing train to perturb.")
@@ -339,7 +347,7 @@ def buzz_is_delicate(context: Context, claim: Claim) -> Measured:
 
 
 def _count(context: Context, hammer: Hammer, train: BuzzTrain, interval: float) -> int:
-    """Count the dots that a buzz-printing train still prints with a changed interval or hammer."""
+    """Count the dots that a buzz-printing train still prints with another firing interval [s] or hammer."""
     times = tuple(k * interval for k in range(len(train.times)))
     if train.kind != "uniform":
         times = delayed_train(hammer, interval, len(train.times))

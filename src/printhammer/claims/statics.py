@@ -37,7 +37,7 @@ def geometry(context: Context, _claim: Claim) -> Measured:
 
 @measures("rest_state", "magnet", "backstop", "waveform")
 def rest_state(context: Context, _claim: Claim) -> Measured:
-    """Measure the compression of the backstop at rest, the residual force, and the stability."""
+    """Measure compression of the backstop, residual force and stability of the armature at rest."""
     rest = context.rest
     force = float(context.idle.forces_at(0.0)["total"][0])
     equilibrium = min(equilibria(context.hammer), key=lambda e: abs(e.x - rest), default=None)
@@ -76,7 +76,7 @@ def return_from_everywhere(context: Context, _claim: Claim) -> Measured:
 
 @measures("release_margin", "magnet", "spring", "backstop")
 def release_margin(context: Context, _claim: Claim) -> Measured:
-    """Measure the net force at the backstop without current, as a fraction of the magnet force."""
+    """Measure the net force of magnet and spring at the backstop, without current, over the magnet force."""
     force = StaticForce(context.hammer)
     magnet, spring = force.magnet(context.position), force.spring(context.position)
     if magnet == 0.0:
@@ -93,7 +93,7 @@ def release_margin(context: Context, _claim: Claim) -> Measured:
 
 @measures("current_range", "magnet", "waveform")
 def current_range(context: Context, _claim: Claim) -> Measured:
-    """Measure the largest current of the paper's drives: single pulse, pulse pairs and trains."""
+    """Measure the largest coil current in the paper's drives: single pulse, pulse pairs and trains."""
     waveform = context.waveform
     if waveform.quantity != "current":
         raise NotMeasurableError(f"The hammer is driven by a {waveform.quantity}, not by a current")
@@ -128,7 +128,7 @@ _NEVER: Final = 1.0
 
 @measures("elastomer_backstop", *WHOLE)
 def elastomer_backstop(context: Context, claim: Claim) -> Measured:
-    """Count the rebounds from the hammer's backstop and from an elastomer, at equal impact speed."""
+    """Count the rebounds from the hammer's backstop and from an elastomer backstop, at equal impact speed."""
     settings = claim.settings
     speed = context.returns[0].v_in
     hard_impact = _impact(context, context.hammer, speed)

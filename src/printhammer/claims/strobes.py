@@ -18,26 +18,29 @@ _LATTICE: Final = 101  # Points along each axis of the window; arbitrary
 
 
 def window() -> tuple[FloatArray, FloatArray]:
-    """Return centre and half-widths of the window of Fig. 11: displacement [m] and velocity [m/s]."""
+    """Return the centre and the half-widths of the window of Fig. 11: each (displacement, velocity), SI."""
     settings = claims()["poincare_window"].settings
     low, high = np.array([settings["window_x_m"], settings["window_v_m_per_s"]]).T
     return 0.5 * (low + high), 0.5 * (high - low)
 
 
 def strobe_points(context: Context, period: float, points: int) -> FloatArray:
-    """Compute the states at the first firings of a train from rest, (m, m/s), shape (points, 2)."""
+    """Compute displacement [m] and velocity [m/s] at the first firings of a train from rest.
+
+    `period` is the time between firings, s; the result has the shape (points, 2).
+    """
     _, x, v = context.strobe_train(period, points).strobe
     return np.column_stack([x, v])
 
 
 def scaled(points: FloatArray) -> FloatArray:
-    """Divide states, (m, m/s), by the half-widths of the window of Fig. 11."""
+    """Divide displacements [m] and velocities [m/s] by the half-widths of the window of Fig. 11."""
     _, half = window()
     return points / half
 
 
 def panels(context: Context, *, strange: bool = True) -> dict[str, FloatArray]:
-    """Compute the strobe points of the panels of Fig. 11, by name: all panels, or only the chaotic panels."""
+    """Compute the strobe points of each panel of Fig. 11, by panel name; `strange`: chaotic only."""
     count = claims()["poincare_window"].settings["points"]
     return {
         panel_name(period): strobe_points(context, period, count)
@@ -119,7 +122,7 @@ def cloud_grows(context: Context, _claim: Claim) -> Measured:
 
 @measures("successive_points_apart", *WHOLE)
 def successive_points_apart(context: Context, claim: Claim) -> Measured:
-    """Measure the distance between successive strobe points, relative to that between arbitrary points."""
+    """Measure the median distance of successive strobe points, relative to that of all pairs of points."""
     ratios: dict[str, float | None] = {}
     for name, states in panels(context).items():
         points = scaled(states)
@@ -134,7 +137,10 @@ def successive_points_apart(context: Context, claim: Claim) -> Measured:
 
 @measures("points_on_single_pulse_orbit", *WHOLE)
 def points_on_single_pulse_orbit(context: Context, claim: Claim) -> Measured:
-    """Measure the distance of strobe points from the single-pulse orbit, relative to random states."""
+    """Measure the median distance of strobe points from the path of the single-pulse motion in state space.
+
+    The distance is divided by the median distance of all states in the window of Fig. 11 from the path.
+    """
     from scipy.spatial import cKDTree
 
     motion, start = context.single, context.returns[0].t_in

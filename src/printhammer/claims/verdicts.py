@@ -24,14 +24,14 @@ _CHANGED: Final[dict[str, Callable[[int], int]]] = {
     "constants up and down by turns": lambda number: 1 - 2 * (number % 2),
     "constants down and up by turns": lambda number: 2 * (number % 2) - 1,
 }
-"""Perturbations of all constants of a hammer: sign of the change by index of the constant, per variant."""
+"""Perturbations of all constants of a hammer, by name; each maps the index of a constant to a sign."""
 
 _APERIODIC: Final = "no period"
 _PANELS: Final = "panels of Fig. 11"
 
 
 def printed_verdicts() -> dict[float, str]:
-    """Return the classifications that Fig. 11 prints on its panels, by strobe time, s."""
+    """Return the classification of each panel as printed in Fig. 11, by strobe time [s]."""
     claim = claims()["poincare"]
     return dict(zip(claim.settings["strobe_times_s"], claim.band["verdicts"], strict=True))
 
@@ -62,7 +62,10 @@ def panel_strobes(context: Context) -> list[Strobe]:
 
 
 def variants(context: Context, periods: list[float]) -> dict[str, list[Verdict]]:
-    """Classify trains of given periods [s] for each variant of constants and tolerance."""
+    """Classify trains of given periods [s], for the unchanged hammer and for each variant, by name.
+
+    A variant is the hammer with all constants slightly changed, or with a tighter integration tolerance.
+    """
     hammers = [context.hammer, *(changed(context.hammer, sign) for sign in _CHANGED.values())]
     every = strobes(
         [hammer for hammer in hammers for _ in periods],
@@ -147,7 +150,10 @@ def stretches(periods: Sequence[float], names: Sequence[str]) -> list[Stretch]:
 
 
 def cascades(scanned: Sequence[Stretch]) -> list[Stretch]:
-    """Find cascades: return the first of every three successive intervals with periods 2, 4 and 8."""
+    """Find period-doubling cascades: three successive intervals with periods of 2, 4 and 8 firings.
+
+    Return the first interval of each cascade.
+    """
     return [
         three[0]
         for three in zip(scanned, scanned[1:], scanned[2:], strict=False)
@@ -157,7 +163,7 @@ def cascades(scanned: Sequence[Stretch]) -> list[Stretch]:
 
 @measures("no_period_doubling_cascade", *WHOLE)
 def no_period_doubling_cascade(context: Context, claim: Claim) -> Measured:
-    """Search for a period-doubling cascade before chaos, and count the periodic windows within chaos."""
+    """Search for a period-doubling cascade before the onset of chaos; count the periodic windows in chaos."""
     settings = claim.settings
     first, last, step = (
         settings[name] for name in ("first_strobe_time_s", "last_strobe_time_s", "strobe_time_step_s")
@@ -203,8 +209,9 @@ def no_period_doubling_cascade(context: Context, claim: Claim) -> Measured:
 
 
 def _first_strange(context: Context, periods: Sequence[float], names: Sequence[str], way: int) -> int | None:
-    """Find the first strange train from one end of a scan; return its index, or None.
+    """Find the first strange train from the start (`way` 1) or the end (-1) of a scan; return its index.
 
+    The scan has trains of `periods` [s] with the classifications `names`; None without a strange train.
     Since Lyapunov exponents are expensive, they are computed only until the first strange train.
     """
     for place in range(len(names))[::way]:
@@ -216,7 +223,10 @@ def _first_strange(context: Context, periods: Sequence[float], names: Sequence[s
 
 
 def _window(stretch: Stretch, step: float) -> dict[str, Any]:
-    """Describe an interval of strobe times for the report: classification, ends and width, s."""
+    """Return the classification, ends [s] and width [s] of an interval of strobe times, by name.
+
+    `step` is the spacing of the scanned strobe times, s.
+    """
     return {
         "verdict": stretch.name,
         "from_s": stretch.longest,
