@@ -62,7 +62,7 @@ class FeedbackStrategy(Declared):
         """Simulate the closed loop from rest, one run per pattern; return the final loop states.
 
         The controller does not know the driven hammer and observes the hammer only through the sensor.
-        Patterns are indices of the slots with a dot; `rate` is the slot rate, Hz.
+        A pattern consists of the indices of the slots with a dot; `rate` is the slot rate, Hz.
         """
         controller = self.controller
         rest = np.array([rest_state(hammer), 0.0, -1.0, 0.0])
@@ -92,7 +92,11 @@ class FeedbackStrategy(Declared):
         return loops
 
     def _legs(self, hammer: Hammer, now: Sequence[tuple[Loop, int]], ends: FloatArray) -> list[Leg]:
-        """Split runs up to `ends` [s] into stages with one pack each; the pack changes at a firing."""
+        """Split the runs up to `ends` [s] into stages, with one hammer per run and stage.
+
+        The hammer of a run changes when its next pulse is fired. `now` pairs each run with the index of its
+        next dot.
+        """
         if self.places is None:
             return [Leg([hammer] * len(now), ends)]
         before = [self.places[loop.slots[max(dot - 1, 0)]] for loop, dot in now]
@@ -103,7 +107,10 @@ class FeedbackStrategy(Declared):
         return [Leg(before, turns), Leg(after, ends)]
 
     def _see_contacts(self, hammer: Hammer, now: Sequence[tuple[Loop, int]]) -> None:
-        """Advance runs to the ends of their latest pack contacts; update the estimates from the contacts."""
+        """Advance runs to the ends of their latest pack contacts; update the estimates from the contacts.
+
+        `now` pairs each run with the index of its next dot.
+        """
         loops = [loop for loop, _dot in now]
         starts = np.array([loop.time for loop in loops])
         over = [loop.touched.end if loop.touched is not None else loop.time for loop in loops]
@@ -112,7 +119,10 @@ class FeedbackStrategy(Declared):
         self.controller.learn(loops, contacts)
 
     def _see_flights(self, hammer: Hammer, now: Sequence[tuple[Loop, int]]) -> None:
-        """Advance runs to their next decisions; predict the next pack contacts from sensor samples."""
+        """Advance runs to their next decisions; predict the next pack contacts from sensor samples.
+
+        `now` pairs each run with the index of its next dot.
+        """
         loops = [loop for loop, _dot in now]
         starts = np.array([loop.time for loop in loops])
         touches = np.array([loop.touch - LEADS[loop.kind] for loop in loops])
@@ -123,7 +133,11 @@ class FeedbackStrategy(Declared):
         self.controller.estimate(loops, flights)
 
     def _carry(self, legs: list[Leg], loops: list[Loop], since: FloatArray) -> tuple[Samples, Samples]:
-        """Advance runs through stages; return sensor samples of contacts and of flights after `since` [s]."""
+        """Advance runs through the stages `legs`, and read the sensor.
+
+        Returns the samples of the latest pack contact, and the samples of the flight after `since` [s], of
+        each run.
+        """
         controller, sensor, ends = self.controller, self.sensor, legs[-1].ends
         starts = np.array([loop.time for loop in loops])
         # An empty time span for a run without a contact.
@@ -173,7 +187,11 @@ class FeedbackStrategy(Declared):
         used: BoolArray,
         x: FloatArray,
     ) -> None:
-        """Advance runs to the end of a stage; record displacements in `x` at sample times up to `until`."""
+        """Advance runs to the end of a stage; write their displacements [m] at sample times to `x`.
+
+        `times` are the sample times [s], and `used` is the mask of samples to take; samples later than
+        `until` [s] are left to the next stage.
+        """
         hammers, ends = leg
         inside = np.array([loop.state[2] in _BRANCHES for loop in loops])
         moves = np.array([loop.time < end for loop, end in zip(loops, ends, strict=True)])

@@ -39,7 +39,7 @@ LEADS: Final = {PUSHED: 30e-6, FREE: 10e-6}
 """Lead time of a decision before the pack contact, s, by kind of contact: a push in progress may have to end
 at the touch, whereas a new push never begins before the touch. Arbitrary."""
 
-WINDOW: Final = 120e-6  # Length of the time window of samples, s; arbitrary
+WINDOW: Final = 120e-6  # Time before a decision from which flight samples are used, s; arbitrary
 # Expected standard deviations at a touch: displacement, as a fraction of the stroke, and speed, m/s;
 # arbitrary
 _PLACE_ERROR: Final = 0.03
@@ -73,11 +73,11 @@ _POLICIES: Final = 8  # Size of the policy cache; arbitrary
 
 
 class Ahead(NamedTuple):
-    """Prediction for a control action: the push into the pack, the next throw, and the next pack contact.
+    """Prediction for a control action: the throw, the departure from the pack, and the next pack contact.
 
-    `fire`, `leaves` and `touch` are the times of the throw, of departure from the pack and of the next touch,
-    s after the present touch. `width` is the width of the push, s; `kind` and `speed` [m/s] describe the
-    next touch.
+    `fire`, `leaves` and `touch` are the times [s] of the throw, of the departure and of the next touch, all
+    measured from the present touch. `width` is the width of the throw's pulse, s; `kind` and `speed` [m/s]
+    describe the next touch.
     """
 
     fire: float
@@ -91,9 +91,9 @@ class Ahead(NamedTuple):
 class Controller:
     """A controller designed for a nominal hammer and the driver of its coil.
 
-    The hammer needs a pack and a backstop. `limits` normalise the deviations of dots; `threads` defaults to
-    one per core; `progress` is called with the number of finished steps of the computation of `fronts` and
-    the total number.
+    The hammer needs a pack and a backstop. `limits` normalise the deviations of the dots in force and arrival
+    time; `threads` defaults to one per core; `progress` is called with the number of finished steps of the
+    computation of `fronts` and the total number of steps.
 
     Raises
     ------
@@ -128,11 +128,11 @@ class Controller:
 
     @cached_property
     def force(self) -> FreeForce:
-        """Interpolated force of magnet and spring on the flying armature."""
+        """Force of magnet and spring on the armature in flight, interpolated in a table."""
         return FreeForce(self.hammer, self.hammer.origin, self.plant.front, self.driver.current)
 
     def launch(self, loop: Loop, dot: int) -> None:
-        """Add a launch from rest, timed for a touch at the due time of a dot."""
+        """Add to a run the launch from rest that makes the armature touch the pack when `dot` is due."""
         start = self.start
         learned = loop.learned
         late = (learned.front * self.stroke - start.place_slope * learned.scale) / start.speed
@@ -145,14 +145,14 @@ class Controller:
         loop.since = fired + _CLEAR * start.flight
 
     def _fire(self, loop: Loop, time: float, width: float) -> None:
-        """Add a firing of full current at `time` [s] for `width` [s]."""
+        """Add a pulse of full coil current to a run, fired at `time` [s], of width `width` [s]."""
         pulse = Pulse(time)
         pulse.switch(time, self.driver.current)
         pulse.switch(time + width, 0.0)
         loop.pulses.append(pulse)
 
     def learn(self, loops: Sequence[Loop], samples: Samples) -> None:
-        """Update the estimated position of the pack's front from sensor samples of pack contacts."""
+        """Update each run's estimated position of the pack front from sensor samples of pack contacts."""
         rows = [k for k, loop in enumerate(loops) if loop.alive and loop.touched is not None]
         for loop in loops:
             loop.learned.drift()
@@ -160,7 +160,7 @@ class Controller:
             self._contacts.learn([loops[k] for k in rows], samples.take(rows))
 
     def estimate(self, loops: Sequence[Loop], samples: Samples) -> None:
-        """Estimate times and speeds of the next pack contacts from sensor samples of the flights."""
+        """Estimate the time and speed of each run's next pack contact from sensor samples of the flight."""
         expected = Expected(
             np.array([loop.touch for loop in loops]),
             np.array([loop.speed for loop in loops]),
@@ -206,9 +206,9 @@ class Controller:
         return np.diag([_PLACE_ERROR * self.stroke, _SPEED_ERROR, loop.learned.scale_error]) ** 2
 
     def decide(self, now: Sequence[tuple[Loop, int]], policy: Policy) -> None:
-        """Choose the pulses that follow the next pack contacts.
+        """Choose the pulses that follow the next pack contact of each run, and add them to the run.
 
-        `now` contains, for each run, its state and the index of the dot printed by its next contact.
+        `now` pairs each run with the index of the dot that its next contact prints.
         """
         kind = np.array([loop.kind for loop, _dot in now])
         speed = np.array([loop.speed for loop, _dot in now])
@@ -249,9 +249,9 @@ class Controller:
             loop.printed = printed if unsure else None
 
     def decide_again(self, now: Sequence[tuple[Loop, int]], policy: Policy) -> None:
-        """Repeat the choice of the next pulse after a contact, with the updated position of the pack's front.
+        """Repeat the choice of each run's next pulse after a contact, with the updated position of the front.
 
-        `now` pairs each run with the index of the coming dot.
+        `now` pairs each run with the index of its next dot.
         """
         before = [loop.printed for loop, _dot in now if loop.printed is not None]
         kind, touch, speed, thought, force, slope, back = (
@@ -282,7 +282,7 @@ class Controller:
             self._throw(loop, float(touch[k]), ahead[k])
 
     def _ahead(self, choice: Choice, way: IntArray) -> list[Ahead]:
-        """Predict the consequences of the chosen control actions, one action per run."""
+        """Predict the throw and the next pack contact of each run; `way` is the index of its action."""
         table, rows = self.fronts.table, np.arange(len(way))
         columns = (
             table.fire[way],
@@ -295,7 +295,10 @@ class Controller:
         return [Ahead(*row) for row in zip(*(column.tolist() for column in columns), strict=True)]
 
     def _throw(self, loop: Loop, touch: float, ahead: Ahead) -> None:
-        """Add the firing that throws the armature at the pack for the next dot."""
+        """Add to a run the pulse that throws the armature at the pack for the next dot.
+
+        `ahead` is the prediction for the throw; the present touch was at the time `touch` [s].
+        """
         self._fire(loop, loop.pulses[-1].at[-1], ahead.width)
         clear = max(ahead.leaves, ahead.fire) if ahead.width != ALWAYS else ahead.leaves
         loop.since = touch + clear
@@ -303,13 +306,20 @@ class Controller:
         loop.touch, loop.speed = touch + ahead.touch, ahead.speed
 
     def _push(self, loop: Loop, pulse: Pulse, release: float, back: float) -> None:
-        """Command full current from touch to `release`, if a push is required, then the return current."""
+        """Add to a pulse the push into the pack, if required, and then the return current `back` [A].
+
+        The push is full coil current from the touch until `release` [s] after the touch.
+        """
         if loop.kind == FREE and release > 0.0:
             pulse.switch(max(loop.touch, loop.time), self.driver.current)
         pulse.switch(max(loop.touch + release, loop.time), back)
 
     def _land(self, loop: Loop, dot: int, release: float, brake: float, width: float) -> None:
-        """Add the pulses that print a dot and brake the armature on its return to the backstop."""
+        """Add to a run the push that prints the dot `dot`, and the brake pulse on the return to the backstop.
+
+        `release` is the end of the push and `brake` the start of the brake pulse, s after the touch; `width`
+        is the width of the brake pulse, s. NaN means no push, or no brake pulse.
+        """
         pulse = loop.pulses[-1]
         self._push(loop, pulse, 0.0 if np.isnan(release) else release, 0.0)
         if not np.isnan(brake):
@@ -325,7 +335,11 @@ class Controller:
             pulse.switch(loop.touch + end, 0.0)
 
     def _landings(self, kind: Any, speed: FloatArray, front: FloatArray) -> list[FloatArray]:
-        """Interpolate release time, brake start and brake width [s] for soft landings after pack contacts."""
+        """Interpolate the pulses for soft landings after pack contacts of given kind, speed [m/s] and front.
+
+        Returns, in this order: the end of the push into the pack, and the start of the brake pulse, both s
+        after the touch; and the width of the brake pulse, s.
+        """
         below, share = between(self.fronts.table, kind, speed)
         nearer, farther = between_fronts(front)
         settings = []
@@ -340,17 +354,20 @@ class Controller:
 
     @property
     def _rest(self) -> float:
-        """Shortest time between two dots in which the armature comes to rest, s."""
+        """Shortest time between two dots that lets the armature come to rest between them, s."""
         return self.fronts.landing.settled + self.start.flight
 
     def _before_rest(self, loop: Loop, dot: int) -> int:
-        """Return the number of dots that follow a dot before the armature comes to rest again."""
+        """Return the number of dots after the dot `dot` of a run before the armature comes to rest again."""
         rests = np.flatnonzero(np.diff(loop.due[dot:]) >= self._rest)
         return int(rests[0]) if rests.size else max(len(loop.due) - dot - 1, 0)
 
 
 def _steps(loops: Sequence[Loop]) -> tuple[FloatArray, FloatArray]:
-    """Return times [s] and heights [A] of all steps of the current command, shape (M, S), zero-padded."""
+    """Return times [s] and heights [A] of the steps of the commanded coil current.
+
+    Both arrays have one row per run, padded with zeros; only the latest `REMEMBERED` pulses are included.
+    """
     rows = []
     for loop in loops:
         steps = [
@@ -367,7 +384,11 @@ def _steps(loops: Sequence[Loop]) -> tuple[FloatArray, FloatArray]:
 
 
 def _current(at: FloatArray, height: FloatArray, edge: float, t: FloatArray) -> FloatArray:
-    """Return the current [A] at times t, shape (M, K), with first-order lag behind the command."""
+    """Return the coil current [A] of M runs at the times `t` [s], shape (M, K).
+
+    The current follows steps of `height` [A] at the times `at` [s] with the first-order time constant
+    `edge` [s].
+    """
     total = np.zeros_like(t)
     for k in range(at.shape[1]):
         since = np.maximum(t - at[:, k, np.newaxis], 0.0)

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     Accelerations = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
 _ROUNDS: Final = 3  # Iterations of path integration, of the fit, and of the touch time; arbitrary
-_NODES: Final = 65  # Time nodes of a path; arbitrary
+_NODES: Final = 65  # Number of time nodes of a flight path; arbitrary
 _SLOWEST: Final = 1e-2  # Smallest speed of a touch, m/s; arbitrary
 _SHORTEST: Final = 1e-6  # Shortest flight, s; arbitrary
 # Finite-difference steps: relative speed, and current scale; arbitrary
@@ -78,10 +78,11 @@ class FreeForce:
 
 @dataclass(frozen=True)
 class Expected:
-    """Prior mean and covariance of time, speed and current scale at the next pack contacts of M runs.
+    """Predicted time, speed and current scale of M runs at their next pack contacts, before new samples.
 
     `time` [s] and `speed` [m/s] describe the contacts; `scale` is the relative deviation of all currents
-    from nominal. `covariance`, shape (M, 3, 3), covers displacement [m] at `time`, speed [m/s] and scale.
+    from nominal. `covariance` is the prior covariance of the displacement [m] at `time`, the speed [m/s] and
+    the scale, shape (M, 3, 3).
     """
 
     time: FloatArray
@@ -104,7 +105,10 @@ class Flight:
     covariance: FloatArray
 
     def at(self, time: FloatArray, accelerations: Accelerations) -> tuple[FloatArray, FloatArray]:
-        """Propagate states, shape (M, 3), and covariances, (M, 3, 3), in free flight to another time, s."""
+        """Return the states, shape (M, 3), and covariances, (M, 3, 3), propagated in flight to `time` [s].
+
+        `accelerations` is as for `flight_from_samples`.
+        """
         place, speed, scale = self.state.T
         way = time - self.reference
         grid = self.reference[:, np.newaxis] + np.linspace(1.0, 0.0, _NODES) * way[:, np.newaxis]
@@ -131,8 +135,8 @@ def flight_from_samples(
 ) -> Flight:
     """Estimate flights from sensor samples; predict the next contact with the pack at `front` [m].
 
-    `accelerations` maps displacements [m], times [s] and scales, all broadcastable to the shape (M, K), to
-    accelerations of a flying armature, m/s².
+    `accelerations` returns the accelerations of the armature in flight [m/s²] for displacements [m], times
+    [s] and relative deviations of the current from nominal, for M runs and K times per run.
     """
     times, shown, used, error = samples
     reference = expected.time
@@ -189,12 +193,13 @@ def least_squares(
     prior: FloatArray,
     expected: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Compute the weighted least-squares step with a prior, and its precision matrix (Gauss-Newton).
+    """Compute the Gauss-Newton step of a weighted least-squares fit with a prior, and its precision matrix.
 
-    For M runs, `slopes` are the derivatives of N samples with respect to each of U unknowns, each of shape
-    (M, N); `rest` are the residuals and `weight` the weights, 0 for unused samples, of the same shape. The
-    prior is a step `expected`, shape (M, U), with the precision `prior`, shape (M, U, U). The returned
-    precision is the inverse of the covariance of the step.
+    M runs with N samples each are fitted, with U unknowns per run. `slopes` contains the derivatives of the
+    samples with respect to each unknown, U arrays of shape (M, N). `rest` contains the residuals and `weight`
+    the weights of the samples, both of shape (M, N); the weight of an unused sample is 0. The prior is a step
+    `expected`, shape (M, U), with the precision `prior`, shape (M, U, U). The returned precision is the
+    inverse of the covariance of the step.
     """
     precision, pull = prior.copy(), np.empty(expected.shape)
     # Explicit sums: in a matrix product, the last bits of a run may depend on the other runs.
@@ -208,7 +213,10 @@ def least_squares(
 
 
 def _integrate(grid: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Compute first and second time integrals of rows, backwards from the last time (trapezoidal rule)."""
+    """Integrate each row of `values` over time, once and twice, by the trapezoidal rule.
+
+    `grid` contains the times [s]; the integrals vanish at the last time of each row.
+    """
     step = (grid[:, -1:] - grid[:, :1]) / (grid.shape[1] - 1)
 
     def backwards(integrand: FloatArray) -> FloatArray:
@@ -221,7 +229,10 @@ def _integrate(grid: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatA
 
 
 def _interpolate(grid: FloatArray, values: FloatArray, times: FloatArray) -> FloatArray:
-    """Interpolate rows linearly over evenly spaced times; times beyond the ends are clipped."""
+    """Interpolate each row of `values` linearly at `times` [s]; times outside the grid are clipped.
+
+    `grid` contains the evenly spaced times [s] at which the values are given.
+    """
     count = grid.shape[1] - 1
     span = np.maximum(grid[:, -1:] - grid[:, :1], 1e-300)
     place = np.clip((times - grid[:, :1]) / span, 0.0, 1.0) * count
@@ -245,14 +256,17 @@ _STRANGE: Final = 9.0
 
 
 class Contacts:
-    """Observer of the pack front; simulates contacts of the nominal hammer at several pack distances."""
+    """Observer that estimates the position of the pack front from sensor samples of pack contacts.
+
+    The contacts are simulated with the nominal hammer, at several distances of the pack.
+    """
 
     def __init__(self, plant: Plant) -> None:
         self._plant = plant
         self._shifted = {0: plant.hammer}
 
     def learn(self, loops: Sequence[Loop], samples: Samples) -> None:
-        """Update each run's pack front and current scale from sensor samples of its latest contact."""
+        """Update each run's estimates of pack front and current scale from samples of its latest contact."""
         stroke = self._plant.stroke
         touches = [loop.touched for loop in loops if loop.touched is not None]
         places = [round(loop.learned.front / _GRID) for loop in loops]
@@ -296,7 +310,12 @@ class Contacts:
         steps: FloatArray,
         samples: Samples,
     ) -> FloatArray:
-        """Simulate the nominal and four perturbed contacts; return displacements [m], shape (5, M, N)."""
+        """Simulate the latest contact of each of M runs with nominal and with perturbed constants.
+
+        `places` are the estimated pack fronts, in steps of `_GRID`; `steps` are the changes of displacement
+        [m], speed [m/s], pack front [strokes] and current scale in the four perturbed simulations. Returns
+        the displacements [m] at the N sample times, shape (5, M, N), the nominal simulation first.
+        """
         hammers, drives, states, strobes = [], [], [], []
         plain = [loop.recent(self._plant.driver) for loop in loops]
         stronger = [drive.scaled(1.0 + _FACTOR_STEP) for drive in plain]
@@ -325,7 +344,7 @@ class Contacts:
         return whole
 
     def _with_front(self, place: int) -> Hammer:
-        """Return the nominal hammer, cached, with its pack moved away by `place` grid steps."""
+        """Return the nominal hammer with its pack moved away by `place` steps of `_GRID`; cached."""
         if place not in self._shifted:
             self._shifted[place] = self._plant.moved(place * _GRID).hammer
         return self._shifted[place]

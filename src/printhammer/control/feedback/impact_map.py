@@ -69,9 +69,10 @@ class ForceMap:
         return int(np.argmin(np.abs(self.back)))
 
     def release_for(self, force: float) -> FloatArray:
-        """Return the release times [s], shape (T, B), for a peak force; NaN if the current is too weak.
+        """Return the release times [s] that give the peak force `force`, relative to the single pulse.
 
-        The release time is 0 if the touch exceeds the force without a push.
+        The result has one row per touch and one column per return current. It is 0 if the touch exceeds the
+        force without a push, and NaN if no push gives the force.
         """
         releases = np.full(self.force.shape[:2], np.nan)
         for place in np.ndindex(releases.shape):
@@ -81,7 +82,10 @@ class ForceMap:
         return releases
 
     def force_at(self, row: int, release: float, back: float) -> float:
-        """Interpolate the peak force after a touch of the pack, as a fraction of the single-pulse force."""
+        """Interpolate the peak force of touch `row`, as a fraction of the single-pulse force.
+
+        The push ends `release` [s] after the touch; then the return current is `back` [A].
+        """
         number = int(np.argmin(np.abs(self.back - back)))
         return float(np.interp(release, self.release, self.force[row, number]))
 
@@ -132,7 +136,10 @@ def force_map(plant: Plant) -> ForceMap:
 
 
 def released_forces(plant: Plant, forces: ForceMap, keys: list[tuple[int, float, float]]) -> FloatArray:
-    """Simulate peak forces for keys (touch index, release time [s], return current [A]); NaN if failed."""
+    """Simulate the peak forces of pack touches, relative to the single pulse; NaN for a failed simulation.
+
+    A key consists of the index of a touch in `forces`, the release time [s] and the return current [A].
+    """
     long = _WATCHED * plant.single.flight_time
     drives = [
         plant.driver.drive([first_pulse(int(forces.kind[row]), release, back, long, plant.driver)])
@@ -145,7 +152,10 @@ def released_forces(plant: Plant, forces: ForceMap, keys: list[tuple[int, float,
 def impact_map(
     plant: Plant, forces: ForceMap, launched: float, progress: Progress | None = None
 ) -> ImpactMap:
-    """Simulate all switching actions of the coil after each touch; `launched` is the launch width, s."""
+    """Simulate all switching actions of the coil after each touch of the force map.
+
+    `launched` is the pulse width of a launch from rest, s.
+    """
     single, driver = plant.single, plant.driver
     scale = single.flight_time
     fires = np.concatenate([_EARLY, _LATE]) * scale
@@ -206,7 +216,11 @@ def impact_map(
 
 
 def first_pulse(kind: int, release: float, back: float, fire: float, driver: Driver) -> Switched:
-    """Return the current waveform from just before a touch up to the next firing."""
+    """Return the waveform of the coil current from just before a touch up to the next firing.
+
+    The touch is of the kind `kind`; a push ends `release` [s] after the touch; then the return current
+    `back` [A] flows until the next firing, `fire` [s] after the touch.
+    """
     at, levels = [0.0], [driver.current if kind == PUSHED else 0.0]
     if release > 0.0:
         at.append(AHEAD)
@@ -216,7 +230,10 @@ def first_pulse(kind: int, release: float, back: float, fire: float, driver: Dri
 
 
 def place_of(values: FloatArray, nodes: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Locate values between evenly spaced nodes: index of the node below, weight of the node above."""
+    """Return, for each value, the index of the node below and the interpolation weight of the node above.
+
+    The nodes ascend and are evenly spaced.
+    """
     place = (values - nodes[0]) / (nodes[1] - nodes[0])
     below = np.clip(place.astype(np.int64), 0, len(nodes) - 2)
     return below, place - below

@@ -48,7 +48,7 @@ class Plant:
         return self.front - self.hammer.origin
 
     def moved(self, offset: float) -> Plant:
-        """Return a copy with the pack moved away by `offset`, as a fraction of the stroke."""
+        """Return a copy with the pack moved away from the backstop by `offset`, a fraction of the stroke."""
         travel = Perturbation(travel=offset * self.stroke)
         return replace(self, hammer=perturbed(self.hammer, travel)) if offset else self
 
@@ -60,9 +60,11 @@ class Plant:
         strobes: Any = None,
         progress: Progress | None = None,
     ) -> tuple[BoolArray, DotTable, Strobes]:
-        """Simulate drives from rest, or from states (drives, 2), m and m/s, up to an end time, s.
+        """Simulate the hammer under each drive until the time `end` [s], from rest or from given states.
 
-        Returns whether each simulation reached its end, the dots of the firings, and the states at `strobes`.
+        `states` has a row of displacement [m] and velocity [m/s] per drive; `strobes` are times [s] at which
+        the states are recorded. Returns, in this order: whether each simulation reached its end; the dots;
+        and the recorded states.
         """
         begun = None if states is None else np.array(states)
         result = Ensemble(self.hammer, list(drives), end, states=begun, tolerance=DISPLAY_TOLERANCE).run(
@@ -150,7 +152,7 @@ _FARTHEST: Final = 5.0
 class Pulse:
     """A firing of the closed loop, with the current switchings decided so far.
 
-    The command changes to `levels` [A] at the times `at` [s].
+    The commanded coil current changes to `levels` [A] at the times `at` [s].
     """
 
     fired: float
@@ -158,7 +160,10 @@ class Pulse:
     levels: list[float] = field(default_factory=list)
 
     def switch(self, time: float, level: float) -> None:
-        """Append a current switching, at least `APART` after the previous switching."""
+        """Append a switching of the coil current to `level` [A] at `time` [s].
+
+        The switching is delayed, if necessary, to `APART` after the previous switching.
+        """
         self.at.append(max(time, self.at[-1] + APART) if self.at else time)
         self.levels.append(level)
 
@@ -181,7 +186,7 @@ class Learned:
     scale_error: float = SCALE_ERROR
 
     def drift(self) -> None:
-        """Inflate the standard deviations of pack front and current scale, at most to their prior values."""
+        """Inflate the standard deviations of both estimates by one step of drift, at most to their priors."""
         self.front_error = float(min(np.hypot(self.front_error, _FRONT_DRIFT), FRONT_ERROR))
         self.scale_error = float(min(np.hypot(self.scale_error, _SCALE_DRIFT), SCALE_ERROR))
 
@@ -212,7 +217,10 @@ class Touched:
 
 @dataclass(frozen=True)
 class Printed:
-    """Pack contact as predicted when its pulse was chosen, with the pack front as estimated at that time."""
+    """Prediction of a pack contact at the time when its pulse was chosen.
+
+    The prediction uses the position of the pack front as estimated at that time.
+    """
 
     # Time, s, speed, m/s, and kind of the touch
     touch: float
@@ -238,7 +246,7 @@ class Loop:
     touch: float = 0.0
     speed: float = 0.0
     kind: int = 0
-    since: float = 0.0  # Start of the current free flight, s
+    since: float = 0.0  # Start of the present free flight, s
     time: float = 0.0  # Simulated time so far, s
     alive: bool = True  # Whether the simulation continues
     launched: bool = True  # Whether the coming touch follows a launch from rest
@@ -253,7 +261,7 @@ class Loop:
     touches: list[tuple[float, float]] = field(default_factory=list)
 
     def wait(self, dot: int) -> float:
-        """Return the time from a dot to the next dot, s; infinite after the last dot."""
+        """Return the time from the dot `dot` to the next requested dot, s; infinite after the last dot."""
         return float(self.due[dot + 1] - self.due[dot]) if dot + 1 < len(self.due) else np.inf
 
     def drive(self, edge: float) -> PulseSequence:

@@ -46,7 +46,7 @@ STEPS: Final = 100
 """Number of steps of the progress bar for each distance of the pack; arbitrary."""
 
 _MAPPING: Final = 70
-"""Number of steps of the progress bar, for each pack distance, up to the end of the impact map; arbitrary."""
+"""Number of these steps that are done when the impact map of a pack distance is complete; arbitrary."""
 
 MIDDLE: Final = 1  # Index of the nominal distance
 
@@ -94,9 +94,10 @@ def fronts(plant: Plant, forces: ForceMap, start: Launch, progress: Progress | N
 
 
 def front_force(farther: Plant, table: ImpactMap) -> FloatArray:
-    """Compute the derivative of the peak force with respect to the distance of the pack; see `Fronts`.
+    """Compute the derivative of the peak force of each touch and action with respect to the pack distance.
 
-    `farther` is the plant with the farthest pack; `table` is the map of the nominal hammer.
+    `farther` is the plant with the farthest pack; `table` is the impact map of the nominal hammer. The unit
+    is single-pulse forces per stroke, the shape (touches, actions).
     """
     keys: dict[tuple[int, float, float], int] = {}
     which = np.full(table.release.shape, -1)
@@ -111,10 +112,10 @@ def front_force(farther: Plant, table: ImpactMap) -> FloatArray:
 
 
 def between_fronts(front: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Locate M pack distances: index of the map below, and weight of the map above.
+    """Return the index of the map below each pack distance, and the interpolation weight of the map above.
 
-    `front` is the pack distance beyond nominal, as a fraction of the stroke; values outside the maps are
-    clipped.
+    `front` is the pack distance beyond nominal, as a fraction of the stroke; values outside the range of the
+    maps are clipped.
     """
     return place_of(np.clip(front, OFFSETS[0], OFFSETS[-1]), np.array(OFFSETS))
 
@@ -173,13 +174,21 @@ class Policy:
         return np.asarray(a**2 * (1.0 + _STEEP * a**4) + b**2 * (1.0 + _STEEP * b**4))
 
     def effort(self, release: FloatArray) -> FloatArray:
-        """Return the cost of the return currents, which make the armature strike the backstop harder."""
+        """Return the cost of the coil current during the armature's return from the pack, for all actions.
+
+        This current makes the armature strike the backstop harder. It flows from `release` [s] after the
+        touch, the end of the push, until the next firing.
+        """
         table = self.table
         cost = _EFFORT * np.square(table.back / table.driver.current) * (table.fire - release)
         return np.asarray(cost / self.period)
 
     def ahead(self, kind: IntArray, late: FloatArray, speed: FloatArray, costs: FloatArray) -> FloatArray:
-        """Interpolate the cost-to-go of pack contacts, including the cost of the dot of each contact."""
+        """Interpolate the cost-to-go from pack contacts, including the cost of the dot of each contact.
+
+        The contacts have a `kind`, a lateness `late` [s] and a `speed` [m/s]; `costs` is a table of
+        `Policy.costs`.
+        """
         kinds, lates, speeds = np.broadcast_arrays(kind, late, speed)
         total = np.full(kinds.shape, NEVER)
         end = self._late[-1]
@@ -207,7 +216,10 @@ class Policy:
         front_error: FloatArray,
         done: Committed | None = None,
     ) -> tuple[IntArray, FloatArray, Choice]:
-        """Select the action of least cost for each of M touches; return index, cost and all outcomes.
+        """Select the action of least cost for each of M touches.
+
+        Returns, in this order: the index of the action and its cost for each touch; and the outcomes of all
+        actions.
 
         The touches have a `kind`, a lateness `late` [s] and a `speed` [m/s]. The next dot is due after `wait`
         [s], and `after` dots follow between the next dot and a rest. The pack is `front` farther away than
@@ -243,8 +255,9 @@ class Policy:
     def _doubts(self) -> FloatArray:
         """Return the cost due to the uncertain speed of a touch, for all actions, shape (touches, actions).
 
-        The cost uses the steepest slope among neighbouring speeds: near a discontinuity, where the number of
-        bounces changes, interpolation between two speeds is meaningless.
+        The cost depends on the derivative of the next touch time with respect to the speed of the present
+        touch, and uses the steepest slope among neighbouring speeds: near a discontinuity, where the number
+        of bounces changes, interpolation between two speeds is meaningless.
         """
         table = self.table
         doubts = np.zeros(table.next_touch.shape)
@@ -260,7 +273,11 @@ class Policy:
         return doubts
 
     def _front_doubt(self, choice: Choice, rows: IntArray, error: FloatArray) -> FloatArray:
-        """Return the cost due to the uncertain position of the pack's front, shape (touches, actions)."""
+        """Return the cost due to the uncertain position of the pack front, shape (touches, actions).
+
+        `rows` are the indices of the touches in `choice`; `error` is the standard deviation of the front for
+        each of these touches, as a fraction of the stroke.
+        """
         weaker = error[:, np.newaxis] * choice.by_speed(self.fronts.front_force)[rows]
         force = choice.force[rows]
         zero = np.zeros(1)
@@ -330,13 +347,21 @@ class Choice:
             setattr(self, name, settled.reshape(self.force.shape))
 
     def by_speed(self, values: FloatArray, way: IntArray | None = None) -> FloatArray:
-        """Interpolate a table (T, A) of the nominal map in speed, for all actions or one per touch, `way`."""
+        """Interpolate a table of the nominal map at the speeds of the M touches.
+
+        `values` has a row per tabulated touch and a column per action. `way` is the index of one action per
+        touch; without it, all actions are interpolated, shape (M, actions).
+        """
         every: Any = slice(None) if way is None else way
         share = self.share[:, np.newaxis] if way is None else self.share
         return blend(values[self.below, every], values[self.below + 1, every], share)
 
     def of(self, name: str, way: IntArray | None = None) -> FloatArray:
-        """Interpolate tables of all maps in speed and distance, for all actions or one per touch (`way`)."""
+        """Interpolate the field `name` of the impact maps at the speeds and pack distances of the M touches.
+
+        `way` is the index of one action per touch; without it, all actions are interpolated, shape
+        (M, actions).
+        """
         tables = [getattr(table, name) for table in self._fronts.maps]
         shape = (len(self.below), tables[MIDDLE].shape[1]) if way is None else (len(self.below),)
         values = np.empty(shape)
@@ -352,7 +377,10 @@ class Choice:
 
 
 def between(table: ImpactMap, kind: IntArray, speed: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Locate M impact speeds in a map: index of the row below, and weight of the row above."""
+    """Locate touches of given kind and speed [m/s] between the touches of an impact map.
+
+    Return, for each touch, the row below its speed, and the interpolation weight of the row above.
+    """
     below, share = np.zeros(len(kind), np.int64), np.zeros(len(kind))
     for number in range(int(table.kind.max()) + 1):
         rows = np.flatnonzero(table.kind == number)

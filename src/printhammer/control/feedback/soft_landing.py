@@ -34,7 +34,7 @@ _FALL: Final = 1.0 / 3.0
 # Times after the touch at which the residual motion is evaluated, in single-pulse flight times; arbitrary
 _WATCHED: Final = np.linspace(2.2, 3.4, 16)
 _SETTLED: Final = 0.65
-"""Time after the brake pulse until the armature is considered at rest, in flight times; arbitrary."""
+"""Time from the end of the brake pulse until the armature counts as at rest, in flight times; arbitrary."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Landing:
 
 
 def soft_landing(plant: Plant, forces: ForceMap) -> Landing:
-    """Optimise the brake pulse after each touch for least residual motion, by refined grid search."""
+    """Find the brake pulse after each touch that leaves the least residual motion, by refined grid search."""
     scale = plant.single.flight_time
     release = forces.release_for(1.0)[:, forces.off]
     force = np.full(len(release), np.nan)
@@ -80,7 +80,12 @@ def soft_landing(plant: Plant, forces: ForceMap) -> Landing:
 def _residual_speeds(
     plant: Plant, forces: ForceMap, release: FloatArray, rows: IntArray, tried: FloatArray
 ) -> FloatArray:
-    """Simulate brake pulses (start and width, s); return the residual speeds, m/s."""
+    """Simulate trial brake pulses after touches; return the residual speeds of the armature, m/s.
+
+    `rows` are the indices of the touches in `forces`; `release` is the end of the push after every touch [s];
+    `tried` contains the start and width [s] of the trial pulses, shape (touches, pulses, 2). The speed is
+    infinite if the simulation fails or the armature touches the pack again.
+    """
     driver, scale = plant.driver, plant.single.flight_time
     drives, states = [], []
     for row, pulses in zip(rows.tolist(), tried, strict=True):
