@@ -1,1 +1,1 @@
-"""Drive control: compensation tables, learning, feedback, bursts of least work, thermal limits."""
+"""Drive control: compensation tables, learning, feedback, bursts of least coil work, thermal limits."""

@@ -99,7 +99,11 @@ class AxisTables:
     tables: tuple[CompensationTable, ...]
 
     def at(self, value: float | str) -> CompensationTable:
-        """Interpolate the tables at an axis value; where solution branches differ, use the nearer entry."""
+        """Interpolate the tables linearly at an axis value, entry by entry.
+
+        Where the entries of the two neighbouring tables belong to different solution branches (see
+        `printhammer.control.table.compensation.mixed`), the entry of the nearer table is used unchanged.
+        """
         asked = read_number(value, AXES[self.axis].unit, self.axis)
         least, most = self.values[0], self.values[-1]
         if not least <= asked <= most:
@@ -117,7 +121,10 @@ class AxisTables:
         return replace(first, **times, deviation=unknown, multiplier=unknown)
 
     def strategy(self, hammer: Hammer, value: float | str) -> TableStrategy:
-        """Return a drive strategy from the table and the pulses of the hammer at an axis value."""
+        """Return the drive strategy for an axis value, with the table and the pulses of that value.
+
+        `hammer` is the hammer for which the tables were tuned.
+        """
         table = self.at(value)
         table.check_hammer(hammer)
         place = read_number(value, AXES[self.axis].unit, self.axis)
@@ -155,7 +162,11 @@ class AxisTables:
         return replace(self, tables=tuple(table.quantised(tick) for table in self.tables))
 
     def with_multipliers(self, hammer: Hammer, effort: Effort = DISPLAY) -> AxisTables:
-        """Return a copy with multipliers, computed for the hammer at the axis value of each table."""
+        """Return a copy with the dot-to-dot multipliers of all histories in each table.
+
+        The multipliers are computed for the hammer at the axis value of the table; see
+        `printhammer.control.table.multipliers`.
+        """
         change = AXES[self.axis].change
         tables = [
             replace(

@@ -260,7 +260,7 @@ def dead_time(
     effort: Effort = DEFAULT,
     **_keywords: Unpack[InOneThread],
 ) -> DeadTime:
-    """Tabulate time to impact, and pulse width at equal impact speed, by voltage and temperature.
+    """Tabulate the time to impact, and the pulse width for a given impact speed, by voltage and temperature.
 
     Parameters
     ----------
@@ -271,9 +271,9 @@ def dead_time(
     temperature : sequence of float or str, optional
         Coil temperatures [degC]; by default 20, 60 and 100 degC.
     blow : float or str, optional
-        Impact speed [m/s] for which widths are computed; by default the impact speed of the hammer's own
-        pulse at nominal rail and temperature, which may be out of reach on a lower rail or with a warmer
-        coil.
+        Impact speed [m/s] for which the pulse widths are computed; by default the impact speed of the
+        hammer's own pulse at nominal rail and temperature, which may be out of reach on a lower rail or with
+        a warmer coil.
 
     Raises
     ------

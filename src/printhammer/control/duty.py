@@ -249,8 +249,8 @@ def thermal_duty(
     ambient : sequence of float or str, optional
         Ambient temperatures, degC.
     burst : sequence of float or str, optional
-        Burst rates [Hz] for which to compute steady temperature, time to the limit and largest duty cycle; by
-        default the largest continuous rate at any of the ambient temperatures.
+        Dot rates in a burst [Hz] for which to compute steady temperature, time to the temperature limit and
+        largest duty cycle; by default the largest continuous rate at the lowest ambient temperature.
     feed : str, optional
         Quantity that the driver keeps constant as the coil warms: "voltage", "current" or "energy".
     thermal_capacity : float or str, optional
@@ -314,7 +314,11 @@ def steady(coil: ThermalCoil, heat: DotHeat, ambient: float, rate: float) -> flo
 
 
 def time_to(coil: ThermalCoil, heat: DotHeat, limit: float, ambient: float, rate: float) -> float:
-    """Integrate the warming of the winding from ambient; return the time to the temperature limit, s."""
+    """Integrate the warming of the winding from ambient at a dot rate [Hz]; return the time to the limit, s.
+
+    The time is 0 if the ambient temperature exceeds the limit, infinite if the winding never reaches the
+    limit, and NaN if the heat capacity is unknown.
+    """
     if limit <= ambient:
         return 0.0
     # At or below the largest continuous rate the limit is never exceeded.
@@ -366,7 +370,10 @@ TEMPERATURES: Final = (20.0, 40.0, 60.0, 80.0, 100.0, 120.0, 140.0)
 
 _LEFT: Final = 1e-3  # Residual current at which a pulse counts as ended, as a fraction of its peak; arbitrary
 _DECAYED: Final = 0.01
-"""Fraction of the current whose heat is neglected: at most 2 % of the heat of the next dot; arbitrary."""
+"""Fraction of its peak below which the current of a dot counts as decayed; arbitrary.
+
+The smaller current changes the heat of the next dot by at most 2 %."""
+
 _DOUBLINGS: Final = 8  # Iteration limit of the doublings of the simulated time; arbitrary
 
 
@@ -408,7 +415,10 @@ def heat_of(hammer: Hammer) -> DotHeat:
 
 
 def _copper_loss(hammer: Hammer, drive: PulseTrain) -> tuple[float, float]:
-    """Simulate one firing until the current has decayed; return coil heat [J] and decay time [s]."""
+    """Simulate one firing until the current has decayed; return the coil heat, J, and the time needed, s.
+
+    The time is measured from the firing until the current has decayed to `_DECAYED` times its peak.
+    """
     from printhammer.run.simulate import simulate
 
     span = 4.0 * drive.waveform.support

@@ -48,7 +48,7 @@ PHASES: Final = 8  # Number of trial shifts per sampling interval; arbitrary
 BEFORE: Final = 1.0  # Length of the window before the touch, in contact times; arbitrary
 AFTER: Final = 0.6  # Length of the window after the touch, in contact times; arbitrary
 REACH: Final = 0.15  # Half-width of the search range about the nominal impact, in flight times; arbitrary
-FAINTEST: Final = 5.0  # Detection threshold, in standard deviations; arbitrary
+FAINTEST: Final = 5.0  # Detection threshold, in standard deviations of a sample; arbitrary
 _DEGREE: Final = 1  # Degree of the nuisance polynomial; arbitrary
 _LEAST: Final = 8  # Smallest number of samples in the window; arbitrary
 _MOST: Final = 200_000  # Largest number of samples in a record; arbitrary
@@ -227,11 +227,14 @@ class ImpactEstimator:
         return np.asarray((windows >= full_scale - self.sampling.step).any(axis=-1))
 
     def _energy(self, windows: FloatArray) -> FloatArray:
-        """Return the sum of squares of each window after removal of its straight-line fit."""
+        """Return the sum of squares of each window of samples after removal of its straight-line fit."""
         return np.asarray((windows**2).sum(axis=1) - ((windows @ self._base) ** 2).sum(axis=1))
 
     def _likeness(self, windows: FloatArray) -> FloatArray:
-        """Return the correlation of windows with the signature at their centre: 1 for the same shape."""
+        """Return the correlation of each window of samples with the impact signature: 1 for the same shape.
+
+        The impact is assumed at the nominal place within the window, without a trial shift.
+        """
         _shifts, weights, sizes = self._filters
         middle = len(weights) // 2
         found = windows @ weights[middle] / sizes[middle]
@@ -241,13 +244,17 @@ class ImpactEstimator:
 
     @cached_property
     def _base(self) -> FloatArray:
-        """Orthonormal polynomials over a window, shape (window, degree + 1)."""
+        """Orthonormal basis of the straight lines over a window, one column per basis function."""
         offsets = np.arange(self._size) - self._before
         return np.asarray(np.linalg.qr(np.vander(offsets / self._size, _DEGREE + 1))[0], np.float64)
 
     @cached_property
     def _filters(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Trial shifts of the touch within a window [s], with filter weights and the norms of the weights."""
+        """Trial shifts of the touch within a window [s], and the matched filter for each shift.
+
+        Contains, in this order: the shifts; the filter weights, shape (shifts, samples of a window); and the
+        norms of the weights.
+        """
         offsets = self.step * (np.arange(self._size) - self._before)
         grid = max(self.step / PHASES, self.contact / _FINEST)
         count = math.ceil(_AROUND * self.contact / grid)
@@ -270,7 +277,10 @@ class ImpactEstimator:
         )
 
     def _without_pack(self, fine: FloatArray) -> FloatArray:
-        """Simulate the readings without a pack, A or V, held at their last value if the run ends early."""
+        """Simulate the readings [A or V] of the nominal hammer without its pack, at the times `fine` [s].
+
+        If the simulation ends early, the last value is repeated.
+        """
         known = self.hammer.constants
         away = self.hammer.replace({key: _SOFT * known[key].si for key in _FIRM if key in known})
         run = simulate(away, PulseTrain(self.pulse), duration=float(fine[-1]) + self.step, times=fine)
@@ -321,7 +331,10 @@ class ImpactEstimator:
 
 
 def _vertex(score: FloatArray, place: int) -> float:
-    """Return the vertex of the parabola through a maximum and its neighbours, as an offset in steps."""
+    """Return the vertex of the parabola through a maximum of `score` and its two neighbours.
+
+    The vertex is given as an offset from the index `place`, and is 0 at the ends of `score`.
+    """
     if not 0 < place < score.size - 1:
         return 0.0
     before, here, after = score[place - 1 : place + 2].tolist()
@@ -373,7 +386,7 @@ class Sampling(Declared):
         return UNITS[self.signal]
 
     def scaled_to(self, largest: float) -> Sampling:
-        """Return a copy with the range `largest` [A or V], unless a range is set."""
+        """Return a copy with the range from 0 to `largest` [A or V]; a range that is already set is kept."""
         return self if self.full_scale is not None else replace(self, full_scale=largest)
 
     @property
@@ -392,7 +405,10 @@ class Sampling(Declared):
         return np.asarray(values, np.float64)
 
     def shown(self, times: FloatArray, true: FloatArray) -> FloatArray:
-        """Apply bandwidth and delay of the probe to a signal, A or V, at dense times since the firing, s."""
+        """Apply the bandwidth and the delay of the probe to the signal `true` [A or V].
+
+        `times` are closely spaced times since the firing, s.
+        """
         slow = lowpass_lines(times, true, time_constant(self.bandwidth))
         return slow if self.delay == 0.0 else np.interp(times - self.delay, times, slow)
 

@@ -284,7 +284,10 @@ def _largest_current(hammer: Hammer) -> float:
 
 
 def unit_record(unit: Hammer, estimator: ImpactEstimator, probe: Sampling) -> tuple[FloatArray, float]:
-    """Simulate the probe signal of one dot of a unit; return signal, A or V, and true impact time, s."""
+    """Simulate one dot of a unit; return the signal after the probe [A or V] and the true impact time, s.
+
+    The impact time is NaN if the unit prints no dot.
+    """
     each = PHASES if probe.delay or probe.bandwidth is not None else 1
     times = np.asarray(estimator.step / each * np.arange(each * estimator.count), np.float64)
     motion = simulate(
@@ -301,8 +304,8 @@ def errors_of(
 ) -> tuple[FloatArray, BoolArray]:
     """Return the errors of estimated impact times [s] and a mask of the estimates that are not flagged.
 
-    `records` are the signals and flight times from `unit_record`; dot number n uses record n modulo the
-    number of records.
+    Both arrays have one entry per dot. `records` are the signals and impact times from `unit_record`; dot
+    number n uses record n modulo the number of records, with new noise.
     """
     errors, believed = [], []
     for number in range(dots):

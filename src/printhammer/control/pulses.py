@@ -35,7 +35,7 @@ def current_bound(hammer: Hammer, largest: float | str | None = None, key: str =
     """Return the current limit, A: `largest` if stated, by default the limit of the hammer.
 
     The default limit is 2 A or, if larger, the peak current of the hammer's own pulse at the largest
-    width, rounded up to 0.1 A.
+    width, rounded up to 0.1 A. `key` is the name of the argument in error messages.
     """
     if largest is not None:
         return read_positive(largest, "A", key)
@@ -96,8 +96,9 @@ def widest(
 ) -> float:
     """Bisect for the largest pulse width [s] at which the peak current stays within a bound [A].
 
-    The search covers the widths from `low` to `high`. The bound is assumed to hold at `low`, which is
-    returned if the bound holds at no larger width. `peak` maps a pulse to its largest current, A.
+    The search covers the widths from `low` to `high` [s], in `halvings` bisections. The bound is assumed to
+    hold at `low`, which is returned if the bound holds at no larger width. `peak` maps a pulse to its largest
+    current, A.
     """
     if peak(of_width(pulse, high)) <= bound:
         return high

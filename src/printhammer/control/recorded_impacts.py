@@ -98,9 +98,10 @@ def recorded_impacts(
     hammer : Hammer
         The nominal hammer, with a pack and a driver of its coil.
     paths : sequence of path
-        Tables with the columns ``time`` and ``current``, or ``voltage``, in equal time steps.
+        Paths of the records: tables with the columns ``time`` and ``current``, or ``voltage``, in equal time
+        steps.
     signal : str, optional
-        "current" or "voltage".
+        Recorded signal, "current" or "voltage".
     delay : float or str, optional
         Delay of the probe, s.
     bandwidth : float or str, optional
@@ -156,7 +157,11 @@ def recorded_impacts(
 
 
 def _errors_of_units(estimator: ImpactEstimator, units: Sequence[Hammer]) -> tuple[float, float]:
-    """Return RMS errors over units, s: of unflagged estimates, and of the nominal flight time."""
+    """Return two RMS errors over simulated units, s.
+
+    The first is the error of the estimates that are not flagged, the second the error of the nominal flight
+    time as an estimate.
+    """
     records = [unit_record(unit, estimator, estimator.sampling) for unit in units]
     errors, believed = errors_of(estimator, records, len(records), np.random.default_rng(0))
     return root_mean_square(errors[believed]), flight_deviation(estimator, records)

@@ -30,7 +30,7 @@ from printhammer.support.roots import bisect
 COLUMNS: Final = {"voltage": "V", "ambient": "degC", "rate": "Hz"}
 """Columns of a file of permitted dot rates, with their SI units."""
 
-_HIGHEST: Final = 1e4  # Upper end of the search, K above the hottest ambient temperature; arbitrary
+_HIGHEST: Final = 1e4  # Upper end of the search for the limit, K above the hottest ambient; arbitrary
 
 
 class ThermalLimit(Result):

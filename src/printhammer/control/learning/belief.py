@@ -114,8 +114,9 @@ class Belief:
     def draw(self, count: int, seed: int) -> FloatArray:
         """Draw samples of the constants from a widened posterior distribution, shape (count, constants).
 
-        Standard deviations are multiplied by `_CARE`, and modes are drawn by the square roots of their
-        probabilities: where readings are nonlinear in the constants, the Laplace approximation is too narrow.
+        Standard deviations are multiplied by `_CARE`, and modes are drawn in proportion to the square roots
+        of their probabilities: where readings are nonlinear in the constants, the Laplace approximation is
+        too narrow.
         """
         normal = _CARE * np.random.default_rng(seed).standard_normal((count, self.modes[0].mean.size))
         shares = np.cumsum(np.sqrt(self.weights))
@@ -140,7 +141,7 @@ def believe(
 
 
 class _Iterate(NamedTuple):
-    """Current iterate of a Levenberg-Marquardt search."""
+    """Iterate of a Levenberg-Marquardt search for a mode."""
 
     constants: FloatArray  # Constants, in prior standard deviations, (constants,)
     shown: FloatArray  # Predicted readings at these constants, (readings,)
@@ -183,13 +184,20 @@ def _misfit(shown: FloatArray, evidence: Evidence) -> float:
 
 
 def _linearise(constants: FloatArray, shown: FloatArray) -> Search[_Iterate]:
-    """Evaluate the Jacobian of the readings at an iterate by forward differences."""
+    """Build the iterate at `constants`, with the Jacobian of the readings by forward differences.
+
+    `shown` are the readings at `constants`; the constants whose readings must be simulated are yielded.
+    """
     (moved,) = yield [constants + _STEP * np.eye(constants.size)]
     return _Iterate(constants, shown, np.asarray((moved - shown).T / _STEP), fresh=True)
 
 
 def _objective(places: FloatArray, shown: FloatArray, value: FloatArray, noise: FloatArray) -> FloatArray:
-    """Compute the negative log posterior of M rows of constants, up to an additive constant."""
+    """Compute the negative log posterior density for each of M rows of constants, up to a constant.
+
+    `places` contains the constants and `shown` the readings predicted for them; `value` are the measured
+    readings, and `noise` their standard deviations.
+    """
     rest = (value - shown) / noise
     each = (_FREEDOM + 1.0) * np.log1p(rest**2 / _FREEDOM)
     lost = np.isfinite(value) & ~np.isfinite(shown)

@@ -82,9 +82,9 @@ class OpenLoop(NamedTuple):
 class Adjustable:
     """Table entries that are learned: advance and width of print pulses, and width of brake pulses.
 
-    Corrections, arrays of shape (..., inputs) in units of `STEP`, are added to the settings `base`, shape (4,
-    entries): times in s, relative to the slots, for the hammer of `task` with its driver. `rate` is the slot
-    rate, Hz.
+    Settings are arrays of shape (4, entries): advance, width, brake delay and brake width of each table
+    entry, s. Corrections, arrays of shape (..., inputs) in units of `STEP`, are added to the settings `base`,
+    which are tuned for the hammer of `task` with its driver. `rate` is the slot rate, Hz.
     """
 
     task: Task
@@ -115,7 +115,7 @@ class Adjustable:
         return [plain] if self.own is None else [plain, self.own]
 
     def limited(self, before: FloatArray, change: FloatArray) -> FloatArray:
-        """Add a change to corrections, shape (inputs,), and clip the resulting settings to all bounds."""
+        """Return the corrections `before` + `change`, with the resulting settings clipped to all bounds."""
         after = before + np.clip(change, -_LARGEST, _LARGEST)
         rows, columns = self.inputs
         return np.asarray((self._clip(self._raw(after)) - self.base)[rows, columns] / STEP)
@@ -251,7 +251,7 @@ class _Unit(NamedTuple):
 
 @dataclass(frozen=True)
 class LearningLaw:
-    """Learning law common to all units: prior, test pulses and update of corrections; holds no readings."""
+    """Learning law common to all units: prior, test pulses and update of corrections, without readings."""
 
     entries: Adjustable
     production: Production
@@ -268,7 +268,7 @@ class LearningLaw:
 
     @property
     def alone(self) -> float:
-        """Certainty of the choice of open loop before a comparison: 1 for a single open loop, else NaN."""
+        """Certainty of the choice of open loop before readings in all loops: NaN, or 1 for a single loop."""
         return 1.0 if len(self.entries.loops) == 1 else float("nan")
 
     def update(self, belief: Belief, corrections: FloatArray, unexplained: FloatArray) -> Printing[Update]:
@@ -311,7 +311,7 @@ class LearningLaw:
         return Update(found, contraction, verdict, left)
 
     def choose_loop(self, belief: Belief, verdict: Verdict) -> Printing[Verdict]:
-        """Simulate the line `COMPARED` on posterior samples in each open loop, and choose an open loop."""
+        """Choose an open loop by simulation on posterior samples; return `verdict` with this choice."""
         drawn = self.production.hammers(belief.draw(_ALIKE, self.seed))
         press = self.production.press([each for each in drawn if each is not None])
         others = yield from order_loops(press, self.entries)
@@ -377,7 +377,10 @@ class LearningLaw:
         return best
 
     def _by_history(self, unexplained: FloatArray) -> FloatArray:
-        """Average the deviations of a line by history; return the averages for the dots of `TRIED`."""
+        """Average the model error of the test line by history; return the average for each dot of `TRIED`.
+
+        `unexplained` is as for `update`; the result contains the arrivals of all dots, then their forces.
+        """
         task = self.entries.task
         shown, wanted = (histories_of(slots, task.gaps, task.reach)[:-1] for slots in (LINE, TRIED))
         sums = np.zeros((2, shown.max() + 1))
@@ -386,7 +389,11 @@ class LearningLaw:
         return np.asarray((sums / np.maximum(np.bincount(shown), 1))[:, wanted]).ravel()
 
     def _off(self, hammers: Sequence[Hammer], corrections: Sequence[FloatArray]) -> Printing[FloatArray]:
-        """Simulate normalised deviations of arrival and force on the pattern `TRIED`, shape (M, 2 dots)."""
+        """Simulate the pattern `TRIED`, and return the deviations of its dots as fractions of the limits.
+
+        Hammer k prints with the corrections k. A row of the result contains the deviations in arrival of all
+        dots, then the deviations in force.
+        """
         press, limits = self.production.press(hammers), self.entries.task.limits
         known = {id(row): self.entries.settings(row) for row in corrections}
         _dots, judgement = yield from press.order_line([known[id(row)] for row in corrections], TRIED)
@@ -394,7 +401,7 @@ class LearningLaw:
         return np.clip(np.nan_to_num(np.concatenate(off, axis=1), nan=GATE), -GATE, GATE)
 
     def _mean_deviations(self, unit: _Unit, corrections: Sequence[FloatArray]) -> Printing[FloatArray]:
-        """Compute the mean deviations over the posterior modes, plus the model error, shape (M, 2 dots)."""
+        """Compute the mean of `_off` over the posterior modes, plus the model error, a row per correction."""
         hammers = [hammer for _ in corrections for hammer in unit.hammers]
         rows = [row for row in corrections for _ in unit.hammers]
         off = yield from self._off(hammers, rows)
@@ -402,13 +409,13 @@ class LearningLaw:
         return np.asarray(np.einsum("m,kmd->kd", unit.weights, by_hammer) + unit.more)
 
     def _slopes(self, hammer: Hammer, corrections: FloatArray) -> Printing[FloatArray]:
-        """Compute the sensitivity G of the deviations by finite differences, shape (2 dots, inputs)."""
+        """Compute the sensitivity G of the deviations to the corrections, a column each, by differences."""
         rows = [corrections, *(corrections + np.eye(len(corrections)))]
         off = yield from self._off([hammer] * len(rows), rows)
         return np.asarray((off[1:] - off[0]).T)
 
     def _compare(self, alike: Sequence[Hammer], corrections: FloatArray) -> Printing[Verdict]:
-        """Compare a table with open-loop drive on samples of the posterior; return the outcome.
+        """Compare a table with open-loop drive on the hammers `alike`, samples of the posterior.
 
         The table is better if the samples print more dots with the table than in either open loop, and if no
         sample, except for a fraction `doubt`, prints fewer dots or has a row in which errors grow from dot to
@@ -431,7 +438,10 @@ class LearningLaw:
         return Verdict(gains, loops[chosen], most, float(good.mean()), every, self.alone)
 
     def _leads(self, share: FloatArray, others: FloatArray) -> bool:
-        """Whether a drive is better: mean gain at least `_GAIN`, losses on at most `doubt` of the samples."""
+        """Whether a drive with the fractions `share` of good dots is better than all others, in both senses.
+
+        The mean gain is at least `_GAIN`, and at most a fraction `doubt` of the samples print fewer dots.
+        """
         harmless = np.quantile(share - others.max(axis=0), self.doubt) >= 0.0
         return bool(harmless and share.mean() - others.mean(axis=1).max() >= _GAIN)
 
@@ -450,7 +460,7 @@ def better_loop(shares: FloatArray, usual: int) -> tuple[int, float]:
 
 
 def order_loops(press: Press, entries: Adjustable) -> Printing[list[BoolArray]]:
-    """Compute masks of the good dots of `PRINTED`, shape (M, dots), one per open loop, as a coroutine."""
+    """Compute the mask of `order_good` for each open loop, in a coroutine that yields print jobs."""
     count = len(press.hammers)
     return (
         yield from together(
@@ -462,18 +472,24 @@ def order_loops(press: Press, entries: Adjustable) -> Printing[list[BoolArray]]:
 def order_good(
     press: Press, settings: Sequence[FloatArray], pulses: Sequence[Waveform] | None = None
 ) -> Printing[BoolArray]:
-    """Compute the mask of evaluated dots of `PRINTED` within limits, shape (M, dots), as a coroutine."""
+    """Compute which evaluated dots of `PRINTED` are within limits, in a coroutine that yields print jobs.
+
+    The mask has one row per hammer of `press`.
+    """
     _dots, judgement = yield from press.order_line(settings, PRINTED, pulses)
     return np.asarray(judgement.good[:, JUDGED])
 
 
 def _badness(off: FloatArray) -> float:
-    """Compute the objective of the learning law: squared deviations plus weighted fourth powers."""
+    """Compute the objective of the learning law: sum of the squares and weighted fourth powers of `off`."""
     return float(np.sum(off**2 + _STEEP * off**4))
 
 
 def _gain(off: FloatArray, slopes: FloatArray) -> FloatArray:
-    """Compute the gain L, shape (inputs, 2 dots): a pseudo-inverse of G weighted as in `_badness`."""
+    """Compute the gain L of the learning law: a pseudo-inverse of the sensitivity G = `slopes`.
+
+    The deviations `off` are weighted as in `_badness`.
+    """
     weight = 1.0 + 2.0 * _STEEP * off**2
     normal = slopes.T @ (weight[:, None] * slopes) + _DAMPING * len(TRIED) * np.eye(slopes.shape[1])
     return np.asarray(np.linalg.solve(normal, slopes.T * weight))

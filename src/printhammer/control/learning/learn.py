@@ -62,9 +62,10 @@ _SAID: Final = ("multiplier", "expected", "certainty", "loop_certainty")
 
 
 def compare(press: Press, learners: Sequence[Learner], sensor: ImpactSensor) -> None:
-    """Print the line `COMPARED` once in each open loop, and store the readings in the learners.
+    """Print the line `COMPARED` once in each open loop on every unit; store the readings in the learners.
 
-    All learners have the same learning law. With a single open loop nothing is printed.
+    Each hammer of `press` is the unit of one learner; all learners have the same learning law. With a single
+    open loop nothing is printed.
     """
     loops, single = learners[0].law.entries.loops, press.task.single.nominal
     if len(loops) == 1:
@@ -131,7 +132,7 @@ def calibrate(
 def table_of(learner: Learner, base: CompensationTable, driver: str, hammer: Hammer) -> CompensationTable:
     """Convert the drive selected by a learner (a table or an open loop) to a table for a hammer.
 
-    `base` is the starting table, tuned for the hammer as switched by `driver`.
+    `base` is the starting table, tuned for the hammer with the driver `driver` of its coil.
     """
     entries = {key: row[np.newaxis] for key, row in zip(COLUMNS, learner.printed, strict=True)}
     unknown = np.full_like(base.deviation, np.nan)
@@ -332,15 +333,15 @@ def learn(
     noise. From these readings, the constants of the unit and the offset and gain of the sensor are estimated
     by maximum a posteriori estimation with a Laplace approximation. The prior standard deviation of the
     offset is the `offset` of the sensor, or 25 us if the sensor has none; for the gain it is 1 %. Iterative
-    learning control then corrects advance, width and brakes of a table that was tuned for the nominal hammer
-    and the variability of the production. The first line is printed in open loop. The table is used only if
-    the posterior explains the readings, and if no posterior sample prints fewer dots of the test cycle and of
-    rows of 200 slots with the table than in open loop, or a row in which errors grow from dot to dot.
-    Otherwise one of two open-loop drives is used: the pulse of the driver, or the hammer's own pulse. Before
-    the first run, the unit prints a short line with each of the two. The drive that prints more dots over the
-    production is used, unless 90 % of the samples of the posterior from all readings print no fewer dots with
-    the other drive. `loop_certainty` of the result is that fraction for the drive in use; below 0.9, or NaN,
-    the readings do not decide between the two drives.
+    learning control then corrects advance, width and brake pulses of a table that was tuned for the nominal
+    hammer and the variability of the production. The first line is printed in open loop. The table is used
+    only if the posterior explains the readings, and if no posterior sample prints fewer dots of the test
+    cycle and of rows of 200 slots with the table than in open loop, or a row in which errors grow from dot to
+    dot. Otherwise one of two open-loop drives is used: the pulse of the driver, or the hammer's own pulse.
+    Before the first run, the unit prints a short line with each of the two. The drive that prints more dots
+    over the production is used, unless 90 % of the samples of the posterior from all readings print no fewer
+    dots with the other drive. `loop_certainty` of the result is that fraction for the drive in use; below
+    0.9, or NaN, the readings do not decide between the two drives.
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ _LATE: Final = (
 
 
 class Mean(NamedTuple):
-    """Mean normalised readings of dots, and counts: a row of times and, if measured, a row of forces."""
+    """Mean normalised readings of each dot over runs: a row of times and, if measured, a row of forces."""
 
     value: FloatArray  # Mean readings; NaN where no dot was detected
     seen: FloatArray  # Number of readings in each mean
@@ -114,7 +114,7 @@ class Learner:
         self._compared = [mean([self._normalise(line)], noise) for line in lines]
 
     def _normalise(self, readings: Readings) -> FloatArray:
-        """Normalise readings by the limits, shape (measured, dots)."""
+        """Divide readings by the limits; return a row of times and, if measured, a row of forces."""
         limits, shown = self.law.entries.task.limits, [readings.time]
         if self.law.production.measured > 1 and readings.force is not None:
             shown.append(readings.force)
@@ -196,7 +196,11 @@ class Learner:
 
 
 def mean(readings: Sequence[FloatArray], noise: FloatArray) -> Mean:
-    """Average readings over runs; exclude NaN and, if there are at least `_FEWEST` runs, outliers."""
+    """Average the normalised readings of each dot over runs; NaN readings are excluded.
+
+    If there are at least `_FEWEST` runs, outliers are excluded too. `noise` is the standard deviation of a
+    single reading.
+    """
     values = np.stack(readings)
     known = np.isfinite(values)
     if len(values) >= _FEWEST:
@@ -217,7 +221,8 @@ def is_explained(belief: Belief) -> bool:
     """Whether the search reached the finest noise level and its mode explains the readings within noise.
 
     In a row in which errors hardly decay, readings are strongly nonlinear in the constants, and a search may
-    end at a local optimum. The misfit is then above 1 by more than its statistical error, 1 / sqrt(2 N).
+    end at a local optimum. The misfit is then above 1 by more than its statistical error, 1 / sqrt(2 N) for N
+    readings.
     """
     mode = belief.modes[0]
     most = 1.0 + _ERRORS / math.sqrt(2.0 * mode.predicted.size)
@@ -225,7 +230,10 @@ def is_explained(belief: Belief) -> bool:
 
 
 def _model_error(rest: FloatArray, noise: FloatArray) -> FloatArray:
-    """Estimate the model error: residuals (measured, dots), shrunk by the noise; 0 without a reading."""
+    """Estimate the model error of each reading: its residual `rest`, reduced by the part due to noise.
+
+    The model error is 0 where a reading is missing.
+    """
     known = np.isfinite(rest).any(axis=1, keepdims=True)
     size = 1.4826 * np.nanmedian(np.where(known, np.abs(rest), 0.0), axis=1, keepdims=True)
     more = np.maximum(size**2 - noise**2, 0.0)

@@ -59,7 +59,10 @@ class Surrogate:
 
     @classmethod
     def of(cls, rows: FloatArray, values: FloatArray) -> Surrogate:
-        """Fit the readings of hammers to their constants, shape (hammers, constants), by ridge regression."""
+        """Fit a quadratic function of the constants to the readings `values` by ridge regression.
+
+        `rows` contains the constants of the hammers with these readings, shape (hammers, constants).
+        """
         known = np.isfinite(values)
         size = rows.shape[1]
         upper = np.triu_indices(size)
@@ -107,7 +110,10 @@ _POINTS: Final = 24  # Number of simulated hammers over which the design is aver
 
 
 class Rung(NamedTuple):
-    """Single test pulse, or a pair `later` s apart; widths as fractions of the nominal width."""
+    """Single test pulse, or a pair of pulses fired `later` [s] apart; a single pulse has `later` 0.
+
+    `first` and `second` are the widths of the pulses, as fractions of the nominal width.
+    """
 
     first: float
     later: float = 0.0
@@ -120,7 +126,10 @@ class Rung(NamedTuple):
 
 
 def candidates(task: Task) -> list[Rung]:
-    """List the candidate test pulses, single and paired; none fires while the armature is in the pack."""
+    """List the candidate test pulses, single and paired.
+
+    The second pulse of a pair is fired after the armature has left the pack.
+    """
     hammer, widest = task.hammers[0], task.widest / task.width
     rungs = [Rung(part) for part in _SINGLE if part <= widest]
     for first in _FIRST:
@@ -209,7 +218,10 @@ LINE: Final = slots_of(cycle_with_lead_in(5, 0))
 
 
 class DrivenLine(NamedTuple):
-    """Test line and its drive: table settings, shape (4, entries), waveform, and slots with a dot."""
+    """Test line and its drive: table settings, waveform of the pulses, and slots with a dot.
+
+    The settings are advance, width, brake delay and brake width of each entry, s, shape (4, entries).
+    """
 
     settings: FloatArray
     pulse: Waveform
@@ -233,14 +245,17 @@ class Printed(NamedTuple):
 
 @dataclass(frozen=True)
 class Press:
-    """Simulator of test pulses and test lines, which several hammers print at a slot rate in Hz."""
+    """Simulator in which each of M hammers prints test pulses and test lines at the slot rate `rate` [Hz]."""
 
     task: Task
     rate: float
     hammers: Sequence[Hammer]
 
     def ladder(self, rungs: Sequence[Rung]) -> tuple[FloatArray, FloatArray]:
-        """Simulate test pulses (a ladder); return flight times [s] and normalised forces, shape (M, dots)."""
+        """Simulate test pulses (a ladder) on every hammer.
+
+        Returns the flight times [s] and the peak forces relative to the single pulse, shape (M, dots).
+        """
         return printed(self.order_ladder(rungs), self.task)
 
     def line(
@@ -251,16 +266,16 @@ class Press:
     ) -> tuple[DotTable, Judgement]:
         """Simulate a test line on every hammer; return the dots and their deviations.
 
-        `settings` contains one array of shape (4, entries) per hammer. `pulses` are the waveforms, one per
-        hammer; the default is the pulse of the task for all hammers.
+        `settings` contains the table settings for each hammer, as in `DrivenLine`. `pulses` are the
+        waveforms, one per hammer; the default is the pulse of the task for all hammers.
         """
         return printed(self.order_line(settings, slots, pulses), self.task)
 
     def multipliers(self, settings: FloatArray) -> FloatArray:
-        """Compute the multipliers of rows of dots printed with table settings, shape (hammers,).
+        """Compute the multiplier of rows of dots printed with table settings, one value per hammer.
 
-        `settings` has the shape (4, entries). A multiplier is the largest absolute Floquet multiplier of two
-        rows, with a dot in every slot and in every second slot; see
+        `settings` is as in `DrivenLine`. The multiplier is the larger absolute Floquet multiplier of two
+        rows, one with a dot in every slot and one with a dot in every second slot; see
         `printhammer.derivatives.rows.row_multipliers`. The result is NaN if neither row is periodic.
         """
         task, count, drives = self.task, len(self.hammers), []
@@ -272,7 +287,7 @@ class Press:
         return np.asarray(np.fmax.reduce(np.abs(growth).reshape(len(_STEPS), count)))
 
     def order_ladder(self, rungs: Sequence[Rung]) -> Printing[tuple[FloatArray, FloatArray]]:
-        """Compute the readings of `ladder` in a coroutine: yield the print job and receive its result."""
+        """Compute the results of `ladder` in a coroutine: yield the print job and receive its result."""
         task, count = self.task, len(self.hammers)
         drives = []
         for rung in rungs:
@@ -298,7 +313,7 @@ class Press:
         slots: Sequence[int] = LINE,
         pulses: Sequence[Waveform] | None = None,
     ) -> Printing[tuple[DotTable, Judgement]]:
-        """Compute the dots of `line` in a coroutine: yield the print job and receive its result."""
+        """Compute the results of `line` in a coroutine: yield the print job and receive its result."""
         task, due = self.task, slot_times(slots, self.rate)
         fired = [task.pulse] * len(settings) if pulses is None else pulses
         known: dict[int, dict[tuple[float, float, float], Waveform]] = {id(pulse): {} for pulse in fired}

@@ -70,7 +70,7 @@ def law_for(
 ) -> tuple[LearningLaw, CompensationTable]:
     """Prepare learning for a hammer at a slot rate [Hz]; return the learning law and its starting table.
 
-    For the arguments see `printhammer.learn`.
+    `report` is called after each step of the work; for the other arguments see `printhammer.learn`.
     """
     if not 0.0 < forgetting < 1.0:
         raise InputError.of("forgetting", forgetting, "a number above 0 and below 1")
@@ -141,7 +141,10 @@ def _law(
 
 
 def _own_loop(hammer: Hammer, task: Task, base: FloatArray) -> OpenLoop | None:
-    """Build the open loop of the hammer's own pulse, shifted to the arrival time of the driver's pulse."""
+    """Build the open loop of the hammer's own pulse, fired so that dots arrive as with the driver's pulse.
+
+    `base` has the shape of table settings. The result is None if the own pulse has no width.
+    """
     pulse: Any = hammer.waveform
     if not isinstance(getattr(pulse, "width", None), float):
         return None

@@ -71,7 +71,7 @@ class Production:
 
     @property
     def noise(self) -> FloatArray:
-        """Standard deviations of a time and a force reading, normalised by the limits, shape (measured,)."""
+        """Standard deviation of a time reading and, if measured, of a force reading, over the limits."""
         limits = self.task.limits
         return np.array([self.sensor.noise / limits.arrival, (self.sensor.force or 0.0) / limits.force])[
             : self.measured
@@ -88,9 +88,10 @@ class Production:
     def readings(
         self, rows: FloatArray, rungs: Sequence[Rung], lines: Sequence[DrivenLine]
     ) -> Printing[FloatArray]:
-        """Predict the readings of test pulses and test lines for parameter rows, shape (M, size).
+        """Predict the readings of test pulses and test lines for M parameter rows, shape (M, size).
 
-        The result, shape (M, measured * dots), is normalised by the limits; NaN where a dot is lost.
+        A row of the result contains the impact times of all dots and then, if measured, their forces, both
+        divided by the limits; NaN for a lost dot.
         """
         hammers = self.hammers(rows)
         there = [k for k, hammer in enumerate(hammers) if hammer is not None]
@@ -120,6 +121,6 @@ class Production:
 def _readings_of(
     line: Printing[tuple[DotTable, Judgement]], force: float
 ) -> Printing[tuple[FloatArray, FloatArray]]:
-    """Extract flight times [s] and forces, as fractions of `force`, from the dots of a print job."""
+    """Run the print job `line`; return the flight times [s] and the peak forces, divided by `force` [N]."""
     dots, _judgement = yield from line
     return dots.flight_time, dots.peak_force / force

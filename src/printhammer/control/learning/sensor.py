@@ -58,7 +58,10 @@ class ImpactSensor(Declared):
             raise InputError.of("seed", self.seed, "a whole number not below 0", file="sensor")
 
     def read(self, flight: FloatArray, force: FloatArray, unit: int, run: int) -> Readings:
-        """Simulate readings of N dots from true flight times [s] and forces; NaN for lost dots."""
+        """Simulate the readings of dots with given true flight times [s] and relative forces, NaN if lost.
+
+        `unit` and `run` are the numbers of unit and run, of which the noise is a function.
+        """
         rng = np.random.default_rng((self.seed, unit, run))
         time = (1.0 + self.gain) * flight + self.delay + self.noise * self._noise(rng, flight.size)
         if self.offset:
