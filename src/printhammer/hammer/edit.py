@@ -105,7 +105,10 @@ def _term_edit(document: Mapping[str, Any], key: str, value: Any, status: str, s
 
 
 def _term_item(section: str, law: Any, key: str, value: Any, status: str, source: str) -> Any:
-    """Convert the value of a constant or option of an entry of ``[[force]]`` or ``[[contact]]`` to TOML."""
+    """Convert the value of a constant or option of an entry of ``[[force]]`` or ``[[contact]]`` to TOML.
+
+    `key` is the dotted key of the constant or option, `law` the law of the entry.
+    """
     model = TERMS[section].get(law)
     if model is None:
         place = key.rpartition(".")[0]
@@ -140,7 +143,7 @@ def _constant(key: str, si_unit: str, value: Any, status: str, source: str) -> d
 
 
 def _table(section: str, value: Any, status: str, source: str) -> dict[str, Any]:
-    """Convert a part, a waveform or a mapping to a TOML table of a hammer file."""
+    """Convert a part, a waveform or a mapping to the TOML table `section` of a hammer file."""
     selector = SELECTORS[section]
     content = dict(value) if isinstance(value, Mapping) else _fields(section, value)
     if content.get(selector, UNSAID.get(section)) not in kinds_of(section):
@@ -186,7 +189,7 @@ def _fields(section: str, value: Any) -> dict[str, Any]:
 
 
 def changed(document: Mapping[str, Any], edits: Iterable[Edit]) -> dict[str, Any]:
-    """Return a copy of a parsed document with edits applied; unedited values are shared."""
+    """Return a copy of a parsed document with edits applied; unedited values are shared with the original."""
     result = dict(document)
     for key, value in edits:
         section, _, name = key.rpartition(".")
@@ -264,7 +267,10 @@ def _put_entry(document: MutableMapping[str, Any], key: str, value: Any, table: 
 
 
 def _put(document: MutableMapping[str, Any], key: str, value: Any, table: Callable[..., Any]) -> None:
-    """Set a key such as "mass" or "pack.stiffness" in a document; None deletes the key."""
+    """Set a key such as "mass" or "pack.stiffness" in a document; None deletes the key.
+
+    `table` converts a mapping to a TOML table.
+    """
     section, _, name = key.rpartition(".")
     holder: Any = document.setdefault(section, {}) if section else document
     if value is None:

@@ -82,7 +82,7 @@ class EquilibriumPicture:
     margin: FloatArray
     """Holding margin at each displacement of `x`, N."""
     weakest: tuple[float, float]
-    """Displacement, m, and value, N, of the smallest holding margin on the grid `x`."""
+    """Smallest holding margin on the grid `x`: its displacement, m, and its value, N."""
     positive_intervals: tuple[tuple[float, float], ...]
     """Intervals of x, m, where the net force at zero current drives the armature toward the paper."""
 
@@ -90,10 +90,16 @@ class EquilibriumPicture:
 def rest_state(hammer: HammerLike) -> float:
     """Return the displacement at which the armature rests at zero current, m.
 
-    If the net force of magnet and spring presses the armature against a backstop, the armature rests at the
-    equilibrium in contact, which compresses the backstop (a rigid backstop: at its position). If a hammer
-    with a magnet has no net force at the backstop, the armature rests there. In all other cases the armature
-    rests at the stable equilibrium nearest to the origin.
+    If the net force of magnet and spring presses the armature against an elastic backstop, the armature rests
+    where the compressed backstop balances this net force; on a rigid backstop, it rests at the position of
+    the backstop. If the net force at the backstop is zero, and the hammer has a magnet or a rigid pack, the
+    armature rests at the position of the backstop. In all other cases the armature rests at the stable
+    equilibrium nearest to the origin.
+
+    Raises
+    ------
+    InputError
+        The hammer has no rest state, e.g. because magnet and spring pull the armature off the backstop.
     """
     out = [math.nan, math.nan]
     code = rest_position(statics_of(hammer), _work(), out)
@@ -112,10 +118,10 @@ def equilibria(
 ) -> list[Equilibrium]:
     """Find all equilibria of the armature at a constant current, in ascending order.
 
-    The search runs from the lower limit of the magnet's law (or the rigid backstop) to the platen, or else to
-    the end of the pack or of the magnet's law. Without such limits it covers 1 m on either side of the
-    origin, extended to 10, 100 and 1000 m as long as no stable equilibrium is found. Intervals without any
-    force are excluded.
+    The search covers the displacements at which the laws of magnet and spring are valid, from a rigid
+    backstop on, and up to the platen or, without a platen, to the back of the pack. It is also limited to 1 m
+    on either side of the origin, extended to 10, 100 and 1000 m as long as no stable equilibrium is found.
+    Intervals in which the net force is zero throughout are not reported.
 
     Parameters
     ----------
@@ -124,12 +130,12 @@ def equilibria(
     current
         Coil current, A.
     within
-        Limits of the search, m, instead of the default limits.
+        Lower and upper end of the search interval, m, instead of the default interval.
 
     Raises
     ------
     InputError
-        The current is not finite or outside the range of the magnet's law, or the limits are empty.
+        The current is not finite or outside the range of the magnet's law, or the search interval is empty.
     """
     force = StaticForce(hammer)
     smallest, largest = _currents(hammer)
@@ -197,11 +203,11 @@ def holding_margin(hammer: HammerLike, x: npt.ArrayLike) -> FloatArray:
 
 
 def positive_intervals(hammer: HammerLike) -> list[tuple[float, float]]:
-    """Return the intervals of the stroke where the net force at zero current is positive; ends in m.
+    """Return the intervals of displacement [m] in which the net force at zero current is positive.
 
-    In such an interval magnet and spring drive the armature toward the paper, and the armature may never
-    return. The search covers backstop to platen, or to the back of the pack; the list is empty without a
-    backstop.
+    In such an interval the net force of magnet and spring drives the armature toward the paper, and the
+    armature may never return to the backstop. The search runs from the backstop to the platen or, without a
+    platen, to the back of the pack. The list is empty for a hammer without a backstop.
     """
     if hammer.backstop is None:
         return []
@@ -301,7 +307,7 @@ def _equilibrium_at(force: StaticForce, root: Root, current: float) -> Equilibri
 
 
 def _is_stable(root: Root, force: StaticForce) -> bool:
-    """Whether the force points to the root from both sides; a rigid stop at the root replaces this force."""
+    """Whether the force drives the armature back to the root from each side that no rigid stop blocks."""
     return is_stable(root.x, root.before, root.after, force.statics)
 
 
@@ -324,7 +330,7 @@ def _roots(force: StaticForce, current: float, within: tuple[float, float] | Non
 
 
 def _same_rest(force: StaticForce, current: float, within: tuple[float, float] | None) -> list[Root]:
-    """Find all roots of the net force; the root at the backstop equals the result of `rest_state` exactly."""
+    """Find all roots of the net force; the root at the backstop is exactly the result of `rest_state`."""
     crossings = _roots(force, current, within)
     backstop = force.hammer.backstop
     if backstop is None or force.rigid or not force.free(backstop.position, current) < 0.0:
@@ -337,13 +343,13 @@ def _same_rest(force: StaticForce, current: float, within: tuple[float, float] |
 
 
 def _grid(force: StaticForce, low: float, high: float) -> list[float]:
-    """Return a search grid between two limits: evenly spaced points, with clusters around the anchors."""
+    """Return a search grid from `low` to `high` [m], ascending and without duplicates; see `fill_grid`."""
     places = [0.0] * MOST_PLACES
     return sorted(set(places[: fill_grid(low, high, force.statics, places)]))
 
 
 def _away_from_zero(first: float, limit: float) -> list[float]:
-    """Return 0 and a geometric sequence of currents [A] up to `limit`, with 12 points per decade."""
+    """Return 0 and a geometric sequence of currents from `first` to `limit` [A], 12 points per decade."""
     if limit <= first:
         return [0.0, limit]
     count = max(2, math.ceil(12.0 * math.log10(limit / first)) + 1)

@@ -148,7 +148,10 @@ def build(
 
 
 def model_of(section: str, kind: str) -> type[BaseModel]:
-    """Return the model class of a table with a given law or shape, such as the table "pack", law "power"."""
+    """Return the class that holds a table of a hammer file, such as the class of "pack" with the law "power".
+
+    `section` is the name of the table, `kind` its law or shape.
+    """
     if section == "waveform":
         from printhammer.drive.waveforms.shapes import SHAPES
 
@@ -169,7 +172,10 @@ def kinds_of(section: str) -> tuple[str, ...]:
 
 
 def file_options(model: type[BaseModel]) -> dict[str, Any]:
-    """List the options of a model that a file may set: all but `quantity`, which follows from the unit."""
+    """Return the options of a part or waveform class that a hammer file may set, with their types.
+
+    These are all options but `quantity`, which follows from the unit of the amplitude.
+    """
     return {name: kind for name, kind in options(model).items() if name != "quantity"}
 
 
@@ -361,7 +367,8 @@ def _read(
 ) -> _M:
     """Parse the constants and options of one table into its model; add the constants to `constants`.
 
-    Constants that are the identical objects in the table `before` are copied from the contents `read`.
+    `before` is the same table of an earlier document, and `read` the contents parsed from that document: a
+    constant that is the identical object in both tables is copied from `read`.
     """
     known, choices = quantities(model), file_options(model)
     _check_keys(table, (*known, *choices), prefix)

@@ -78,7 +78,7 @@ def load(name_or_path: str | Path) -> Hammer:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Hammer:
-    """Actuator: armature, magnet, coil, spring, backstop, the pack that the armature strikes, waveform.
+    """Actuator: armature, magnet, coil, spring and backstop, the pack that is struck, and the waveform.
 
     Created by `load` or `Hammer.from_toml`. Two hammers are equal if their files have equal contents.
     """
@@ -117,7 +117,7 @@ class Hammer:
         source: str = "given in Python",
         **parts: Any,
     ) -> Hammer:
-        """Build a hammer from parts, such as a textbook impact oscillator.
+        """Build a hammer, such as a textbook impact oscillator, from its parts.
 
         Parameters
         ----------
@@ -249,7 +249,7 @@ class Hammer:
 
     @property
     def laws(self) -> dict[str, str]:
-        """Laws of parts, forces and contacts, and the shape of the waveform, by table of the file."""
+        """Law of each part, force and contact, and shape of the waveform, by table of the hammer file."""
         laws = {role: part.law for role, part in self.parts.items()}
         for role, part in (("spring", self.spring), ("damping", self.damping)):
             if isinstance(part, (ForceSum, DryFriction)):
@@ -296,10 +296,10 @@ class Hammer:
 
     @cached_property
     def fingerprint(self) -> str:
-        """Digest of the physics: laws, SI values, options and tables, in hexadecimal.
+        """Hexadecimal digest of the physics of the hammer: laws, SI values, options and tables.
 
         Names, notes, units, sources, statuses, errors, comments and file names do not affect the digest; an
-        option or constant at its default equals a missing option or constant.
+        option or constant at its default counts as missing.
         """
         content: dict[str, Any] = {"mass": self.mass.hex()}
         if self.platen is not None:
@@ -343,7 +343,7 @@ class Hammer:
         return self._with(wanted, status, source, f"{self._where.removesuffix(_CHANGED)}{_CHANGED}")
 
     def _with(self, wanted: Mapping[str, Any], status: str, source: str, where: str) -> Hammer:
-        """Return a new hammer with the values of `wanted` replaced; error messages begin with `where`."""
+        """Return a new hammer, the keys in `wanted` set to their values; messages begin with `where`."""
         document = dict(self._document)
         edits: list[Edit] = []
         with located(where):
@@ -396,7 +396,7 @@ class Hammer:
         return {key: name for key, name in names.items() if name}
 
     def _tables(self, target: Path) -> dict[str, bytes]:
-        """Return the contents, by name, of the tables that are missing in the folder of the file `target`."""
+        """Return the contents, by file name, of the tables that are missing in the folder of `target`."""
         missing: dict[str, bytes] = {}
         for name in self.files.values():
             if Path(name).is_absolute():
@@ -416,13 +416,13 @@ class Hammer:
         return rest_state(self)
 
     def check(self) -> None:
-        """Raise InputError if a hammer with magnet and backstop does not rest at the backstop.
+        """Check that the armature of a hammer with magnet and backstop rests at the backstop.
 
         Raises
         ------
         InputError
-            At the backstop, the net force at zero current is not negative, or compresses the backstop
-            beyond the range of the magnet's law.
+            At zero current, the net force of magnet and spring pulls the armature off the backstop, or
+            compresses the backstop beyond the range of the magnet's law.
         """
         if self.magnet is not None and self.backstop is not None:
             with located(self._where):

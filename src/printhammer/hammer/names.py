@@ -7,7 +7,7 @@ name                   meaning
 ``pack.stiffness``     constant of a part, spelled as in a hammer file
 ``waveform.width``     constant of the fired pulse: the waveform of the hammer or of the drive
 ``period``, ``rate``   time between firings and firings per second, of a train or of a force
-``drive.amplitude``    constant of a continuous periodic force, as is ``drive.phase``
+``drive.amplitude``    constant of a sinusoidal force, as is ``drive.phase``
 =====================  ========================================================================
 
 The unit, meaning and bounds of a constant are declared once, with its part or waveform

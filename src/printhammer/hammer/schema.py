@@ -67,13 +67,16 @@ def _term(section: str, law: str, model: type[BaseModel]) -> dict[str, Any]:
 
 
 def _table(section: str, kind: str, selector: str) -> dict[str, Any]:
-    """Return the schema of a part or waveform table with the law or shape `kind`."""
+    """Return the schema of a part or waveform table; `selector` is the key of its law or shape `kind`."""
     needed = [] if UNSAID.get(section) == kind else [selector]
     return _described(model_of(section, kind), {selector: {"const": kind}}, needed)
 
 
 def _described(model: type[BaseModel], properties: dict[str, Any], needed: list[str]) -> dict[str, Any]:
-    """Return the schema of a table with `properties` and the constants and options of a model."""
+    """Return the schema of a table with the given `properties` and the constants and options of `model`.
+
+    `needed` lists the properties that are required in addition to the required constants and options.
+    """
     properties |= _constants(model)
     for name, annotation in file_options(model).items():
         description = model.model_fields[name].description

@@ -56,8 +56,8 @@ class StaticForce:
     Magnet, spring and the elastic force of the backstop are functions of x; the pack acts on its loading
     branch, as when fresh paper is pressed slowly. A `rigid` backstop excludes positions below its surface.
     `limits` [m] is the range in which the laws are valid and no rigid backstop is penetrated. `low`
-    and `high` [m] bound the default search for equilibria: from the lower limit to the platen, the end of the
-    pack or the upper limit, and at most 1 m from the origin.
+    and `high` [m] bound the default search for equilibria: from the lower limit to the platen, the back of
+    the pack or the upper limit, and at most 1 m from the origin.
     """
 
     def __init__(self, hammer: HammerLike) -> None:
@@ -99,8 +99,8 @@ class StaticForce:
     def slope(self, x: float, current: float = 0.0) -> float:
         """Compute the derivative of the total force, contacts included, with respect to x, N/m.
 
-        Each part is differentiated separately, within its contact or range; the backstop with respect to
-        sqrt(depth), in which its laws are smooth.
+        The force of each part is differentiated separately, from points within the same contact or range.
+        The force of the backstop is differentiated as a function of sqrt(depth), in which it is smooth.
         """
         room = min(x - self.statics.low, self.statics.high - x)
         step = 0.05 * room if math.isfinite(room) else 1e-3
@@ -169,7 +169,7 @@ def statics_of(hammer: HammerLike) -> Statics:
 
 
 def derivative(function: Callable[[float], float], x: float, step: float) -> float:
-    """Differentiate a function by central differences, extrapolated to step size 0.
+    """Differentiate a function at `x` by central differences, from step size `step` extrapolated to 0.
 
     C. J. F. Ridders, Adv. Eng. Software 4 (1982) 75.
     """
@@ -195,7 +195,7 @@ def derivative(function: Callable[[float], float], x: float, step: float) -> flo
 def law_of(
     hammer: HammerLike, part: Part | None, name: str
 ) -> tuple[Callable[..., float], tuple[float, ...]]:
-    """Return the compiled law function of a part and its packed constants."""
+    """Return the compiled law function `name` of a part, and the packed constants of the part."""
     standard: Callable[..., float] = getattr(absent, name)
     if part is None:
         return standard, ()

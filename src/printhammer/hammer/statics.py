@@ -89,7 +89,7 @@ def free_force(x: float, current: float, s: Statics) -> float:
 
 
 def total_force(x: float, current: float, s: Statics) -> float:
-    """Return the net force including the contacts, N; the pack on its loading branch."""
+    """Return the net force including the contacts, N; the pack acts on its loading branch."""
     force = float(s.magnet_force(s.magnet, x, current)) + float(s.spring_force(s.spring, x))
     depth = s.position - x
     if depth > 0.0 and not s.rigid:
@@ -105,7 +105,10 @@ def force_at(x: float, about: tuple[float, Statics]) -> float:
 
 
 def nearest_level(x: float, s: Statics) -> float:
-    """Return the distance [m] from `x` to the nearest other kink of the spring law, or infinity."""
+    """Return the distance [m] from `x` to the nearest kink of the spring law; infinity without such a kink.
+
+    A kink at `x` itself is ignored.
+    """
     nearest = math.inf
     k = 0.0
     level = float(s.spring_level(s.spring, k))
@@ -141,9 +144,10 @@ def reach_of(far: float, s: Statics) -> tuple[float, float]:
 
 
 def compressed(current: float, low: float, s: Statics) -> float:
-    """Return the equilibrium in a compressed elastic backstop that is nearest to the surface, m.
+    """Return the displacement [m] at which a compressed elastic backstop balances magnet and spring.
 
-    The result is NaN without an equilibrium above `low` [m].
+    Of several such equilibria, the equilibrium nearest to the surface of the backstop is returned; NaN if
+    there is none above `low` [m]. `current` is the coil current, A.
     """
     depth = max(NEAREST, spacing(s.position))
     above = s.position
@@ -170,14 +174,25 @@ def spacing(x: float) -> float:
 
 
 def is_stable(x: float, before: float, after: float, s: Statics) -> bool:
-    """Whether the force points to a root from both sides; a rigid stop at the root replaces this force."""
+    """Whether the force drives the armature back to the root `x` from each side that no rigid stop blocks.
+
+    `before` and `after` are the force, or its sign, just below and just above the root.
+    """
     low, high = limits_of(s)
     held = before > 0.0 or (s.rigid and x == low)
     return held and (after < 0.0 or (s.rigid_front and x == high))
 
 
 def put_cluster(anchor: float, sign: float, limit: float, grid: Any, count: int) -> int:
-    """Append an anchor and a geometric sequence of points on its side `sign`; return the new point count."""
+    """Append an anchor and points on one side of it to the first `count` points of a grid.
+
+    The distances of the points from the anchor, times `sign`, form a geometric sequence up to `limit` [m].
+
+    Returns
+    -------
+    int
+        New number of points of the grid.
+    """
     grid[count] = anchor
     if limit <= NEAREST:
         grid[count + 1] = anchor + sign * limit
@@ -194,7 +209,10 @@ def put_cluster(anchor: float, sign: float, limit: float, grid: Any, count: int)
 
 
 def fill_grid(low: float, high: float, s: Statics, grid: Any) -> int:
-    """Write an unsorted search grid between two limits, m: evenly spaced points, and clusters at anchors.
+    """Write an unsorted search grid from `low` to `high` [m] into `grid`.
+
+    The grid consists of evenly spaced points, and of clusters of points at the anchors: the backstop, the
+    front of the pack, the origin, and the ends of the range.
 
     Returns
     -------
@@ -236,13 +254,13 @@ class Work(NamedTuple):
 
 
 def equilibria_between(low: float, high: float, current: float, s: Statics, work: Work) -> int:
-    """Find the roots of the net force between two limits, m; return their number."""
+    """Write the roots of the net force from `low` to `high` [m] into `work.found`; return their number."""
     count = work.ascending(work.grid, fill_grid(low, high, s, work.grid))
     return int(find_roots(force_at, (current, s), work.grid, count, work.places, work.values, work.found))
 
 
 def has_stable(count: int, s: Statics, work: Work) -> bool:
-    """Whether any root of the net force is a stable equilibrium."""
+    """Whether any of the first `count` roots in `work.found` is a stable equilibrium."""
     found = False
     for k in range(count):
         found = found or is_stable(work.found[k, 0], work.found[k, 1], work.found[k, 2], s)
@@ -255,8 +273,8 @@ def rest_position(s: Statics, work: Work, out: Any) -> int:
     Returns
     -------
     int
-        Outcome, such as `RESTS`. For `RESTS`, ``out[0]`` is the position [m]; otherwise ``out[1]`` is the
-        number stated in the error message: end of the range, m, or force at the backstop, N.
+        Outcome, such as `RESTS`. For `RESTS`, ``out[0]`` is the position [m]; otherwise `out` contains the
+        numbers stated in the error message: ends of the range, m, or force at the backstop, N.
     """
     first, last = reach_of(FARTHER[0], s)
     if s.position > -math.inf:

@@ -53,7 +53,10 @@ class Uncertainty:
         return Uncertainty(keys, self.covariance[np.ix_(rows, rows)], self.records)
 
     def table(self, units: Mapping[str, str]) -> dict[str, Any] | None:
-        """Return the table for a hammer file, with SI `units` by key; None if every constant is exact."""
+        """Return the table ``[uncertainty]`` of a hammer file; None if every constant is exact.
+
+        `units` contains the SI unit of each constant, by key.
+        """
         errors = np.sqrt(self.covariance.diagonal())
         exact = [key for key, error in zip(self.keys, errors.tolist(), strict=True) if not error > 0.0]
         if exact:
