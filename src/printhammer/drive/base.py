@@ -95,11 +95,15 @@ class Drive:
         return self._segments
 
     def kernel_arrays(self) -> tuple[FloatArray, IntArray, FloatArray, bool, bool]:
-        """Return the arrays of the drive for the kernel, as a tuple.
+        """Return the arrays of the drive for the kernel.
 
-        The arrays are the firing times [s], the first row of each firing's segment table, and all segment
-        tables, stacked by `printhammer.drive.segments.stacked`. Two flags follow: whether pulses replace each
-        other, and whether the drive is a force.
+        Returns
+        -------
+        tuple
+            In this order: firing times [s]; for each firing, the index of the first row of its segment table
+            in the stacked tables; the segment tables, stacked by `printhammer.drive.segments.stacked`;
+            whether each pulse replaces the preceding pulse, instead of being added; whether the drive is a
+            force.
         """
         return self._times, self._begins(), self._pieces, self._overlap == "replace", self.quantity == "force"
 
@@ -138,7 +142,7 @@ class Drive:
         return largest_sum(np.unique(np.add.outer(shortest.times, self._segments[:, 0])), shortest.value)
 
     def scaled(self, factor: float) -> Self:
-        """Return a copy of the drive with all values scaled by `factor`."""
+        """Return a copy of the drive with its current, force or voltage scaled by `factor`."""
         return self._with_waveform(self._waveform.scaled(read_number(factor, "1", "factor")))
 
     def to_toml(self) -> str:

@@ -44,19 +44,22 @@ class Ragged:
 
     @classmethod
     def of(cls, rows: Sequence[npt.NDArray[Any]]) -> Self:
-        """Concatenate a sequence of rows."""
+        """Create a `Ragged` from a sequence of rows."""
         counts = np.array([len(row) for row in rows], dtype=np.int64)
         return cls(np.concatenate(rows) if rows else np.zeros(0), starts_of(counts))
 
     @classmethod
     def even(cls, table: npt.NDArray[Any]) -> Self:
-        """Convert a table, shape (rows, columns), to rows of equal length."""
+        """Create a `Ragged` with rows of equal length from a table, shape (rows, columns)."""
         rows, columns = table.shape
         return cls(table.ravel(), columns * np.arange(rows + 1, dtype=np.int64))
 
     @classmethod
     def sorted_by(cls, keys: npt.NDArray[Any]) -> Self:
-        """Group indices by key: one row per distinct key, with the indices of the entries with that key."""
+        """Group the indices of `keys` by value: one row per distinct value, in ascending order.
+
+        Each row contains the ascending indices at which `keys` has this value.
+        """
         _, counts = np.unique(keys, return_counts=True)
         return cls(np.argsort(keys, kind="stable"), starts_of(counts))
 
@@ -100,7 +103,7 @@ class Ragged:
         return type(self)(self.values[self.places(rows)], starts_of(self.counts[rows]))
 
     def filled(self, columns: int | None = None) -> npt.NDArray[Any]:
-        """Return the rows as a table of `columns` columns, by default the longest row, padded with NaN."""
+        """Return the rows as a table, padded with NaN to `columns` columns (by default: the longest row)."""
         counts, width = self.counts, self.longest if columns is None else columns
         shape = (len(self), width, *self.values.shape[1:])
         if (counts == width).all():
@@ -149,7 +152,7 @@ class PulseTrains(Sequence[PulseTrain]):
         overlap: Overlap = "add",
         start: float | str = 0.0,
     ) -> Self:
-        """Create pulse trains of equal length at constant rates [Hz]; the first firing is at `start` [s]."""
+        """Create trains of `pulses` firings, one per rate [Hz]; each train begins at time `start` [s]."""
         grid = read_array(rates, "rates", "numbers, Hz", "Hz").reshape(-1)
         steps = np.arange(read_count(pulses, "pulses"), dtype=np.float64)
         with np.errstate(all="ignore"):
@@ -252,7 +255,7 @@ class PulseTrains(Sequence[PulseTrain]):
 
 
 def firings_of(drives: Sequence[Drive]) -> Ragged:
-    """Return the firing times of several drives, s."""
+    """Return the firing times of several drives, s, one row per drive."""
     return drives.firings if isinstance(drives, PulseTrains) else Ragged.of([drive.times for drive in drives])
 
 

@@ -194,7 +194,7 @@ def _required(table: Mapping[str, Any], keys: tuple[str, ...], name: str) -> Non
 
 
 def _arguments(table: dict[str, Any], kind: str) -> dict[str, Any]:
-    """Parse the keys of a timing table; return the values in SI."""
+    """Parse the table `kind` of a drive file, such as "train"; return its values in SI, by key."""
     _known(table, set(_KEYS[kind]), kind)
     result: dict[str, Any] = {}
     for key, value in table.items():

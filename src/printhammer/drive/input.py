@@ -24,7 +24,15 @@ SPACING_UNITS: Final = {"rate": "Hz", "period": "s"}
 
 
 def read_number(value: float | str, si: str, name: str) -> float:
-    """Parse a number in SI or a string with a unit."""
+    """Parse a number in SI or a string with a unit, such as "1.2 kHz"; return the value in SI.
+
+    `si` is the SI unit, and `name` the name of the argument in error messages.
+
+    Raises
+    ------
+    InputError
+        The number is not finite, or the string is not a quantity of the dimension of `si`.
+    """
     if isinstance(value, str):
         from printhammer.units import parse
 
@@ -79,7 +87,8 @@ def read_count(value: SupportsIndex | None, name: str, least: int = 1) -> int:
 def read_array(values: npt.ArrayLike, name: str, what: str = "numbers", si: str = "") -> FloatArray:
     """Parse numbers into a new float array of any shape.
 
-    With a unit `si`, a list may contain text with units besides numbers in SI.
+    If `si` is a unit, a list may contain strings with units in addition to numbers in SI. Error messages
+    state the argument `name` and the expectation `what`.
     """
     if si and isinstance(values, (list, tuple)) and any(isinstance(value, str) for value in values):
         return np.array([read_number(value, si, name) for value in values], dtype=np.float64)
@@ -96,7 +105,9 @@ def even_times(
 
     Returns
     -------
-    The firing times [s]; the name of the passed argument, "rate" or "period", and its value; the period [s].
+    tuple
+        In this order: the firing times [s]; the pair of the name of the passed argument, "rate" or "period",
+        and its value in SI; the period [s].
     """
     steps = np.arange(count, dtype=np.float64)
     if rate is not None:

@@ -74,7 +74,9 @@ def stacked(tables: Sequence[FloatArray]) -> tuple[list[int], FloatArray]:
 
     Returns
     -------
-    The index of the first row of each table; the stacked rows, shape (all rows, 6), read-only.
+    tuple
+        In this order: for each table of `tables`, the index of its first row in the stacked rows; the stacked
+        rows, shape (all rows, 6), read-only.
     """
     order = sorted(range(len(tables)), key=lambda number: float(tables[number][-1, 0]))
     begins, row = [0] * len(tables), 0
@@ -119,7 +121,11 @@ def evaluate(segments: FloatArray, t: npt.ArrayLike, fired: npt.ArrayLike = 0.0)
 
 @lru_cache(maxsize=_KEPT)
 def filled(shape: int, fields: tuple[float, ...]) -> FloatArray:
-    """Build the segment table of a shape, read-only; `shape` is a code of `printhammer.drive.tables`."""
+    """Build the segment table of a waveform of a given shape, read-only.
+
+    `shape` is a code of `printhammer.drive.tables`, and `fields` the constants of the shape, in order of
+    declaration.
+    """
     rows = np.empty((ROWS, COLUMNS))
     result = rows[: fill_table(shape, fields, rows)].copy()
     result.flags.writeable = False

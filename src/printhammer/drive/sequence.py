@@ -118,7 +118,7 @@ class PulseSequence(Drive):
         return largest_sum(np.unique(np.concatenate([some.ravel() for some in edges])), self.value)
 
     def scaled(self, factor: float) -> Self:
-        """Return a copy of the drive with all values scaled by `factor`; errors as for `Drive.scaled`."""
+        """Return a copy of the drive with its currents, forces or voltages scaled by `factor`."""
         number = read_number(factor, "1", "factor")
         scaled = {id(waveform): waveform.scaled(number) for waveform in self._waveforms}
         result = copy(self)

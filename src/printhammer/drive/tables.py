@@ -139,12 +139,20 @@ def series_of(fields: Any) -> float:
 
 
 def put_on(fields: Any, table: Any, row: int, at: float, upper: float, lower: float) -> int:
-    """Write the on segment of a driver, from time `at` [s]; return the index of the next row."""
+    """Write the segment of a driver with the supply on; return the index of the next row.
+
+    The segment begins at time `at` [s] after the firing. `upper` and `lower` are the coil currents [A] at
+    which the chopper turns off and on again; a negative `lower` is minus the off-time [s]. An infinite
+    `upper` stands for a supply without a chopper.
+    """
     return put(table, row, at, SWITCHED, fields[_VOLTAGE], series_of(fields), upper, lower)
 
 
 def put_off(fields: Any, table: Any, row: int, at: float) -> int:
-    """Write the off segment of a driver, from time `at` [s], and the end row; return the number of rows."""
+    """Write the segment of a driver with the supply off, and the end row; return the number of rows.
+
+    The segment begins at time `at` [s] after the firing.
+    """
     decay = fields[len(fields) - 1]
     against = fields[_DECAY_VOLTAGE]
     if math.isnan(against):
@@ -161,7 +169,7 @@ def rail(fields: Any, table: Any) -> int:
 
 
 def chopper(fields: Any, table: Any) -> int:
-    """Write the segments of a chopped pulse, by thresholds or off-time; return the row count."""
+    """Write the segments of a pulse chopped by two thresholds or a fixed off-time; return the row count."""
     upper, lower, off_time = fields[_OWN], fields[_OWN + 1], fields[_OWN + 2]
     if math.isnan(lower):
         lower = -off_time
@@ -182,7 +190,7 @@ def capacitor(fields: Any, table: Any) -> int:
 
 
 def bridge(fields: Any, table: Any) -> int:
-    """Write the segments of an H-bridge pulse: supply on, reversed, off; return the row count."""
+    """Write the segments of an H-bridge pulse: supply on, reversed, then off; return the row count."""
     rows = put_on(fields, table, 0, 0.0, math.inf, 0.0)
     rows = put(table, rows, fields[_WIDTH], SWITCHED, -fields[_VOLTAGE], series_of(fields), math.inf, 0.0)
     return put_off(fields, table, rows, fields[_WIDTH] + fields[_OWN])
@@ -232,7 +240,10 @@ def fill_values(table: Any, times: Any, values: Any) -> None:
 
 
 def largest_inside(kind: float, p0: float, p1: float, p2: float, p3: float, length: float) -> float:
-    """Return the largest absolute value of a segment of duration `length` [s]: at its ends or extrema."""
+    """Return the largest absolute value of a segment of duration `length` [s].
+
+    The ends of the segment and the extrema inside the segment are compared.
+    """
     best = abs(segment_value(kind, p0, p1, p2, p3, 0.0))
     if not math.isinf(length):
         best = max(best, abs(segment_value(kind, p0, p1, p2, p3, length)))
@@ -325,27 +336,28 @@ def fill_table(shape: int, fields: Any, table: Any) -> int:
 
 
 def pulse(shape: int, fields: Any, table: Any, about: Any) -> int:
-    """Write the segment table of a pulse, and numbers that describe the pulse; return the row count.
+    """Write the segment table of a pulse to `table`, and numbers that describe the pulse to `about`.
 
     Parameters
     ----------
     shape : int
         Code of the shape.
     fields : float64 array
-        Fields of the shape in order of declaration, NaN if missing; for a driver then the index of the decay
-        path. For a record, the times and then the values.
+        Fields of the shape in order of declaration, NaN for a missing field; the fields of a driver are
+        followed by the index of the decay path. For a record, the times and then the values.
     table : float64 array, shape (rows, 6), at least 4 rows, for a record one row more than samples
         Segment table, in the form for the kernel: the last row has the kind `END`.
     about : float64 array, shape (14,)
-        In order: support, s; end of the table, s; largest value; 1 if the latest firing replaces earlier
-        firings, else 0; resistance of the supply in series with one coil, ohm; upper current of the hold
-        phase and of the chopper, A, NaN if missing; the six numbers of the supply; end of the time axis of a
-        plot, s.
+        In this order: support of the pulse, s; end of the table, s; largest absolute value; 1 if the latest
+        firing replaces earlier firings, else 0; resistance of the supply in series with one coil, ohm; upper
+        current of the hold phase, A, NaN without such a phase; upper current of the chopper, A, NaN without a
+        chopper; the six numbers of the supply, in the order of `Supply`; end of the time axis of a plot of
+        the pulse, s.
 
     Returns
     -------
     int
-        Number of rows; -1 for an unknown shape.
+        Number of rows written to `table`; -1 for an unknown shape.
     """
     rows = fill_table(shape, fields, table)
     if rows < 0:
@@ -375,8 +387,8 @@ def pulse(shape: int, fields: Any, table: Any, about: Any) -> int:
 def fill_firings(rate: float, marks: Any, pattern: bool, times: Any) -> int:
     """Write the firing times of a train to `times` [s], ascending; return their number.
 
-    Slot k is fired if ``marks[k]`` is not 0; its time is k times the period, or, in a `pattern`, k divided by
-    the `rate` [Hz], which may differ by rounding.
+    Slot k is fired if ``marks[k]`` is not 0. The time of slot k is k / `rate` [Hz] for a `pattern`, otherwise
+    k times the period 1 / `rate`; the two times may differ by rounding.
     """
     count = 0
     period = 1.0 / rate

@@ -71,7 +71,7 @@ class PulseTrain(_Pulsed):
     waveform
         Waveform of every firing; None, as from a hammer without a waveform, raises `InputError`.
     rate, period
-        Firings per second, Hz, or the time between them, s; one of the two.
+        Firing rate, Hz, or time between firings, s; only one of the two may be passed.
     at
         Firing times [s], ascending, instead of a rate or period.
     pulses
@@ -80,7 +80,7 @@ class PulseTrain(_Pulsed):
     overlap
         "add": overlapping pulses add up; "replace": each firing cuts off the preceding pulse.
     start
-        Time of the first firing, or shift of the times `at` [s].
+        Time of the first firing, s; for firing times `at`, the time by which all of them are shifted.
 
     Raises
     ------
@@ -150,13 +150,13 @@ class Burst(_Pulsed):
     waveform
         Waveform of every firing.
     rate, period
-        Firings per second within a burst, Hz, or the time between them, s; one of the two.
+        Firing rate within a burst, Hz, or time between firings, s; one of the two.
     pulses
         Number of firings of one burst.
     bursts
         Number of bursts.
     gap
-        Time from the last firing of a burst to the first of the next, s.
+        Time from the last firing of a burst to the first firing of the next burst, s.
     overlap, start
         As for `PulseTrain`.
     """

@@ -43,7 +43,7 @@ class Waveform(BaseModel):
     """Waveform of one pulse, as a function of tau, the time since its firing.
 
     Numbers are SI; strings with a unit ("350 us") are accepted as well. An amplitude in N makes the waveform
-    a force, an amplitude in V a voltage across a coil with its circuit.
+    a force; an amplitude in V makes it a voltage that drives the circuit of a coil.
 
     Raises
     ------

@@ -32,11 +32,11 @@ from printhammer.support.constants import quantity
 from printhammer.support.constants import quantity as measured
 
 DECAYS: Final = ("diode", "zener", "rail")
-"""Paths of the current after the supply is switched off."""
+"""Paths of the decaying coil current after the supply is switched off."""
 
 
 class _Driver(Waveform):
-    """Base class of drivers, which switch a supply on for a time and then let the current decay."""
+    """Base class of drivers, which switch a supply on for the pulse width and then let the current decay."""
 
     quantity: QuantityName = "voltage"
     voltage: float = measured("V", "V", "voltage of the supply", gt=0.0)
@@ -100,7 +100,7 @@ class Rail(_Driver):
 
 
 class Chopper(_Driver):
-    """Chopper: the supply is on for the width, chopped between two currents or with a fixed off-time.
+    """Chopper: the supply is chopped, between two currents or with a fixed off-time, for the pulse width.
 
     While the chopper keeps the supply off, the current circulates through a diode.
     """
@@ -121,7 +121,7 @@ class Chopper(_Driver):
 
 
 class PeakAndHold(_Driver):
-    """Peak-and-hold driver: full supply for the peak time, then chopped between two lower currents."""
+    """Peak-and-hold driver: the supply is on for the peak time, then chopped between two lower currents."""
 
     shape: ClassVar[str] = "peak-and-hold"
     code: ClassVar[int] = tables.PEAK_AND_HOLD
@@ -141,7 +141,7 @@ class PeakAndHold(_Driver):
 
 
 class Capacitor(_Driver):
-    """Capacitor driver: a continuously charged capacitor discharges through the coil for the width."""
+    """Capacitor driver: a continuously charged capacitor discharges through the coil for the pulse width."""
 
     shape: ClassVar[str] = "capacitor"
     code: ClassVar[int] = tables.CAPACITOR
@@ -152,7 +152,7 @@ class Capacitor(_Driver):
 
 
 class Bridge(_Driver):
-    """H-bridge: supply for the width, then reversed supply for a time, then off."""
+    """H-bridge: the supply is on for the pulse width, then reversed for a given time, then off."""
 
     shape: ClassVar[str] = "bridge"
     code: ClassVar[int] = tables.BRIDGE
@@ -262,7 +262,7 @@ def _number(entry: object, unit: str, name: str) -> Any:
 
 
 def _levels(entries: Any) -> tuple[tuple[Any, ...], str]:
-    """Parse levels, all in A or all in N; return the values and the unit."""
+    """Parse levels that have the same SI unit, A, N or V; return the values and the unit."""
     for unit in QUANTITY_UNITS:
         try:
             return tuple(_number(entry, unit, "levels") for entry in entries), unit

@@ -37,6 +37,8 @@ class Samples:
 def checked(times: npt.ArrayLike, values: npt.ArrayLike, quantity: QuantityName, what: str) -> Samples:
     """Validate the times and values of a sampled waveform; return them as `Samples`.
 
+    `what` names the waveform or its file in error messages.
+
     Raises
     ------
     InputError
@@ -118,7 +120,7 @@ def read_csv(path: Path) -> Samples:
 
 
 def _held(times: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Repeat each logic level just before the next row, so that the level holds up to that row."""
+    """Add a sample of each logic level just before the next sample, so that the level holds up to there."""
     before = times[1:] - min(_EDGE, 0.5 * float(np.diff(times).min()))
     order = np.argsort(times := np.concatenate([times, before]))
     return times[order], np.concatenate([values, values[:-1]])[order]
@@ -166,7 +168,7 @@ class Sampled(Waveform):
         interpolation: Interpolation = "pchip",
         file: str = "",
     ) -> Self:
-        """Create a sampled waveform from arrays, SI; of the path `file`, only the file name is stored."""
+        """Create a sampled waveform from arrays, SI; `file` is stored as a name only, not read."""
         record = checked(times, values, quantity, "sampled waveform")
         fields = {"file": file, "interpolation": interpolation}
         return cls.model_validate(fields, context={"record": record})

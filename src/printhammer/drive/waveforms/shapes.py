@@ -36,10 +36,10 @@ _ROUNDING: Final = 1e-14  # Relative difference between times that counts as rou
 class Chain(Waveform):
     """Several consecutive waveforms in one firing, each at an offset, with a zero drive in between.
 
-    `parts` are pairs of an offset, a number in s or a string with a unit, and a waveform, in ascending order
-    of offset; all waveforms are currents, or all are forces. A waveform may begin once the preceding one has
-    ended or decayed to `TAIL` of its peak; the remainder is cut off. The edges of a waveform lie at the
-    rounded sums of offset and edge.
+    `parts` are pairs of an offset (a number in s or a string with a unit) and a waveform, in ascending order
+    of offset; all waveforms are currents, or all are forces. A waveform may begin once the preceding waveform
+    has ended or decayed to the fraction `TAIL` of its peak; the remainder is cut off. The time of an edge is
+    the rounded sum of the offset and the time of the edge within its waveform.
     """
 
     shape: ClassVar[str] = "chain"
@@ -126,7 +126,7 @@ def _validate(parts: object) -> tuple[tuple[float, Waveform], ...]:
 
 
 def _is_over(begun: float, waveform: Waveform, time: float) -> bool:
-    """Whether a waveform that began at `begun` [s] has ended or decayed to its tail by `time` [s]."""
+    """Whether a waveform begun at `begun` [s] has ended or decayed to `TAIL` of its peak by `time` [s]."""
     segments = waveform.segments()
     # A driver's circuit carries current after the supply is off.
     end = waveform.support
@@ -141,7 +141,7 @@ def _is_over(begun: float, waveform: Waveform, time: float) -> bool:
 
 
 def _offset(written: object, number: int) -> float:
-    """Parse the offset of a waveform: a number in s, or a string with a unit."""
+    """Parse the offset of waveform `number` of a chain: a number in s, or a string with a unit."""
     if isinstance(written, str):
         return read_number(written, "s", f"parts[{number}]")
     if isinstance(written, bool) or not isinstance(written, float | int) or not math.isfinite(written):
