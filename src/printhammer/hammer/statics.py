@@ -146,8 +146,8 @@ def reach_of(far: float, s: Statics) -> tuple[float, float]:
 def compressed(current: float, low: float, s: Statics) -> float:
     """Return the displacement [m] at which a compressed elastic backstop balances magnet and spring.
 
-    Of several such equilibria, the equilibrium nearest to the surface of the backstop is returned; NaN if
-    there is none above `low` [m]. `current` is the coil current, A.
+    Of several such equilibria, the equilibrium nearest to the surface of the backstop is returned; NaN
+    without an equilibrium above `low` [m]. `current` is the coil current, A.
     """
     depth = max(NEAREST, spacing(s.position))
     above = s.position
