@@ -199,7 +199,10 @@ class CurrentLaw:
         self._slopes: dict[bytes, FloatArray] = {}
 
     def space(self, start: FloatArray) -> Parameters:
-        """Build initial guess, bounds, prior and scales of all parameters; `start` contains the constants."""
+        """Build initial guess, bounds, prior and scales of all parameters.
+
+        `start` contains the initial guesses of the named constants, SI.
+        """
         longest = max(float(trace.times[-1]) for trace in self.traces)
         peak = max(float(np.abs(trace.table.values["current"]).max()) for trace in self.traces)
         ends = [bounds_of(error, longest) for error in self.fitted]
@@ -222,7 +225,10 @@ class CurrentLaw:
         )
 
     def simulated(self, p: FloatArray, **added: float) -> FloatArray:
-        """Simulate the currents of all records as seen by the probe, including the probe errors `added`."""
+        """Simulate the currents of all records as seen by the probe, at parameters `p`.
+
+        The values in `added`, SI, are added to the probe errors of these names.
+        """
         count = len(self.names)
         hammer = self.hammer.replace(dict(zip(self.names, p[:count].tolist(), strict=True)))
         probe = {error.name: error.value for error in self.errors}
@@ -247,7 +253,7 @@ class CurrentLaw:
     def missing(self, p: FloatArray) -> dict[str, FloatArray]:
         """Return the derivatives of the currents with respect to undeclared probe errors.
 
-        The keys are the texts of `SIGNS`, which suggest stating or fitting the error.
+        The keys of the result are the texts of `SIGNS`, which suggest stating or fitting the error.
         """
         short = _SHORT * self.step
         steps = {"offset": 1.0, "gain": 1.0, "delay": short, "time constant": short}
@@ -297,8 +303,9 @@ class CurrentLaw:
 class Averaged:
     """Law averaged over quantisation plateaus, for readings whose quantisation step exceeds the noise.
 
-    Rows on one plateau have correlated rounding errors: these average out where the law varies by a whole
-    step across the plateau; where the law is nearly constant, the error of the mean is up to half a step.
+    Rows on one plateau have correlated rounding errors. The rounding errors average out where the law varies
+    by a whole quantisation step across the plateau; where the law is nearly constant, the error of the mean
+    is up to half a quantisation step.
     """
 
     def __init__(self, law: CurrentLaw, plateau: IntArray, fitted: FloatArray, step: float) -> None:
@@ -311,7 +318,7 @@ class Averaged:
         self.share = np.minimum(np.maximum(1.0 - span / step, 0.0) ** 2 + 1.0 / self.rows**2, 1.0)
 
     def mean(self, values: FloatArray) -> FloatArray:
-        """Average rows over each quantisation plateau; the result has the shape (count,)."""
+        """Return the mean of `values` over each quantisation plateau, shape (plateaus,)."""
         return np.asarray(np.add.reduceat(values, self.begins, axis=0) / self.rows)
 
     def data(self, data: Data) -> Data:
@@ -339,12 +346,18 @@ class Averaged:
 
 
 def _within(p: FloatArray, space: Parameters) -> FloatArray:
-    """Return the initial guess of a second fit: the prior means, or without a prior the first estimates."""
+    """Return the initial guess of a second fit from the estimates `p` of the first fit.
+
+    A parameter with a prior begins at the mean of its prior, any other parameter at its estimate.
+    """
     return np.where(np.isfinite(space.deviation), space.start, np.clip(p, space.low, space.high))
 
 
 def _kept(known: dict[bytes, FloatArray], p: FloatArray, made: Callable[[], FloatArray]) -> FloatArray:
-    """Return the cached value of `made` at parameters `p`; a fit evaluates the same point repeatedly."""
+    """Return the value of `made` at parameters `p`; a known value is taken from the cache `known`.
+
+    The cache saves time, since a fit evaluates the same point repeatedly.
+    """
     key = p.tobytes()
     if key not in known:
         known[key] = made()
@@ -352,7 +365,10 @@ def _kept(known: dict[bytes, FloatArray], p: FloatArray, made: Callable[[], Floa
 
 
 def _start(hammer: Hammer, names: list[str], trace: Trace) -> tuple[Hammer, FloatArray]:
-    """Estimate a missing resistance or inductance from a record; return hammer and initial guesses, SI."""
+    """Estimate a missing resistance or inductance from a record.
+
+    Return the hammer with these estimates, and the initial guesses of the constants `names`, SI.
+    """
     t, current = trace.table.values["time"], np.abs(trace.table.values["current"])
     top = int(np.argmax(current))
     if not (current[top] > 0.0 and trace.waveform.peak > 0.0):

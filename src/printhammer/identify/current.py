@@ -140,7 +140,12 @@ class Trace(Declared, eq=False):
 def read_trace(
     path: str | Path, hammer: Hammer, locked: float | None, has_offset: bool, columns: str | None = None
 ) -> Trace:
-    """Read a current record; `locked` is the locked displacement, m (None: stated in the record, or free)."""
+    """Read a record of a coil current.
+
+    `locked` is the displacement at which the armature was locked, m; if None, the displacement stated in a
+    comment of the record, else the armature was free. `has_offset` states that the probe has an offset; the
+    record may then begin with a nonzero current.
+    """
     table = read_table(path, {"time": "s", "current": "A"}, optional={"voltage": "V"}, columns=columns)
     table.check_times()
     t = table.values["time"]
@@ -175,7 +180,7 @@ def read_trace(
 
 
 def _check_begin(table: Readings, recorded: bool) -> None:
-    """Raise `InputError` if current flows at switch-on or at the start of a recorded voltage."""
+    """Raise `InputError` if current flows at switch-on or, with a `recorded` voltage, in the first row."""
     t, current = table.values["time"], np.abs(table.values["current"])
     before = current[:1] if recorded else current[t <= 0.0][-3:]
     if before.size and float(np.median(before)) > _FLOWS * float(current.max()):
@@ -244,8 +249,9 @@ class ProbeError(Declared):
 def read_probe(settings: Mapping[str, float | str | None], step: float) -> list[ProbeError]:
     """Parse the declared errors of a probe; `step` is the sampling interval, s.
 
-    Settings are "offset", A, "gain", "delay", s, and "bandwidth", Hz: a number or a text with a unit, a value
-    with its standard deviation such as "0 us +- 5 us", or "fit". None stands for an undeclared error.
+    The settings are "offset" [A], "gain" [1], "delay" [s] and "bandwidth" [Hz]. Each is a number or a text
+    with a unit, a value with its standard deviation such as "0 us +- 5 us", or "fit"; None stands for an
+    undeclared error.
     """
     errors = []
     for name, written in settings.items():
@@ -305,7 +311,11 @@ _WHOLE: Final = 0.02  # Arbitrary
 
 
 def plateaus(fitted: FloatArray, series: IntArray, step: float) -> IntArray:
-    """Return the plateau index of each row; a plateau is a run of rows with equal rounded fitted values."""
+    """Return the index of the quantisation plateau of each row.
+
+    A plateau is a run of consecutive rows of one series whose fitted values round to the same multiple of the
+    quantisation step `step`.
+    """
     code = np.rint(fitted / step)
     begins = (np.diff(code) != 0.0) | (np.diff(series) != 0)
     return np.concatenate([[0], np.cumsum(begins)]).astype(np.int64)

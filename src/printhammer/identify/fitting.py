@@ -104,7 +104,11 @@ def _magnet_and_spring(paths: list[Any]) -> tuple[list[Any], Any]:
 
 
 def _static(kind: str, table: Any, hammer: Hammer | None, options: dict[str, Any]) -> Fit:
-    """Fit a static table; propagate the uncertainty of a known constant by central differences."""
+    """Fit a table of static forces, or of rebounds.
+
+    The uncertainty of the known constant that the fit requires, if stated, is propagated by central
+    differences.
+    """
     name, key = _TAKEN[kind]
     known = None
     if options.get(name) is None:
@@ -130,7 +134,10 @@ _TAKEN: Final = {
 
 
 def _known(hammer: Hammer | None, key: str) -> float | None:
-    """Return a known constant of a hammer, SI, or None; a backstop stiffness may be a computed value."""
+    """Return a known constant of a hammer, SI; None if the hammer does not state the constant.
+
+    The stiffness of the backstop may also be computed from other constants of the backstop.
+    """
     if hammer is None:
         return None
     if key == "backstop.stiffness":

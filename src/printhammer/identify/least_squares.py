@@ -96,7 +96,7 @@ class Parameters(Declared, eq=False):
         rest: FloatArray | None = None,
         tolerance: float = 1e-15,
     ) -> Self:
-        """Create parameters; by default without bounds and without a prior."""
+        """Create parameters, by default without bounds or prior; a scalar applies to every parameter."""
         low, high, deviation = (np.broadcast_to(each, start.shape).copy() for each in (low, high, deviation))
         sizes = None if size is None else np.broadcast_to(size, start.shape).copy()
         return cls(start, low, high, deviation, sizes, rest, tolerance)
@@ -143,7 +143,7 @@ class Solution(Declared, eq=False):
 
 
 class NoSolutionError(ArithmeticError):
-    """Raised if no parameters fit the data; `row` is the datum farthest from the initial prediction."""
+    """Raised if no parameters fit the data; `row` is the index of the datum that deviates most."""
 
     def __init__(self, row: int) -> None:
         super().__init__(f"the law does not fit the data: row {row} deviates most")
@@ -227,10 +227,11 @@ def _next_held(solution: Solution, data: FloatArray) -> int | None:
 
 
 def _held_at(law: Law, data: FloatArray, solution: Solution, free: BoolArray, held: int) -> FloatArray:
-    """Hold a parameter at its default, or at its estimate if the data exclude the default; refit the others.
+    """Hold the parameter `held` at its default value, and refit the parameters in the mask `free`.
 
-    A parameter at a bound stays there, but the value `rest` is tried first: where two parameters have the
-    same effect, one can end at its bound because the other compensates for it.
+    The default is `Parameters.rest`, or the initial guess. If the data exclude the default, the parameter is
+    held at its estimate. A parameter at a bound stays there unless `rest` is stated and fits: where two
+    parameters have the same effect, one can end at its bound because the other compensates for it.
     """
     p, space = solution.p.copy(), solution.parameters
     if space.rest is None and _at_bound(solution)[held]:
@@ -328,7 +329,7 @@ def _with_determining_rows(rows: FloatArray, inside: BoolArray) -> BoolArray:
 def _weighted_jacobian(
     jacobian: FloatArray, variance: FloatArray, used: BoolArray | None, space: Parameters, free: BoolArray
 ) -> FloatArray:
-    """Return the weighted Jacobian of the free parameters, with one extra row per prior."""
+    """Return the weighted Jacobian of the `used` rows and `free` parameters, with one extra row per prior."""
     rows = jacobian[:, free] / np.sqrt(variance)[:, None]
     rows = rows if used is None else rows[used]
     known = np.isfinite(space.deviation)

@@ -77,11 +77,11 @@ def lowpass_lines(times: FloatArray, values: FloatArray, tau: float) -> FloatArr
 
 
 def _joined(first: float, at_start: list[float], at_end: list[float], kept: list[float]) -> list[float]:
-    """Return the output at the ends of all pieces, from the first output on.
+    """Return the output of the filter at the start of the first piece, `first`, and at the end of each piece.
 
-    `at_start` and `at_end` are the particular solution at the ends of each piece; `kept` is the fraction of
-    the transient that is left at its end. The loop over floats is several times faster than array operations
-    on short rows.
+    `at_start` and `at_end` are the particular solutions at the start and at the end of each piece; `kept` is
+    the fraction of the transient that is left at the end of the piece. The loop over floats is several times
+    faster than array operations on short rows.
     """
     result = [first]
     value = first

@@ -43,7 +43,10 @@ def running_median(values: FloatArray, width: int) -> FloatArray:
 
 
 def spikes_of(values: FloatArray, noise: float) -> BoolArray:
-    """Return the mask of samples that differ from their neighbours by more than noise and slope explain."""
+    """Return the mask of samples that differ from their neighbours by more than noise and slope explain.
+
+    `noise` is the standard deviation of the noise, in the unit of the values.
+    """
     middle = running_median(values, 5)
     padded = np.pad(middle, 2, mode="edge")
     return np.abs(values - middle) > _SPIKE * noise + np.abs(padded[4:] - padded[:-4])

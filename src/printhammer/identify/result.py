@@ -228,7 +228,7 @@ class Fit(Result):
         return f"{self.correlation[first, second]:.2f} at most, of {self.keys[first]} and {self.keys[second]}"
 
     def entries(self) -> Entries:
-        """Return the columns: data along `datum`, constants along `constant`, and their covariance."""
+        """Return the columns of the result: one row per datum or per constant, and the covariance."""
         entries = super().entries()
         for name, (meaning, unit) in zip(
             ("abscissa", "data", "fitted", "residuals"), (self.axes[0], *[self.axes[1]] * 3), strict=True
@@ -351,7 +351,10 @@ class Fit(Result):
         )
 
     def _uncertainty(self, hammer: Hammer, set_anew: set[str]) -> dict[str, Any] | None:
-        """Return the uncertainty table of the updated hammer, for fitted and remaining constants."""
+        """Return the uncertainty table of the updated hammer, for fitted and remaining constants.
+
+        `set_anew` contains the keys of the constants that the fit replaces, fitted constants included.
+        """
         own = [key for key, each in self.constants.items() if each.in_file and not each.held]
         before = hammer.uncertainty or Uncertainty((), np.empty((0, 0)))
         rest = before.without(set_anew)
@@ -401,7 +404,10 @@ class Fit(Result):
         return [*lines, *self.indistinct, *self.remarks]
 
     def outlier_lines(self, most: int = 20) -> str:
-        """List the excluded rows as text, with the names of their series if there are several files."""
+        """List the line numbers of the excluded rows as text; at most `most` lines or ranges of lines.
+
+        The names of the series are added if there are several files.
+        """
         rows = [int(row) for row in np.flatnonzero(self.outliers)]
         count = f"{len(rows)} outlier{'s' if len(rows) > 1 else ''} left out"
         if not len(self.lines):
@@ -428,7 +434,8 @@ class Fit(Result):
 def with_error(fit: Fit, key: str, error: float, slopes: list[float]) -> Fit:
     """Return a copy of a fit with the uncertainty of a known constant propagated.
 
-    `slopes` are the derivatives of the constants in `Fit.keys` with respect to the known constant; all SI.
+    `key` and `error` are the key and the standard error of the known constant; `slopes` are the derivatives
+    of the constants in `Fit.keys` with respect to the known constant. All numbers are SI.
     """
     slope = np.array(slopes)
     constants = dict(fit.constants)
@@ -459,7 +466,10 @@ def student(degrees_of_freedom: float) -> float:
 
 
 def _check_agreement(hammer: Hammer, key: str, text: str) -> None:
-    """Raise `InputError` if the hammer's constant differs from the value that the fit treated as known."""
+    """Raise `InputError` if the hammer's constant differs from the value that the fit treated as known.
+
+    `text` is that value with its unit.
+    """
     from printhammer.units import parse
 
     known = hammer.constants.get(key)

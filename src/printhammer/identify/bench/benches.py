@@ -155,7 +155,10 @@ def pack(
     peaks: npt.ArrayLike | None = None,
     points: int = BRANCH_POINTS,
 ) -> Bench:
-    """Compute load cycles of the pack up to given peak indentations, m, each cycle on fresh paper."""
+    """Compute load cycles of the pack up to given peak indentations, m, each cycle on fresh paper.
+
+    Each branch of a cycle, loading or unloading, has `points` readings.
+    """
     if hammer.pack is None:
         raise InputError(
             f"{hammer.path}: the hammer has no [pack]",
@@ -221,7 +224,10 @@ def backstop(hammer: Hammer, sensor: Sensor, *, speeds: npt.ArrayLike | None = N
 def motion(
     hammer: Hammer, sensor: Sensor, *, duration: float | str | None = None, before: float | str = BEFORE
 ) -> Bench:
-    """Simulate one shot from rest, from `before` [s] before the firing to `duration` [s] after the firing."""
+    """Simulate the displacement and the current of one shot from rest.
+
+    The record begins `before` [s] before the firing and ends `duration` [s] after the firing.
+    """
     from printhammer.drive.trains import PulseTrain
 
     if hammer.waveform is None:
@@ -263,7 +269,11 @@ def current(
     before: float | str = BEFORE,
     locked: float | str | None = None,
 ) -> Bench:
-    """Simulate the coil current of one voltage-driven shot, the armature free or locked at `locked` [m]."""
+    """Simulate the coil current of one shot with a voltage driver, the armature free or locked.
+
+    The record begins `before` [s] before the firing and ends `duration` [s] after the firing. `locked` [m] is
+    the displacement at which the armature is locked; None for a free armature.
+    """
     from printhammer.drive.input import read_number
 
     check_driver(hammer)
@@ -294,7 +304,11 @@ BENCHES: Final[dict[str, Callable[..., Bench]]] = {
 def _record(
     sensor: Sensor, duration: float | str | None, before: float | str, least: float = CYCLE
 ) -> tuple[int, int, float, float]:
-    """Return the first and last sample index of a record, the sampling rate [Hz] and the duration [s]."""
+    """Return the first and last sample index of a record, the sampling rate [Hz] and the duration [s].
+
+    The firing has the sample index 0. `before` is the time from the start of the record to the firing, s, and
+    `least` is the duration after the firing if `duration` is None, s.
+    """
     from printhammer.drive.input import read_number, read_positive
 
     rate = sensor.sampling_rate

@@ -86,7 +86,7 @@ class Measurement(Result):
         return f"measurement of the {self.kind} of {self.hammer.name}"
 
     def entries(self) -> Entries:
-        """Return the columns: readings, texts, true values such as `true_force`, and outlier mask `wrong`."""
+        """Return the columns: readings, true values such as `true_force`, text, and outlier mask `wrong`."""
         entries: Entries = {}
         for name, readings in self.values.items():
             key, si = name.replace(" ", "_"), SI[name]

@@ -40,7 +40,10 @@ class Amount:
 
     @classmethod
     def read(cls, text: str | float, si: str, name: str, *, signed: bool = False) -> Amount:
-        """Parse an error size: "0.2 um", "0.5 %" (of full scale), "1 % of reading", or a number in SI."""
+        """Parse an error size: "0.2 um", "0.5 %" (of full scale), "1 % of reading", or a number in SI.
+
+        Negative sizes are accepted only if `signed`; `name` is the name of the setting in error messages.
+        """
         of = ""
         if isinstance(text, str) and "%" in text:
             share, _percent, tail = text.partition("%")
@@ -156,7 +159,8 @@ def full_scale(true: FloatArray) -> float:
 def wrong_rows(share: float, true: FloatArray, rng: np.random.Generator) -> tuple[IntArray, FloatArray]:
     """Draw the indices of the rows with gross errors, ascending, and their gross errors, SI.
 
-    The errors are normal, with a standard deviation of a tenth of full scale.
+    `share` is the fraction of rows with gross errors; `true` are the true values, which determine the full
+    scale. The gross errors are normally distributed, with a standard deviation of a tenth of the full scale.
     """
     count = int(share * len(true) + 0.5)
     rows = np.sort(rng.permutation(len(true))[:count])
@@ -175,9 +179,12 @@ _OTHERS: Final = ("exact", "sampling_rate", "bandwidth", "outliers")
 def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, str]) -> Sensor:
     """Return a copy of a sensor with changed settings; `units` are the SI units of the quantities.
 
-    Settings are "noise", "resolution", "offset": a mapping of quantity to amount, such as {"force": "0.5 %"};
-    "sampling_rate" and "bandwidth": "100 kHz" or a number in Hz, "none" for no limit; "outliers": a
-    fraction, "2 %" or 0.02; "exact": True to start from a sensor without errors.
+    The settings are:
+
+    - "noise", "resolution" and "offset": the size of the error by quantity, such as {"force": "0.5 %"};
+    - "sampling_rate" and "bandwidth": "100 kHz" or a number in Hz, "none" for no limit;
+    - "outliers": fraction of rows with a gross error, "2 %" or 0.02;
+    - "exact": True to start from a sensor without errors.
 
     Raises
     ------
@@ -213,7 +220,7 @@ def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, st
 
 
 def applicable(sensor: Sensor, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Select the settings that apply to a sensor; sampling settings apply only to records."""
+    """Select the settings that apply to a sensor; sampling rate and bandwidth apply only to records."""
     kept = dict(settings)
     for role in PARTS:
         if role in kept:
@@ -227,8 +234,8 @@ def applicable(sensor: Sensor, settings: Mapping[str, Any]) -> dict[str, Any]:
 def by_quantity(texts: list[str], setting: str, quantities: Mapping[str, str]) -> dict[str, str]:
     """Parse settings such as "force=0.5 %", or "0.2 um" for all quantities of that dimension.
 
-    Returns the text of the error size by quantity; `setting` is the name in error messages, such as
-    "noise".
+    Return the text of the error size by quantity. `quantities` contains the SI unit of each quantity, and
+    `setting` is the name of the setting in error messages, such as "noise".
 
     Raises
     ------

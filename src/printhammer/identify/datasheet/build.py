@@ -166,7 +166,7 @@ def forces_of(part: ReluctanceMagnet, sheet: Sheet) -> FloatArray:
 
 
 def inductance_of(part: ReluctanceMagnet, sheet: Sheet) -> float:
-    """Compute the small-current inductance [H] at the gap of the stated value, else at the widest gap."""
+    """Compute the small-current inductance [H] at the sheet's inductance gap, or else at its widest gap."""
     gap = float(sheet.gaps.max()) if sheet.inductance is None else sheet.inductance[1]
     return law.magnet_inductance(part.packed(0.0), sheet.closed_at - gap, 0.0)
 
@@ -177,7 +177,10 @@ def _classify(
     spread: dict[str, float],
     forces: Callable[[ReluctanceMagnet, Sheet], FloatArray],
 ) -> SheetMagnet:
-    """Classify the constants of a fitted magnet as derived or assumed."""
+    """Classify the constants of a fitted magnet as derived or assumed.
+
+    `spread` contains the ratio of posterior to prior standard deviation of each constant.
+    """
     key = {
         "turns": "turns",
         "residual_gap": "residual_gap",
@@ -287,7 +290,7 @@ def _made(value: float, unit: str, status: str, source: str) -> dict[str, Any]:
 
 
 def _magnet(sheet: DataSheet, magnet: SheetMagnet) -> dict[str, Any]:
-    """Build the magnet table of the hammer file."""
+    """Build the magnet table of the hammer file, with status and source of each constant."""
     count = len(sheet.force)
     guessed = "force" in sheet.assumed
     what = f"fitted to {count}{' assumed' * guessed} force{'s' if count > 1 else ''}"
@@ -334,7 +337,10 @@ def _derived_from(sheet: DataSheet, key: str, how: str) -> tuple[str, str]:
 
 
 def _spring(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, Any] | None:
-    """Return the spring table, or None; raise `InputError` if the spring overcomes the magnet."""
+    """Build the spring table; None if the data sheet states no spring.
+
+    Raise `InputError` if the spring overcomes the magnet.
+    """
     stated = [name for name in ("preload", "stiffness") if f"spring.{name}" in sheet.entries]
     if not stated:
         return None
@@ -424,7 +430,7 @@ def _pack(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, An
 
 
 def _work(sheet: DataSheet, magnet: SheetMagnet, front: float, current: float) -> float:
-    """Compute the work of magnet and spring from rest to a displacement, at constant current, J."""
+    """Compute the work [J] of magnet, spring and contacts from rest to `front` [m], at constant current."""
     c = magnet.part.packed(0.0)
     x = np.linspace(0.0, front, _GRID)
     pull = np.array([law.magnet_force(c, place, current) for place in x.tolist()])
@@ -460,7 +466,7 @@ def damping_ratio(restitution: float) -> float:
 
 
 def _waveform(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, Any]:
-    """Build the waveform table: the driver of the data sheet, or a pulse of the rail voltage."""
+    """Build the waveform table: the driver of the data sheet, or by default a pulse of the rail voltage."""
     from printhammer.drive.waveforms.shapes import SHAPES
 
     table: dict[str, Any] = {"shape": sheet.driver.get("shape", "rail"), "voltage": sheet.constant("rail")}

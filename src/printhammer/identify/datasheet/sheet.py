@@ -216,7 +216,7 @@ def _quantity_text(key: str) -> str:
 
 
 def _entry(key: str, written: Any, si: str, *, zero: bool = False) -> Entry:
-    """Parse a quantity that must be positive or, with `zero`, non-negative."""
+    """Parse a quantity with the SI unit `si`; the value must be positive or, with `zero`, non-negative."""
     zero = zero or key in _ZERO
     if isinstance(written, bool) or not isinstance(written, str | int | float):
         raise InputError.of(
@@ -235,7 +235,7 @@ def _entry(key: str, written: Any, si: str, *, zero: bool = False) -> Entry:
 
 
 def _pair(key: str, written: Any, units: tuple[str, str], wanted: str) -> tuple[Entry, Entry]:
-    """Parse a pair of quantities; a length in the pair may be 0."""
+    """Parse a pair of quantities with given SI units; a length in the pair may be 0."""
     if not isinstance(written, list) or len(written) != _PAIR:
         raise InputError.of(key, written, wanted, written=shown(written))
     first, second = (_entry(key, part, si, zero=si == "m") for part, si in zip(written, units, strict=True))

@@ -17,7 +17,7 @@ from printhammer.results import Declared, part
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 _WIDE: Final = 10.0  # Arbitrary
-"""Initial width of the gap penalty, relative to the largest gap, which then weighs as much as all data."""
+"""Initial width of the gap penalty, relative to the largest gap; a gap of this width weighs like all data."""
 _NARROW: Final = 0.001
 """Width of the gap penalty, normalised by stroke and typical speed, at which the approach ends; arbitrary."""
 _RISE: Final = 0.3  # Factor on the width of the gap penalty after a successful step; arbitrary
@@ -71,7 +71,10 @@ class Priors:
 
 
 def largest_gap(chains: Sequence[Chain], units: FloatArray) -> float:
-    """Return the largest gap between segments in all chains, normalised by stroke and typical speed."""
+    """Return the largest gap between segments in all chains, normalised by `units`.
+
+    `units` are the stroke [m] and a typical speed [m/s].
+    """
     return max((float(np.abs(chain.gaps / units).max()) for chain in chains if chain.gaps.size), default=0.0)
 
 
@@ -92,7 +95,10 @@ class Approach:
         self.keep = [(~rows).astype(np.float64) for rows in spikes]
 
     def run(self, values: FloatArray, states: Sequence[FloatArray]) -> tuple[FloatArray, list[FloatArray]]:
-        """Compute parameters, SI, and joint states as initial guess for the fit without gaps."""
+        """Improve parameter values, SI, and the joint states of each shot by minimisation.
+
+        The returned values and states are the initial guess of the fit without gaps.
+        """
         values, states = values.copy(), list(states)
         chains = self.shooting.chains(values, states, derivatives=True)
         width = 0.0 if chains is None else _WIDE * largest_gap(chains, self.shooting.units)
@@ -146,7 +152,11 @@ class Approach:
     def _step(
         self, values: FloatArray, chains: Sequence[Chain], scales: FloatArray, width: float
     ) -> FloatArray:
-        """Compute the Gauss-Newton step; parameters in units of their scales, joint states in `units`."""
+        """Compute the Gauss-Newton step of parameters and joint states.
+
+        The step of a parameter is in units of its scale, the step of a joint state in `Shooting.units`.
+        `scales` are the residual scales of the shots, m, and `width` is the width of the gap penalty.
+        """
         count = len(values)
         size = count + sum(chain.gaps.size for chain in chains)
         units = self.shooting.units

@@ -106,9 +106,10 @@ def changes_if_fitted(
 ) -> list[tuple[str, float, float]]:
     """Estimate, for each held constant, how it would change if it alone were fitted in addition.
 
-    `design`, shape (m, p), `residuals`, shape (m,), and `columns`, shape (m, q), the derivatives per relative
-    change of each held constant, are whitened by the standard errors of the data. The result lists the name,
-    relative standard error and best relative change of each constant.
+    `design`, shape (m, p), is the Jacobian of the fit, `residuals`, shape (m,), are its residuals, and
+    `columns`, shape (m, q), are the derivatives per relative change of each held constant; all are whitened
+    by the standard errors of the data. The result lists the name, the relative standard error and the best
+    relative change of each held constant.
     """
     basis, _r = np.linalg.qr(design)
     further = []
@@ -252,7 +253,11 @@ class GaussNewton:
         near: bool,
         noise: Solution | None = None,
     ) -> _Weighted:
-        """Linearise data and priors; return their whitened residuals and Jacobian."""
+        """Linearise data and priors; return their whitened residuals and Jacobian.
+
+        `parts` are the linear models of the shots, from `Shooting.condensed`. If the iterate is `near` the
+        solution, outliers are excluded by their residuals. `noise` is as in `solve`.
+        """
         rows, residuals, outliers, scales, memories = [], [], [], [], []
         for shot, (x, (shown, jacobian, *_rest)) in enumerate(zip(self.data, parts, strict=True)):
             left = x - shown
@@ -317,7 +322,7 @@ class GaussNewton:
         )
 
     def profile(self, solution: Solution, which: int, degrees_of_freedom: float) -> Profile:
-        """Compute the profile likelihood of the parameter `which`, and its 95 % interval.
+        """Compute the profile likelihood of the parameter with index `which`, and its 95 % interval.
 
         The noise scales are those of the solution, with the given degrees of freedom. The profile ends where
         no fit converges, or where the parameter would change its sign.
@@ -362,7 +367,7 @@ class _Weighted:
 
 
 def _solve_step(design: FloatArray, residuals: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Solve for the least-squares step and the standard errors, in units of the parameters' scales."""
+    """Return the least-squares step and the standard errors of the parameters, in units of their scales."""
     sizes = np.sqrt((design * design).sum(axis=0))
     sizes[sizes == 0.0] = 1.0
     values, vectors = singular(design / sizes)

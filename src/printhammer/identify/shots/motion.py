@@ -48,7 +48,11 @@ _OFF: Final = 5.0  # Number of standard errors above which a deviation is report
 
 
 def tested(shots: Sequence[Shot], solution: Solution, count: int) -> tuple[float, str]:
-    """Test the residuals against the noise of the records (F-test); return p-value and rejection reason."""
+    """Test the residuals against the noise of the records by an F-test.
+
+    `count` is the number of fitted constants. Return the p-value, and the reason for the rejection of the
+    model; the reason is empty if the model is not rejected.
+    """
     from scipy.special import fdtrc
 
     p_value, worst = 1.0, ""
@@ -108,7 +112,10 @@ def remembered(shots: Sequence[Shot], solution: Solution) -> list[str]:
 
 
 def further(fit: GaussNewton, solution: Solution, hammer: Hammer, rejected: str) -> list[str]:
-    """Return remarks on held constants that the records could determine, or that the records contradict."""
+    """Return remarks on held constants that the records could determine, or that the records contradict.
+
+    `rejected` is the reason for the rejection of the model, or an empty text.
+    """
     sentences = ["a motion depends on forces over mass only: the mass is as accurate as the known forces"]
     shooting = fit.shooting
     parameters = shooting.parameters
@@ -247,7 +254,10 @@ def fit_motion(
 def _free_keys(
     hammer: Hammer, free: Sequence[str] | None, shots: Sequence[Shot], *, touched: bool
 ) -> tuple[str, ...]:
-    """Return the keys of the constants to fit; raise `InputError` for a constant that cannot be fitted."""
+    """Return the keys of the constants to fit; raise `InputError` for a constant that cannot be fitted.
+
+    `touched` states whether any record has a contact with the backstop after the shot.
+    """
     hertz = hammer.backstop is not None and hammer.backstop.law == "hertz"
     if free is None:
         return ("mass", _DAMPING) if touched and hertz else ("mass",)
@@ -308,7 +318,10 @@ def _plain(hammer: Hammer, keys: Sequence[str]) -> Hammer:
 
 
 def _known(hammer: Hammer, *, own_waveform: bool) -> Uncertainty:
-    """Return the uncertainty of the constants that affect the motion."""
+    """Return the uncertainty of the constants that affect the motion.
+
+    `own_waveform` states whether any shot fires the hammer's own waveform, not a recorded current.
+    """
     known = hammer.uncertainty or Uncertainty((), np.empty((0, 0)))
     idle = ["platen"] if own_waveform else ["platen", "waveform."]
     if not own_waveform or hammer.waveform is None or hammer.waveform.quantity != "voltage":
@@ -356,7 +369,10 @@ def _pulses(hammer: Hammer, shots: Sequence[Shot]) -> tuple[list[Pulse | None], 
 def _assemble(
     hammer: Hammer, keys: tuple[str, ...], pulses: Sequence[Pulse | None], known: Uncertainty
 ) -> tuple[FloatArray, Parameters, list[Prior], list[Pulse | None]]:
-    """Return the initial guess, the parameters, the priors, and the current pulse of each shot."""
+    """Return the initial guess, the parameters, the priors, and the current pulse of each shot.
+
+    `known` is the uncertainty of the hammer's constants, which gives a prior on these constants.
+    """
     start = [hammer.constants[key].si for key in keys]
     priors: list[Prior] = []
     if known.keys:

@@ -48,7 +48,7 @@ class Parameters:
         return len(self.keys) + len(self.owners)
 
     def of_shot(self, shot: int) -> list[int]:
-        """Return the indices of the pulse parameters of a shot."""
+        """Return the indices of the parameters that describe the current pulse of a shot."""
         return [len(self.keys) + i for i, owner in enumerate(self.owners) if owner == shot]
 
 
@@ -121,7 +121,11 @@ class Shooting:
     def _variants(
         self, values: FloatArray, derivatives: bool
     ) -> list[tuple[Hammer, float, list[PulseTrain]]]:
-        """Build hammer, rest position and drives for the nominal and each perturbed parameter vector."""
+        """Build the hammer, its rest position [m] and the drives of all shots at given parameter values, SI.
+
+        The first entry of the list is for these values. With `derivatives`, one entry follows for each
+        parameter, with this parameter perturbed.
+        """
         parameters = self.parameters
         count = len(parameters.keys)
         variants = []
@@ -154,8 +158,9 @@ class Shooting:
     ) -> list[Chain] | None:
         """Integrate all segments of all shots; return None for an invalid hammer or a failed simulation.
 
-        `values` are the parameters, SI; `states` the displacement [m] and velocity [m/s] at the joints of
-        each shot, shape (j, 2).
+        `values` are the parameters, SI; `states` are the displacement [m] and velocity [m/s] at the joints
+        between the segments of each shot, shape (j, 2). With `derivatives`, the chains contain the
+        derivatives of the motion.
         """
         try:
             variants = self._variants(values, derivatives)
@@ -197,7 +202,11 @@ class Shooting:
         return [self._chain(shot, states[shot], table, where, count) for shot in range(len(self.shots))]
 
     def _has_effect(self, variant: int, shot: int, start: float) -> bool:
-        """Whether perturbing a parameter changes a segment that begins at a given time, s."""
+        """Whether the perturbation of a variant changes a segment of a shot.
+
+        `variant` is the index in the list of `_variants`, and `start` is the time at which the segment
+        begins, s.
+        """
         number = variant - 1 - len(self.parameters.keys)
         return number < 0 or (self.parameters.owners[number] == shot and start <= self.lasting[shot])
 
@@ -239,8 +248,9 @@ class Shooting:
     def shown(self, shot: int, motion: FloatArray) -> FloatArray:
         """Apply the sensor model: return the readings at the samples of a shot.
 
-        `motion` is displacement and velocity on the grid, or derivatives of them, shape (g, 2, ...); the
-        readings have the shape (n, ...). Samples before the firing read the rest position.
+        `motion` contains displacement and velocity on the time grid, or their derivatives, shape (g, 2, ...).
+        The readings, or their derivatives, have the shape (n, ...). Before the firing the reading is the rest
+        position.
         """
         plan = self.plans[shot]
         flat = motion.reshape(len(motion), 2, -1)
@@ -249,10 +259,11 @@ class Shooting:
         return out[rows].reshape(len(rows), *motion.shape[2:])
 
     def opened(self, shot: int, chain: Chain) -> tuple[FloatArray, FloatArray]:
-        """Compute the readings of a shot with independent segments, and their derivatives.
+        """Compute the readings of a shot with independent segments, i.e. with gaps, and their derivatives.
 
-        The readings have the shape (n,). The derivatives, shape (n, p + 2 j), are per unit of each
-        parameter's scale and, for the joint states, per unit of `units`.
+        The readings have the shape (n,). The derivatives have the shape (n, p + 2 j): first the derivatives
+        with respect to the p parameters, per unit of their scales, then with respect to displacement and
+        velocity at the j joints, per unit of `units`.
         """
         plan = self.plans[shot]
         count = chain.by_parameter.shape[2]
@@ -271,9 +282,13 @@ class Shooting:
     def condensed(self, shot: int, chain: Chain) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Eliminate the joint states by condensing; return the linear model of a shot with closed gaps.
 
-        Returned are the readings with closed gaps at unchanged parameters, shape (n,); their derivatives per
-        unit of each parameter's scale, shape (n, p); the change of the joint states that closes the gaps,
-        shape (j, 2), and its derivatives per unit of each parameter's scale, shape (j, 2, p).
+        Returns
+        -------
+        tuple
+            In this order: readings with closed gaps at unchanged parameters, shape (n,); their derivatives
+            with respect to the parameters, shape (n, p); change of the joint states that closes the gaps at
+            unchanged parameters, shape (j, 2); derivatives of this change with respect to the parameters,
+            shape (j, 2, p). The derivatives are per unit of each parameter's scale.
         """
         plan = self.plans[shot]
         count = chain.by_parameter.shape[2]

@@ -151,7 +151,12 @@ def find_touches(
 
 
 def _visits(surface: Surface, depth: FloatArray, clear: float) -> list[Touch]:
-    """Find the sample intervals beyond a surface; crossings within `clear` [m] do not end an interval."""
+    """Find the contacts with a surface: runs of consecutive samples beyond the surface.
+
+    `depth` [m] is the depth of each sample beyond the surface, negative in front of the surface. Only a run
+    that is somewhere deeper than `clear` [m] counts as a contact, and a retreat from the surface by at most
+    `clear` does not end a contact.
+    """
     touches: list[Touch] = []
     inside, outside = np.flatnonzero(depth > clear), np.flatnonzero(depth < -clear)
     row = 0
@@ -174,7 +179,10 @@ def _visits(surface: Surface, depth: FloatArray, clear: float) -> list[Touch]:
 def _check(
     name: str, t: FloatArray, smooth: FloatArray, clear: float, touches: list[Touch], hammer: Hammer
 ) -> None:
-    """Raise `InputError` for a record that does not cover the shot from rest to after the impact."""
+    """Raise `InputError` for a record that does not cover the shot from rest to after the impact.
+
+    `smooth` is the smoothed record, m, and `clear` the threshold of the contact detection, m.
+    """
     start = smooth[0] - hammer.position if hammer.position is not None else 0.0
     if start > clear:
         raise InputError(
@@ -213,7 +221,10 @@ def _check(
 
 
 def _state(t: FloatArray, x: FloatArray, row: int, reach: int, noise: float) -> tuple[float, float]:
-    """Estimate displacement and velocity at a sample from a robust local parabola fit."""
+    """Estimate displacement [m] and velocity [m/s] at the sample `row` from a robust local parabola fit.
+
+    The parabola is fitted to `reach` samples on either side; `noise` is the noise of the samples, m.
+    """
     rows = slice(max(row - reach, 0), row + reach + 1)
     s = t[rows] - t[row]
     scale = float(np.abs(s).max())
@@ -316,7 +327,11 @@ def fit_pulse(where: str, t: FloatArray, current: FloatArray, waveform: Waveform
 def _fit_waveform(
     t: FloatArray, current: FloatArray, waveform: Waveform, tau: float, top: float
 ) -> tuple[Pulse, float]:
-    """Fit the waveform constants; return the pulse and the RMS residual, A."""
+    """Fit the constants of a waveform to a recorded current; return the pulse and the RMS residual, A.
+
+    `top` is the height of the recorded pulse, A; `tau` is the time constant of the sensor, s, as in
+    `fit_pulse`.
+    """
     from scipy.optimize import least_squares
 
     names = tuple(name for name in quantities(type(waveform)) if getattr(waveform, name))
@@ -354,7 +369,10 @@ def _fit_waveform(
 
 
 def _starts(t: FloatArray, current: FloatArray, values: dict[str, float], top: float) -> list[FloatArray]:
-    """Return the logarithms of two initial guesses, with amplitude and width from `values` or the record."""
+    """Return the logarithms of two initial guesses of the waveform constants.
+
+    The first guess is `values`, the second also `values`, but with amplitude and width from the record.
+    """
     high = t[np.abs(current) > 0.5 * top]
     recorded = dict(values)
     recorded["amplitude"] = top

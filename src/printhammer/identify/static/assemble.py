@@ -53,9 +53,15 @@ def judge(
     the excluded rows are more consecutive than random gross errors would be. The smallest p-value is
     corrected for the number of tests (Bonferroni).
 
-    `terms` maps the meaning of a missing term to its values, in the unit of the data; terms, abscissa and
-    series have the shape (m,) of the data. Returned are the corrected p-value, NaN if the data are exact or
-    too few, and the meaning of the term or test with the smallest p-value, empty unless the law is rejected.
+    `terms` maps the meaning of a missing term to the values of the term, in the unit of the data. Terms,
+    abscissa and series have the shape (m,) of the data.
+
+    Returns
+    -------
+    p_value : float
+        Smallest p-value, corrected; NaN if the data are exact or too few.
+    why : str
+        Meaning of the term, or name of the test, with the smallest p-value; empty unless the law is rejected.
     """
     if solution.exact or solution.degrees_of_freedom < 3:
         return math.nan, ""
@@ -145,7 +151,7 @@ def stretch_p_value(signs: FloatArray) -> float:
 
 
 def inseparable(solution: Solution, names: Sequence[str]) -> list[str]:
-    """Describe, in one sentence, the parameters that the data hardly separate; an empty list if none.
+    """Describe the parameters that the data hardly separate, as a list of one sentence or an empty list.
 
     The sentence names the parameters with large components in the weakest direction; parameters with an empty
     name are skipped.
@@ -341,7 +347,11 @@ def profile(law: Law, data: FloatArray, solution: Solution, index: int) -> Profi
 
 
 def _crossing(values: FloatArray, increase: FloatArray, level: float, never: float) -> float:
-    """Locate the first crossing of a level by a profile likelihood; its square root is interpolated."""
+    """Return the first of the values at which a profile likelihood reaches a level; `never` if it does not.
+
+    `increase` is the profile likelihood at `values`; its square root is interpolated linearly between the
+    values.
+    """
     above = np.flatnonzero(increase >= level)
     if not above.size:
         return never
@@ -352,7 +362,7 @@ def _crossing(values: FloatArray, increase: FloatArray, level: float, never: flo
 
 
 def check_rows(data: Data, needed: int, what: str) -> None:
-    """Raise `InputError` for data with too few rows for a fit, or without a nonzero value."""
+    """Raise `InputError` for data with fewer than `needed` rows for a fit of `what`, or with only zeros."""
     where = " and ".join(str(path) for path in data.files)
     if len(data.values) < needed:
         raise InputError(

@@ -172,8 +172,9 @@ def fit_backstop(
     """Fit the damping ratio l/k to rebounds, and compute stiffness k and damping l of the backstop.
 
     The table has the columns ``impact speed`` and ``rebound speed``. `stiffness` is computed from the radii
-    and moduli of the two bodies in contact, or is a known value, N/m^1.5. See
-    `printhammer.identify.fitting.fit`.
+    and moduli of the two bodies in contact (`Stiffness.from_bodies`), or is a known value, N/m^1.5. Without a
+    table the result contains only the stiffness, without a stiffness only the ratio l/k. The other options
+    are described with `printhammer.identify.fitting.fit`.
 
     Raises
     ------

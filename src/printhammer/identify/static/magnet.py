@@ -74,7 +74,11 @@ class TotalLaw:
         return TotalLaw(x, current, self.position, 0.0).value(p)
 
     def richer(self, p: FloatArray, *, by_current: bool) -> dict[str, FloatArray]:
-        """Return candidate terms that equation (3) lacks, keyed by the meaning of each term."""
+        """Return candidate terms that equation (3) lacks, shape (m,), keyed by the meaning of each term.
+
+        With `by_current`, terms that depend on the current are included, which requires more than two
+        different currents.
+        """
         x, magnet, current = self._place(p), self.magnet.astype(np.float64), self.current
         place = "the pull does not follow the inverse root of the displacement"
         square = "the pull does not follow the square of Am - Bm I"
@@ -174,7 +178,7 @@ def fit_magnet(
     requires `position`, b, the position of the backstop, m. `zero` is the sensor reading at x = 0, m; None to
     fit it. The result has the constants "magnet.F0", "magnet.Am", "magnet.Bm", "spring.Bs" and "spring.As".
     Without `spring`, the forces determine only "magnet.Am", "magnet.Bm", F0 + Bs (1 + b / As) and Bs / As.
-    See `printhammer.identify.fitting.fit`.
+    The other options are described with `printhammer.identify.fitting.fit`.
 
     Raises
     ------

@@ -78,7 +78,7 @@ def _by_sense(depth: FloatArray) -> BoolArray:
 
 
 def check_loading(table: Readings, cycles: Cycles) -> None:
-    """Raise `InputError` for an implausible loading branch.
+    """Check that indentation and force grow on the loading branch of each load cycle.
 
     Raises
     ------
@@ -202,7 +202,7 @@ def fit_pack(
     """Fit "pack.stiffness" to a table with the columns ``indentation``, ``force`` and optionally ``branch``.
 
     `thickness` is the thickness d of the pack, platen minus front, m. With `exponents`, the exponents of
-    loading and unloading are fitted too, instead of assuming 2.7 and 11. See
+    loading and unloading are fitted too, instead of assuming 2.7 and 11. The other options are described with
     `printhammer.identify.fitting.fit`.
 
     Raises

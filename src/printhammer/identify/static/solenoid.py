@@ -218,7 +218,7 @@ class CircuitLaw:
 def _start(
     law: CircuitLaw, gap: FloatArray, force: FloatArray, linkage: FloatArray, data: FloatArray
 ) -> FloatArray:
-    """Estimate the initial guess by a multi-start least-squares search in the logarithms."""
+    """Estimate the initial guess by a multi-start least-squares search in the logarithms of the constants."""
     from scipy.optimize import least_squares
 
     current = np.array([row[1] for row in law.rows])

@@ -89,7 +89,10 @@ def fit_spring(path: str | Path, *, position: float, robust: bool = True, column
 
 
 def start_of(path: Path, travel: FloatArray, force: FloatArray) -> FloatArray:
-    """Return initial guesses of Bs and As by the Theil-Sen estimator, robust to outliers."""
+    """Return initial guesses of the spring constants Bs and As by the Theil-Sen estimator.
+
+    The estimator is robust to outliers. `travel` is the displacement from the backstop, m.
+    """
     from scipy.stats import theilslopes
 
     slope, height = (float(part) for part in theilslopes(force, travel)[:2])
