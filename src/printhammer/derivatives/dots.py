@@ -237,7 +237,7 @@ def changes_of(
 
 @dataclass(frozen=True)
 class _Look:
-    """Context of the derivatives of one dot: motion, problem, tangent flow and constants."""
+    """Data from which the derivatives of dots are computed: problem, record, tangent flow and constants."""
 
     problem: Problem
     record: Record

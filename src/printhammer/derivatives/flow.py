@@ -72,7 +72,7 @@ class Flow(Declared):
 
     @property
     def status_name(self) -> str:
-        """Name of the status of the run."""
+        """Name of the status of the run, such as "ok"."""
         return STATUS_NAMES[self.status]
 
 
@@ -95,10 +95,10 @@ def carry_columns(
     marks : array, shape (m,)
         Ascending times at which the columns are returned, s.
     initial : array, shape (3, n), with a circuit (3, n) or (6, n)
-        Changes of displacement [m], velocity [m/s] and latest local maximum [m] at the first mark; rows 3 to
-        5, zero by default, are changes of the flux linkages of the coil and of its shorted turn, Wb, and of
-        the reservoir voltage, V. If no current flows, the displacement determines the linkage, and the given
-        change of the linkage is ignored.
+        Changes of displacement [m], velocity [m/s] and latest local maximum of displacement [m] at the first
+        mark; rows 3 to 5, zero by default, are changes of the flux linkages [Wb] of the coil and of its
+        shorted turn, and of the reservoir voltage [V]. If no current flows, the displacement determines the
+        linkage, and the given change of the linkage is ignored.
     forcing : tuple, optional
         Derivatives of the equations with respect to constants (see `forcing_of`); by default none, and only
         the initial state changes.
@@ -190,9 +190,9 @@ def flow(
 def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
     """Return the derivatives of the rest state at time 0 with respect to n constants, shape (3, n).
 
-    The rows are displacement [m], velocity [m/s] and latest local maximum [m]. If a pulse with a sharp edge
-    is fired at time 0, a shift of its firing changes the initial velocity. With a coil circuit, the shape is
-    (6, n); the run starts without current, see `without_current`.
+    The rows are displacement [m], velocity [m/s] and latest local maximum of displacement [m]. If a pulse
+    with a sharp edge is fired at time 0, a shift of its firing changes the initial velocity. With a coil
+    circuit, the shape is (6, n); the run starts without current, see `without_current`.
     """
     columns = np.zeros((3, len(wanted)))
     columns[0] = rest_changes(problem.hammer, wanted)
@@ -278,7 +278,7 @@ def pack_push_changes(
     """Return the derivatives of the pack force [N] with respect to n constants, shape (n,).
 
     `state` is a row of `Flow.states` inside the pack; `changes`, shape (3 or more, n), are the derivatives of
-    displacement, velocity and latest local maximum in this state.
+    displacement, velocity and latest local maximum of displacement in this state.
     """
     moves = as_arrays(wanted)["hammer"]
     return np.array(
@@ -307,7 +307,7 @@ def _push_change(problem: Problem, moves: FloatArray, state: FloatArray, change:
     """Return the directional derivative of the pack force [N] along a change of constants and state.
 
     `moves` is the change of the packed constants; `change` is that of displacement, velocity and latest local
-    maximum in `state`.
+    maximum of displacement in `state`, a row of `Flow.states`.
     """
     x, v, mode, peak = (float(number) for number in state[:4])
     dx, dv, dp = (float(number) for number in change)

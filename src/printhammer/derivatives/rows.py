@@ -42,7 +42,7 @@ _SPACING: Final = 1e-5  # Finite-difference step of the state, in its scales; ar
 # Arbitrary.
 _TOLERANCE: Final = 1e-9
 _CLOSED: Final = 1e-6
-"""Distance from state to image below which an orbit is closed, in scales of the state; arbitrary."""
+"""Distance between a scaled state and its image below which an orbit counts as closed; arbitrary."""
 _LONGEST_STEP: Final = 0.1  # Longest Newton step, in scales of the state; arbitrary
 # Norm of the derivative below which the map is contracting and steps are not clipped; arbitrary, well below 1
 _CONTRACTING: Final = 0.3

@@ -208,12 +208,15 @@ def problem_between(
 
 
 def components(mode: float) -> int:
-    """Return the number of mechanical state components in a mode: 3 with a pack memory, else 2."""
+    """Return the number of mechanical state components in a mode of motion: 3 with a pack memory, else 2.
+
+    A mode, such as free flight or unloading of the pack, is a number of the kernel.
+    """
     return 3 if mode in (UNLOADING, RELOADING, HELD_UNLOADING) else 2
 
 
 def state_rows(problem: Problem, mode: float, electric: int = 3) -> list[int]:
-    """Return the row indices of `Flow.changes` that form the state in a mode.
+    """Return the row indices of `Flow.changes` that form the state in a mode of motion, see `components`.
 
     `electric` is the index of the first electric row. The components have the same indices in the initial
     columns of `carry_columns`.
@@ -226,7 +229,10 @@ def state_rows(problem: Problem, mode: float, electric: int = 3) -> list[int]:
 
 
 def state_of(row: FloatArray) -> tuple[float, float, float]:
-    """Return displacement [m], velocity [m/s] and latest local maximum [m] from a row of `Flow.states`."""
+    """Return displacement [m], velocity [m/s] and latest local maximum of displacement [m] of a state.
+
+    `row` is a row of `Flow.states`.
+    """
     return float(row[0]), float(row[1]), float(row[3])
 
 

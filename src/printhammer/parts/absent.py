@@ -42,7 +42,7 @@ def magnet_inductance(c: Any, x: float, current: float) -> float:
 
 
 def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float:
-    """Return the current of a coil without a magnet, linkage / inductance, A."""
+    """Return linkage / inductance, the current [A] of a coil in a hammer without a magnet."""
     return linkage / inductance
 
 
@@ -77,7 +77,7 @@ def pack_loading(c: Any, x: float, v: float) -> float:
 
 
 def pack_memory(c: Any, peak: float) -> float:
-    """Return 0: a pack without memory stores no state at a local maximum."""
+    """Return 0: a pack without memory stores no state at a local maximum of displacement, `peak`."""
     return 0.0
 
 
@@ -92,7 +92,7 @@ def pack_switch(c: Any, x: float, v: float) -> float:
 
 
 def pack_rebound(c: Any, v_in: float) -> float:
-    """Return the rebound velocity of a perfectly elastic surface, -v_in, m/s."""
+    """Return -v_in, the velocity [m/s] after a rebound from a perfectly elastic surface."""
     return -v_in
 
 
@@ -127,7 +127,7 @@ def backstop_switch(c: Any, w: float, v: float) -> float:
 
 
 def backstop_rebound(c: Any, v_in: float) -> float:
-    """Return the rebound velocity of a perfectly elastic surface, -v_in, m/s."""
+    """Return -v_in, the velocity [m/s] after a rebound from a perfectly elastic surface."""
     return -v_in
 
 

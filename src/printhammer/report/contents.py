@@ -177,13 +177,16 @@ class Report(Declared):
 
     @property
     def search(self) -> Search | None:
-        """Record of the search that found the constants of this hammer; None for another hammer."""
+        """Record of the search that found the constants of the hammer; None if no search found them."""
         search = self.reconstruction.search
         return search if search is not None and search.shipped == self.hammer.fingerprint else None
 
     @property
     def family(self) -> Family | None:
-        """Family of hammers that satisfy the claims about as well as this hammer; None for another hammer."""
+        """Family of hammers that satisfy the claims about as well as the hammer of the report.
+
+        None unless this hammer is the reconstruction of the hammer of the paper.
+        """
         return self.reconstruction.family if self.reconstructed else None
 
 

@@ -260,7 +260,10 @@ def _worded(summary: Callable[..., Summary]) -> Callable[..., Summary]:
 
 
 def named_codes(values: np.ndarray[Any, Any], note: Column) -> np.ndarray[Any, Any]:
-    """Return the names of integer codes; "" for codes without a name."""
+    """Return the names that a column declares for its integer codes; "" for codes without a name.
+
+    `note` is the declaration of the column. If it declares no names, the codes are returned.
+    """
     if not note.codes:
         return values
     names = np.array([*note.codes, ""])
@@ -282,8 +285,8 @@ def stacked(results: Sequence[Result], dim: str, kind: type[Result]) -> Entries:
     Returns
     -------
     dict
-        Entries in the form of `Result.entries`. A coordinate is that of the result in which the coordinate is
-        longest.
+        Entries in the form of `Result.entries`. Coordinates are not stacked: the longest
+        coordinate of each name is used.
     """
     declared = (note for note in kind.COLUMNS.values() if note.kind in ("column", "coordinate"))
     none: Entries = {note.name: (note, np.zeros((0,) * len(note.dims))) for note in declared}

@@ -55,7 +55,7 @@ def live_page(shelf: Shelf, start: Mapping[str, Any] | str = "") -> str:
     Raises
     ------
     InputError
-        A module is neither in the wheel nor can be linked: the extra `page` is not installed.
+        A module is not in the wheel and cannot be linked, since the extra `page` is not installed.
     """
     content = content_of(shelf)
     modules = [gzip.decompress(b64decode(module)) for module in content.pop("modules")]

@@ -140,7 +140,11 @@ class _Tasks:
         future.add_done_callback(self._done.put)
 
     def _next(self) -> tuple[Index, Results | None] | None:
-        """Wait for a task; return its block and results, or None for results if workers were killed."""
+        """Wait for a task to end; return the index of its block and its results.
+
+        The results are None if the task killed several workers. Return None if no task ends for `_INTERVAL`
+        seconds, or if the scheduler repeats the task that ended.
+        """
         try:
             future = self._done.get(timeout=_INTERVAL)
         except Empty:

@@ -40,9 +40,10 @@ def _inside(c: Any, x: float, current: float) -> bool:
 
 
 def _along_current(c: Any, x: float, j: int) -> tuple[float, float, float, float]:
-    """Return the linkage at `x` within current cell `j` as a polynomial: coefficients of powers 0 to 3.
+    """Return the linkage at `x` as a polynomial in the current: coefficients of powers 0 to 3.
 
-    The variable of the polynomial is the current minus the current at the start of the cell.
+    The polynomial holds in the interval `j` of the currents of the table; its variable is the current minus
+    the current at the start of the interval.
     """
     nx = int(c[0])
     i = cell_of(c, 2, nx, x)
@@ -57,9 +58,10 @@ def _along_current(c: Any, x: float, j: int) -> tuple[float, float, float, float
 
 
 def _slope_along_current(c: Any, x: float, j: int) -> tuple[float, float, float, float]:
-    """Return d(linkage)/dx at `x` within current cell `j` as a polynomial: coefficients of powers 0 to 3.
+    """Return d(linkage)/dx at `x` as a polynomial in the current: coefficients of powers 0 to 3.
 
-    The variable of the polynomial is the current minus the current at the start of the cell.
+    The polynomial holds in the interval `j` of the currents of the table; its variable is the current minus
+    the current at the start of the interval.
     """
     nx = int(c[0])
     i = cell_of(c, 2, nx, x)
@@ -91,7 +93,7 @@ def magnet_force(c: Any, x: float, current: float) -> float:
 
 
 def magnet_energy(c: Any, x: float) -> float:
-    """Return 0 J, since there is no force at zero current; NaN outside the table."""
+    """Return 0 J, the potential energy at zero current, where there is no force; NaN outside the table."""
     return 0.0 if c[2] <= x <= c[1 + int(c[0])] else math.nan
 
 

@@ -32,7 +32,7 @@ def magnet_force(c: Any, x: float, current: float) -> float:
 
 
 def magnet_energy(c: Any, x: float) -> float:
-    """Return 0 J: there is no magnetic force at zero current."""
+    """Return 0 J, the potential energy at zero current, where there is no magnetic force."""
     return 0.0
 
 
@@ -47,7 +47,7 @@ def magnet_emf(c: Any, x: float, current: float) -> float:
 
 
 def magnet_inductance(c: Any, x: float, current: float) -> float:
-    """Return 0 H: the permanent field does not depend on the current."""
+    """Return 0 H, the derivative of the flux linkage of the permanent field with respect to current."""
     return 0.0
 
 

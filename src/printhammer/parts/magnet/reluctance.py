@@ -85,7 +85,7 @@ def magnet_force(c: Any, x: float, current: float) -> float:
 
 
 def magnet_energy(c: Any, x: float) -> float:
-    """Return 0 J: there is no magnetic force at zero current; NaN outside the range of the law."""
+    """Return 0 J, the potential energy at zero current; NaN outside the range of the law."""
     return 0.0 * _gap_inductance(c, x)
 
 

@@ -68,9 +68,10 @@ def magnet_energy(c: Any, x: float) -> float:
 
 
 def _linkage(c: Any, x: float, j: int) -> tuple[float, float, float]:
-    """Return the linkage at `x` within current cell `j` as a polynomial: coefficients of powers 0 to 2.
+    """Return the linkage at `x` as a polynomial in the current: coefficients of powers 0 to 2.
 
-    The variable of the polynomial is the current minus the current at the start of the cell.
+    The polynomial holds in the interval `j` of the currents of the table; its variable is the current minus
+    the current at the start of the interval.
     """
     nx = int(c[0])
     ni = int(c[1])

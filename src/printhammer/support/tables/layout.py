@@ -436,8 +436,8 @@ def _clock(
 ) -> Clock | None:
     """Derive the sample times from metadata: start and step, or step and the index of time zero.
 
-    Return None if the metadata do not determine the times. `numbered` states whether the metadata stand
-    beside the numbers; above them, a start without a unit may be a sample index.
+    Return None if the metadata do not determine the times. `numbered` states whether metadata stand to the
+    right of the column names; otherwise, a start without a unit may be a sample index.
     """
     written = _fact(facts, _START, [""])[0]
     # Above the numbers, a start without a unit may be a sample index.

@@ -329,7 +329,7 @@ def _by_heading(
 
 
 def _values(table: Table, name: str, source: Source, si: str, gaps: bool) -> FloatArray:
-    """Return the numbers of a column in SI."""
+    """Return the numbers of the quantity `name` in SI; if `gaps`, empty cells become NaN."""
     cells = table.cells(source.place - 1)
     heading = table.columns[source.place - 1]
     if heading.unit in _CAPITALS and not source.unit.endswith(f"/{heading.unit}"):
