@@ -63,7 +63,7 @@ def _print(text: str) -> None:
 
 
 def complain(sentence: str) -> None:
-    """Print one line to standard error."""
+    """Print an error message to standard error, on one line after the name of the program."""
     text = " ".join(sentence.split())
     _print(f"[red]printhammer:[/red] {escape(text)}")
 

@@ -218,7 +218,7 @@ _TAKES: Final = {
 
 
 def _check_options(task: str, options: set[str]) -> None:
-    """Raise InputError if an option is set that belongs to another task."""
+    """Raise InputError if any of the set `options` belongs to a task other than `task`, such as "yield"."""
 
     def named(name: str) -> str:
         return "the report" if name == "report" else f"--{name}"

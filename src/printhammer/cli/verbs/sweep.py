@@ -78,10 +78,9 @@ def sweep(
 
 
 def ended(result: xr.Dataset, new: float, seconds: float) -> str:
-    """Format the outcome of a sweep: number of members by status, and of members that end not at rest.
+    """Format the outcome of a sweep: the number of members with each status, and of those not yet at rest.
 
-    The text also states the number `new` of members that this process has computed, and the duration of the
-    computation.
+    The text also states that this process has computed `new` members in `seconds`.
     """
     from collections import Counter
 
