@@ -44,12 +44,12 @@ _STYLES: Final[dict[str, Style]] = {
 
 
 def index_sums(orbits: Sequence[tuple[int, npt.NDArray[np.complex128]]], longest: int) -> dict[int, int]:
-    """Compute the sums of the fixed-point indices of the strobe map over 1, 2, ... firings.
+    """Compute the sums of the fixed-point indices of the strobe map over n firings, for n up to `longest`.
 
-    The index of a fixed point is the sign of det(I - M), with M the derivative of the map over that number of
-    firings: -1 for a saddle with a multiplier beyond +1, else +1. If the map is continuous and maps a disc
-    into itself, the indices of all fixed points in the disc add up to 1 (S. Lefschetz, Trans. Am. Math. Soc.
-    28 (1926) 1). `orbits` are pairs of the number of firings and the multipliers of an orbit.
+    The index of a fixed point is the sign of det(I - M), with M the derivative of the map over n firings: -1
+    for a saddle with a multiplier beyond +1, else +1. If the map is continuous and maps a disc into itself,
+    the indices of all fixed points in the disc add up to 1 (S. Lefschetz, Trans. Am. Math. Soc. 28 (1926) 1).
+    `orbits` contains the period [firings] and the multipliers of each orbit. The result maps n to the sum.
     """
     sums = {}
     for count in range(1, longest + 1):
@@ -62,14 +62,14 @@ def index_sums(orbits: Sequence[tuple[int, npt.NDArray[np.complex128]]], longest
 def fewest_missing(sums: Mapping[int, int]) -> int:
     """Compute a lower bound on the number of missing orbits from the index sums.
 
-    An orbit of d firings adds d or -d to the sums over the multiples of d firings, so that at least
-    k / n orbits are missing if the sum over n firings differs from 1 by k.
+    An orbit of d firings adds d or -d to the sum for every multiple of d, so that at least k / n orbits are
+    missing if the sum for n firings differs from 1 by k.
     """
     return max((math.ceil(abs(total - 1) / count) for count, total in sums.items()), default=0)
 
 
 def indices_add_up(regime: Regime) -> bool:
-    """Whether theory requires the fixed-point indices to sum to 1.
+    """Whether a theorem requires the fixed-point indices of the strobe map to sum to 1; see `index_sums`.
 
     True for a hammer without a pack that has damping or a backstop.
     """
@@ -78,7 +78,10 @@ def indices_add_up(regime: Regime) -> bool:
 
 
 def energies_of(regime: Regime) -> list[str]:
-    """Return the names of the energies in a summary: drive work, and losses of the hammer's components."""
+    """Return the names of the energies that a summary of orbits shows.
+
+    They are the work of the drive, and the losses in pack, backstop and, if there is any, damping.
+    """
     work = "drive_work" if regime.fired.quantity == "force" else "coil_work"
     damping = ["damping_loss"] if regime.hammer.is_damped else []
     return [work, "pack_loss", "backstop_loss", *damping]
@@ -143,15 +146,16 @@ class Orbits(Result):
 
     @property
     def counts(self) -> dict[str, int]:
-        """Number of orbits by kind: stable, saddle, unstable, undecided."""
+        """Number of orbits of each kind that occurs: stable, saddle, unstable, undecided."""
         counts = Counter(orbit.kind for orbit in self.found)
         return {kind: counts[kind] for kind in KINDS if counts[kind]}
 
     @property
     def coverage(self) -> float:
-        """Estimated probability that a further converging guess reaches a known orbit; NaN without guesses.
+        """Estimated probability that a further guess, if it converges, leads to a known orbit.
 
-        The estimate is not a bound: orbits that no guess comes near are not counted.
+        The estimate is not a bound, since orbits that no guess comes near are not counted. It is NaN if no
+        guess has led to an orbit.
 
         The Good-Turing estimate is 1 minus the fraction of guesses that converge to an orbit reached by no
         other guess (I. J. Good, Biometrika 40 (1953) 237).
@@ -162,10 +166,11 @@ class Orbits(Result):
     def unseen(self) -> float:
         """Estimated lower bound on the number of orbits that the search missed.
 
-        The larger of two bounds: f1 (f1 - 1) / (2 (f2 + 1)), with f1 and f2 the numbers of orbits reached
-        from exactly one and exactly two guesses (A. Chao, Scand. J. Statist. 11 (1984) 265), less the orbits
-        found only as mirror images or from guesses near known orbits; and the smallest number of missing
-        orbits implied by the fixed-point indices; see `fewest_missing`.
+        The result is the larger of two bounds. The first is f1 (f1 - 1) / (2 (f2 + 1)), with f1 and f2 the
+        numbers of orbits reached from exactly one and exactly two guesses (A. Chao, Scand. J. Statist. 11
+        (1984) 265), minus the number of orbits found only as mirror images or from guesses near known orbits.
+        The second is the smallest number of missing orbits that the fixed-point indices imply; see
+        `fewest_missing`.
         """
         once, twice = self.hits.count(1), self.hits.count(2)
         bound = 0.5 * once * max(once - 1, 0) / (twice + 1) - self.hits.count(0)
@@ -173,9 +178,9 @@ class Orbits(Result):
 
     @property
     def indices(self) -> dict[int, int]:
-        """Sums of the indices of the fixed points of the strobe map, by number of firings, ascending from 1.
+        """Sums of the fixed-point indices of the strobe map over 1, 2, ... firings; see `index_sums`.
 
-        See `index_sums`. The array is empty if no theorem gives the sum.
+        Empty if no theorem gives the expected sum, or if an orbit is undecided.
         """
         if not indices_add_up(self.regime) or any(orbit.kind == UNDECIDED for orbit in self.found):
             return {}

@@ -47,7 +47,7 @@ _SIZES: Final = (-6.0, -1.5)
 
 Near chatter, orbits that differ by one bounce lie close together. Tuned on the ball of Tufillaro at 60 Hz."""
 _NEARBY: Final = (-1.5, -0.5)  # Arbitrary
-"""Range of decimal logarithms of the distances between known orbits and starts, in half-widths."""
+"""Range of decimal logarithms of the distances of starts from states of known orbits, in half-widths."""
 _PLASTIC: Final = 1.324717957244746
 """Real root of x^3 = x + 1, whose inverse powers spread points evenly over a square."""
 
@@ -67,16 +67,17 @@ class Records(Declared):
 
 
 def firings_for(period: int) -> int:
-    """Compute the number of firings to record per motion in a search for orbits of a period."""
+    """Compute the number of firings to record per motion in a search for orbits of `period` firings."""
     return max(2 * period, _LEAST)
 
 
 def record(
     regime: Regime, starts: FloatArray, firings: int, long: int, threads: int | None = None
 ) -> list[Records]:
-    """Simulate motions from initial states, shape (M, 2); record their states at each of `PHASES`.
+    """Simulate motions from the initial states `starts`, displacement [m] and velocity [m/s], shape (M, 2).
 
-    The motion from the first state lasts `long` firings; every other motion lasts `firings` firings.
+    The motion from the first state lasts `long` firings; every other motion lasts `firings` firings. Returns,
+    for each section phase in `PHASES`, the states at the sections.
     """
     longest = max(firings, long) if len(starts) else 0
     drive, _ = regime.train(longest + 1)
@@ -105,12 +106,12 @@ def record(
 
 
 def spread(regime: Regime, count: int, visited: FloatArray) -> FloatArray:
-    """Distribute initial states evenly: half over the strobe window, half over a larger rectangle.
+    """Distribute `count` initial states evenly: half over the strobe window, half over a larger rectangle.
 
     The rectangle contains the window, the states `visited` and the range up to the pack. If backstop and pack
     do not both bound the displacement, the rectangle extends over at least six half-widths of the window on
     either side: in the bouncing-ball model, an orbit with one impact per period rises to five half-widths.
-    A row is displacement [m] and velocity [m/s].
+    Each row of the result contains displacement [m] and velocity [m/s].
     """
     window = regime.window
     low, high = np.array([window.x[0], window.v[0]]), np.array([window.x[1], window.v[1]])
@@ -142,7 +143,7 @@ def spread(regime: Regime, count: int, visited: FloatArray) -> FloatArray:
 
 
 def first_state(regime: Regime) -> tuple[float, float]:
-    """Return the rest state of the hammer; without a rest state, the middle of the hammer's window."""
+    """Return the rest state (m, m/s) of the hammer; without a rest state, the middle of its strobe window."""
     try:
         return rest_state(regime.hammer), 0.0
     except InputError:
@@ -151,11 +152,12 @@ def first_state(regime: Regime) -> tuple[float, float]:
 
 
 def touches(regime: Regime, count: int) -> FloatArray:
-    """Compute the states at the next firing of motions that leave a rigid backstop, shape (count, 2).
+    """Compute `count` states at a firing of motions that left a rigid backstop since the previous firing.
 
-    Phases of the departure are spread evenly, speeds more densely at low values: near chatter, an
-    accumulation of ever lower bounces, orbits are so dense that no even spread over the plane resolves them.
-    If a run ends before the firing, the rest state replaces the state.
+    Each row contains displacement [m] and velocity [m/s]. The phases at which the motions leave are spread
+    evenly, their speeds more densely at low values: near chatter, an accumulation of ever lower bounces,
+    orbits are so dense that no even spread over the plane resolves them. If a run ends before the firing, the
+    state is that of `first_state`.
     """
     number = np.arange(1, count + 1)
     phases, shares = ((0.5 + number / _PLASTIC**k) % 1.0 for k in (1, 2))
@@ -172,12 +174,12 @@ def touches(regime: Regime, count: int) -> FloatArray:
 def close_returns(
     records: Records, period: int, most: int, scales: FloatArray, within: int
 ) -> tuple[list[Guess], list[Guess]]:
-    """Select the closest returns of motions after `period` firings, without duplicates.
+    """Select segments of motions that return closest to their starts after `period` firings, as guesses.
 
-    Only the first `within` firings of the short records are used. Two lists are returned: the closest of all
-    returns, and the closest of the returns that begin within the first `_EARLY` firings, each of at most half
-    of `most`. Distances are divided by `scales`, the half-widths of the strobe window. A larger `most`
-    extends both lists.
+    Only the first `within` firings of the short records are used. Two lists without duplicates are returned:
+    the closest of all returns, and the closest of the returns that begin within the first `_EARLY` firings of
+    a motion. Each contains at most half of `most` guesses; a larger `most` extends both lists. Distances are
+    divided by `scales`, the half-widths of the strobe window.
     """
     scaled = records.states / scales
     count = scaled.shape[1] - period
@@ -214,10 +216,10 @@ def close_returns(
 def joined(
     shorter: Sequence[Guess], period: int, most: int, scales: FloatArray, known: Collection[tuple[int, int]]
 ) -> list[Guess]:
-    """Concatenate pairs of shorter orbits into initial guesses for orbits of `period` firings.
+    """Concatenate pairs of the orbits `shorter` into initial guesses for orbits of `period` firings.
 
-    At most `most` pairs are used, in ascending order of the jump between the two orbits; pairs of indices in
-    `known` are skipped.
+    At most `most` pairs are used, in ascending order of the distance between the two orbits, scaled by
+    `scales`. Pairs whose indices are in `known` are skipped.
     """
     guesses: list[tuple[float, Guess]] = []
     for k, orbit in enumerate(shorter):
@@ -240,10 +242,10 @@ def moves_near(rng: np.random.Generator, count: int) -> FloatArray:
 
 
 def motions(maps: FastMaps, starts: FloatArray, period: int) -> list[Guess]:
-    """Simulate motions over `period` firings as initial guesses; omit motions whose run fails.
+    """Simulate motions from `starts` over `period` firings, as guesses; omit motions whose run fails.
 
-    The motions need not return to their starts: Newton's method often leads from such a guess to an orbit to
-    which no recorded motion closely returns.
+    The motions need not return to their starts: Newton's method often leads from such a guess to an orbit
+    near which no recorded motion returns closely.
     """
     table = starts[:, np.newaxis]
     for _ in range(period - 1):
@@ -256,7 +258,10 @@ def motions(maps: FastMaps, starts: FloatArray, period: int) -> list[Guess]:
 def displaced(
     orbits: Sequence[Guess], period: int, rng: np.random.Generator, scales: FloatArray, lowest: FloatArray
 ) -> list[Guess]:
-    """Build guesses from orbits of a period: states displaced at random, but not below `lowest`."""
+    """Build guesses from known orbits of `period` firings by random displacements of their states.
+
+    Displacements are in units of `scales`. No component of a state becomes smaller than that of `lowest`.
+    """
     # The same displacements for every orbit, so that a larger search includes those of a smaller search.
     sizes = 10.0 ** rng.uniform(*_SIZES, (_NEAR, 1, 1))
     moves = sizes * scales * rng.uniform(-1.0, 1.0, (_NEAR, period, 2))
@@ -268,7 +273,10 @@ def displaced(
 
 
 def _is_new(cycle: FloatArray, kept: FloatArray, apart: float) -> bool:
-    """Whether a cycle of states, in any cyclic shift, differs by more than `apart` from all known cycles."""
+    """Whether a cycle of scaled states differs by more than `apart` from every cycle in `kept`.
+
+    All cyclic shifts of a cycle are equivalent.
+    """
     if not len(kept):
         return True
     return all(

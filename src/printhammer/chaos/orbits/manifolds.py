@@ -193,7 +193,7 @@ class Scaled:
         return np.asarray(points * self.scales)
 
     def image(self, point: FloatArray, firings: int) -> tuple[FloatArray, FloatArray]:
-        """Compute the image of a scaled state and the derivative there; NaN if the run fails."""
+        """Compute the image of a scaled state, and the derivative of the map there; NaN if the run fails."""
         images = self.maps(self.outward(point)[np.newaxis], np.array([firings]))
         if images.reasons[0] != CLOSED:
             return np.full(2, np.nan), np.full((2, 2), np.nan)
@@ -202,10 +202,10 @@ class Scaled:
 
 
 def _direction(own: Scaled, saddle: FloatArray, firings: int, stable: bool) -> tuple[FloatArray, float, int]:
-    """Return the eigenvector at a saddle, the growth factor per step, and the firings per step.
+    """Return the stable or unstable eigenvector at a saddle, and the factor by which a step scales it.
 
-    If the multiplier is negative, images alternate between the sides of the saddle, so that one step is two
-    periods.
+    A step is one period of the saddle orbit, or two if the multiplier is negative, since images then
+    alternate between the two sides of the saddle. The third result is the number of firings per step.
     """
     _, jacobian = own.image(saddle, firings)
     # The smaller eigenvalue would be lost in the rounding of the trace.
@@ -219,7 +219,10 @@ def _direction(own: Scaled, saddle: FloatArray, firings: int, stable: bool) -> t
 
 
 def _unstable(own: Scaled, saddle: FloatArray, side: float, firings: int, limits: _Limits) -> _Curve:
-    """Grow an unstable manifold as the images of a fundamental segment; return the curve."""
+    """Grow one side of an unstable manifold as the images of a fundamental segment; return the curve.
+
+    `side` is 1 or -1, the direction along the eigenvector.
+    """
     vector, growth, firings = _direction(own, saddle, firings, stable=False)
     start = _NEAR / growth
 
@@ -265,7 +268,7 @@ def _unstable(own: Scaled, saddle: FloatArray, side: float, firings: int, limits
 
 
 def _sink(own: Scaled, point: FloatArray, firings: int, spacing: float) -> FloatArray | None:
-    """Find the stable fixed point within one spacing of a point by Newton's method, or None."""
+    """Find the stable fixed point within the distance `spacing` of a point, by Newton's method; else None."""
     guess = point
     for _ in range(_NEWTON):
         image, jacobian = own.image(guess, firings)
@@ -281,7 +284,10 @@ def _sink(own: Scaled, point: FloatArray, firings: int, spacing: float) -> Float
 
 
 def _has_gap(row: list[FloatArray], k: int, spacing: float) -> bool:
-    """Whether a point has to be inserted after point k: wide gap, sharp bend, or end of the curve."""
+    """Whether a point has to be inserted after point k of a row of points.
+
+    A point is needed in a gap wider than `spacing`, at a sharp bend, or before the end of the curve.
+    """
     here, there = row[k], row[k + 1]
     step = float(np.hypot(*(there - here)))
     if not math.isfinite(step):
@@ -296,7 +302,10 @@ def _has_gap(row: list[FloatArray], k: int, spacing: float) -> bool:
 
 
 def _stable(own: Scaled, saddle: FloatArray, side: float, firings: int, limits: _Limits) -> _Curve:
-    """Continue a stable manifold: each new point is the preimage of a point of the known curve."""
+    """Continue one side of a stable manifold: each new point is the preimage of a point of the known curve.
+
+    `side` is 1 or -1, the direction along the eigenvector.
+    """
     vector, shrink, firings = _direction(own, saddle, firings, stable=True)
     made = _Inward(saddle, side * _NEAR * vector, shrink)
     place, step, total = 1.0, 0.05, 0.0
@@ -335,9 +344,10 @@ def _stable(own: Scaled, saddle: FloatArray, side: float, firings: int, limits: 
 
 @dataclass
 class _Inward:
-    """Known section of a stable manifold, whose parameter grows by 1 from each point to its preimage.
+    """Known part of a stable manifold, from the saddle outward, with a parameter along the curve.
 
-    From 0 to 1 the curve is treated as straight.
+    The parameter of the preimage of a point is larger by 1 than that of the point. Up to the parameter 1 the
+    curve is treated as straight.
     """
 
     saddle: FloatArray
@@ -352,13 +362,14 @@ class _Inward:
         self.places.append(1.0)
 
     def ahead(self, step: float) -> FloatArray:
-        """Extrapolate the curve beyond its end by a parameter step, along the line from the saddle."""
+        """Extrapolate the curve by a parameter step beyond its end, along the line from the saddle."""
         return np.asarray(self.saddle + (self.points[-1] - self.saddle) * self.shrink**-step)
 
     def at(self, place: float) -> FloatArray:
-        """Interpolate the point at a parameter value: on the straight start, or by a cubic beyond 1.
+        """Return the point of the curve at the parameter value `place`.
 
-        The cubic interpolates the offset from the saddle divided by the offset under the linear map.
+        Up to 1 the curve is straight. Beyond 1 a cubic interpolates the offset from the saddle, divided by
+        its growth under the linearised map.
         """
         if place <= 1.0:
             return np.asarray(self.saddle + self.shrink ** (1.0 - place) * self.reach)
@@ -376,7 +387,7 @@ class _Inward:
 def _preimage(
     own: Scaled, wanted: FloatArray, guess: FloatArray, firings: int, spacing: float
 ) -> FloatArray | None:
-    """Find the preimage of the point `wanted` near a guess by Newton's method, or None."""
+    """Find the preimage of the point `wanted` near `guess` by Newton's method; None if not found."""
     point = guess
     for _ in range(_NEWTON):
         image, jacobian = own.image(point, firings)
@@ -393,7 +404,7 @@ def _preimage(
 
 
 def _angle(one: FloatArray, other: FloatArray) -> float:
-    """Compute the angle between two vectors of the plane, rad."""
+    """Compute the angle [rad] between two vectors of the plane."""
     across = one[0] * other[1] - one[1] * other[0]
     return abs(math.atan2(across, float(one @ other)))
 

@@ -51,7 +51,11 @@ _LEAST_SHARE: Final = 2.0**-7
 
 @dataclass(frozen=True)
 class Images:
-    """Images of many states, one per row: states, derivatives, differentiability, reasons for failure."""
+    """Images of many states under the strobe map, one per row.
+
+    The fields are the image, the derivative of the map, whether the derivative exists, and the reason for a
+    failure.
+    """
 
     states: FloatArray
     jacobians: FloatArray
@@ -109,12 +113,12 @@ def close_orbits(
     enough: float,
     iterations: int,
 ) -> list[Closing]:
-    """Converge initial guesses of orbits, with equal numbers of segments, by damped Newton's method.
+    """Converge n initial guesses of orbits, each of m segments, by damped Newton's method.
 
-    Guesses are states at the starts of the segments, shape (n, m, 2), with numbers of firings, shape (n, m);
-    the scales are the half-widths of the window, m and m/s. In units of the scales, the iteration stops at
-    the residual `goal`; a residual of `enough` is accepted if the residual stops decreasing. `iterations` is
-    the maximum number of steps tried per orbit.
+    Guesses are the states at the starts of the segments, shape (n, m, 2), and `firings` the numbers of
+    firings in the segments, shape (n, m). The scales are the half-widths of the strobe window [m and m/s]. In
+    units of the scales, the iteration stops at the residual `goal`; a residual of `enough` is accepted if the
+    residual stops decreasing. `iterations` is the maximum number of steps tried per orbit.
     """
     search = _Search(maps, guesses, firings, scales)
     for _ in range(iterations):
@@ -144,7 +148,10 @@ class _Search:
         self.open &= np.isfinite(self.residual)
 
     def step(self, goal: float, enough: float) -> IntArray:
-        """Try one damped Newton step for every unfinished orbit; return the indices of these orbits."""
+        """Try one damped Newton step for every unfinished orbit; return the indices of these orbits.
+
+        `goal` and `enough` are the residuals of `close_orbits`.
+        """
         self._end(self.open & (self.residual <= goal), CLOSED)
         rows = np.flatnonzero(self.open)
         if not rows.size:
@@ -167,7 +174,10 @@ class _Search:
         return rows
 
     def result(self, enough: float) -> list[Closing]:
-        """Return the outcome of every initial guess, in input order."""
+        """Return the outcome of every initial guess, in input order.
+
+        A guess that is still unfinished counts as closed if its residual is at most `enough`.
+        """
         self._end(self.open & (self.residual <= enough), CLOSED)
         return [
             Closing(
@@ -186,7 +196,12 @@ class _Search:
         self.open[rows] = False
 
     def _evaluate(self, z: FloatArray, rows: IntArray) -> tuple[Images, FloatArray, FloatArray, TextArray]:
-        """Evaluate orbits at trial states; return images, closing defects, their norms, and failures."""
+        """Evaluate the orbits `rows` at the scaled trial states `z`.
+
+        Returns, in this order: the images; the closing defects, i.e. the differences between the end of each
+        segment and the start of the next; the largest absolute defect of each orbit, infinite after a
+        failure; and the reason for a failure.
+        """
         images = self.maps((z * self.scales).reshape(-1, 2), self.firings[rows].reshape(-1))
         ends = images.states.reshape(z.shape) / self.scales
         defects = ends - np.roll(z, -1, axis=1)
@@ -205,7 +220,10 @@ class _Search:
         reasons: TextArray,
         which: BoolArray | None = None,
     ) -> None:
-        """Store the accepted iterates and compute the full Newton step from each."""
+        """Store the results of `_evaluate` for the orbits `rows`; compute the full Newton step from each.
+
+        `which` is the mask of the evaluated orbits whose step is accepted; by default all are accepted.
+        """
         chosen = np.ones(len(residual), np.bool_) if which is None else which
         shape = (len(residual), self.segments, 2, 2)
         jacobians = images.jacobians.reshape(shape) * self.scales / self.scales[:, np.newaxis]
@@ -218,7 +236,7 @@ class _Search:
         self._aim(rows[~bad])
 
     def _aim(self, rows: IntArray) -> None:
-        """Solve the linear systems of the full Newton steps; clip each step to the largest allowed."""
+        """Compute the full Newton step of the orbits `rows`; limit each step to `_LONGEST_STEP`."""
         m = self.segments
         matrix = np.zeros((len(rows), 2 * m, 2 * m))
         for i in range(m):

@@ -145,7 +145,7 @@ class Orbit(Result):
         "1", "phase of the section after the first firing, as a fraction of the drive period", kind="column"
     )
     def phase(self) -> float:
-        """Phase of the section after the first firing, as a fraction of the drive period."""
+        """Phase of the section: time since the last firing, as a fraction of the drive period."""
         return self.regime.phase
 
     @property
@@ -260,7 +260,7 @@ class Orbit(Result):
 
 
 def no_orbit(regime: Regime, firings: int, tolerance: float, status: str) -> Orbit:
-    """Build the result for an orbit that was not found, with the reason as its status."""
+    """Build the result for an orbit that was not found; `status` is the reason."""
     none = np.full(firings, np.nan)
     return Orbit(
         regime=regime,
@@ -323,11 +323,11 @@ def orbit_of(regime: Regime, closing: Closing, tolerance: float) -> Orbit:
 
 
 def multipliers_of(jacobians: FloatArray) -> npt.NDArray[np.complex128]:
-    """Compute the eigenvalues of the product of 2 x 2 matrices, shape (m, 2, 2), last factor on the left.
+    """Compute the two eigenvalues of a product of m matrices, shape (m, 2, 2); the last is leftmost.
 
-    The eigenvalues are computed from trace and determinant, and the determinant as the product of the
-    factors' determinants, since the rounding of the matrix product would destroy the small eigenvalue of a
-    strong contraction.
+    The eigenvalues are computed from the trace and the determinant of the product. The determinant is the
+    product of the determinants of the factors: rounding in the matrix product would destroy the small
+    eigenvalue of a strong contraction.
     """
     product = np.eye(2)
     for factor in jacobians:
@@ -361,7 +361,7 @@ class _Run:
         return Motion(self.problem, self.record, end, times, "default")
 
     def at_firings(self) -> FloatArray:
-        """Return displacement [m], velocity [m/s], mode and memory [m] at each firing, one row per period.
+        """Return displacement [m], velocity [m/s], mode and memory [m] at each firing, one row per firing.
 
         The first row belongs to the last firing at or before the section.
         """
@@ -375,7 +375,10 @@ class _Run:
 def _contacts_and_dots(
     regime: Regime, start: FloatArray, firings: int, tolerance: float
 ) -> tuple[Rows[Contact], Rows[Dot]]:
-    """Compute the contacts and dots that begin in one period of an orbit, each followed to its end."""
+    """Compute the contacts and dots that begin in one period of an orbit, each followed to its end.
+
+    `start` is the state of the orbit at the section.
+    """
     skipped = 0 if regime.phase == 0.0 or regime.drive is not None else 1
     run = _Run(regime, start, firings + skipped + 1, tolerance)
     motion, period = run.motion, firings * regime.period

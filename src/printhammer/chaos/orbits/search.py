@@ -59,13 +59,14 @@ def orbits(
         1024, 2048, 4096 and so on. A search with more starts or guesses finds all orbits of a search with
         fewer.
     guesses : int, optional
-        Number of guesses for each orbit period in each block of starts, rounded up to 8, 48, 96 and so on,
-        and multiplied by eight for period 1, by four for period 2, and by two for periods 3 and 4. Further
-        guesses are concatenations of known shorter orbits.
+        Number of guesses for each orbit period, in each block of starts: the first 128, those up to 1024,
+        those up to 2048, and so on. The number is rounded up to 8, 48, 96 and so on, and multiplied by eight
+        for period 1, by four for period 2, and by two for periods 3 and 4. Further guesses are concatenations
+        of known shorter orbits.
     follow : int, optional
-        Largest period, in firings, of the orbits whose branches are followed over 5 % of the drive period on
-        either side; where a branch returns to the period of the drive, a further orbit exists. 0 follows no
-        branches.
+        Largest period, in firings, of the orbits whose branches are followed, over drive periods up to 5 %
+        shorter or longer. Where a branch returns to the drive period of the regime, a further orbit exists.
+        If 0, no branch is followed.
 
     Returns
     -------
@@ -100,10 +101,10 @@ def orbit(
     state : array, shape (2,)
         Displacement [m] and velocity [m/s] at a section.
     firings : int, optional
-        Period of the orbit, in firings.
+        Number of firings after which the orbit repeats.
     phase : float, optional
-        Phase of the section, by default that of the regime. At this phase the armature must not be moving out
-        of the pack, since its state would then include a memory.
+        Phase of the section, by default that of the regime. The armature must not be moving out of the pack
+        at the section, since its state would then include a memory.
 
     Returns
     -------

@@ -67,9 +67,10 @@ class Settled(Declared):
 
 
 def shown(points: FloatArray, period: int) -> BoolArray:
-    """Return the mask of motions whose states alone prove the period `period`, without a Newton test.
+    """Return the mask of the motions whose states alone prove the period `period`, without Newton's method.
 
-    `points`, shape (n, m, k), are the states at m successive firings, divided by the scales.
+    `points`, shape (n, m, k), are the states of n motions at m successive firings; their k components are
+    divided by the scales.
     """
     _early, late = _apart(points, period, period)
     clear = np.asarray(late <= AGREES)
@@ -81,10 +82,11 @@ def shown(points: FloatArray, period: int) -> BoolArray:
 def settled(regime: Regime, points: FloatArray, period: int, scales: FloatArray) -> Settled:
     """Determine the settled orbit of a motion whose states agree `period` firings apart.
 
-    Points, shape (m, k), are displacement [m], velocity [m/s] and further components of the state, at
-    successive sections; the scales, shape (k,), are the half-widths of the strobe window. If the strobe map
-    has no derivative, because a section falls into the pack or on a touch without velocity, or because a
-    current flows at the section, the states alone decide.
+    `points`, shape (m, k), are the states at m successive sections: displacement [m], velocity [m/s] and, if
+    k > 2, further components. The scales, shape (k,), are the half-widths of the strobe window and a typical
+    value of each further component. The states alone decide if the strobe map has no derivative, because the
+    armature is in the pack or touches a surface without velocity at a section, or because a current flows
+    there.
     """
     scaled = (points / scales)[np.newaxis]
     plane, states = scales[:2], points[:, :2]
@@ -117,10 +119,11 @@ def settled(regime: Regime, points: FloatArray, period: int, scales: FloatArray)
 def is_approaching(
     points: FloatArray, orbit: FloatArray, within: float = NEAR, lies_on: float = LIES_ON
 ) -> bool:
-    """Whether successive states, shape (m, 2), lie on a periodic orbit or converge to it.
+    """Whether successive states, shape (m, 2), lie on a periodic orbit, shape (q, 2), or converge to it.
 
-    False if the states converge to a point off the orbit: their steps then shrink, but their distance from
-    the orbit does not.
+    States lie on the orbit up to the distance `lies_on`, and may converge to it from a distance of up to
+    `within`, both in half-widths of the strobe window. False if the states converge to a point off the orbit:
+    the differences of successive states then shrink, but the distance from the orbit does not.
     """
     count = len(orbit)
     whole = points[len(points) % count :].reshape(-1, count, 2)
@@ -134,15 +137,19 @@ def is_approaching(
 
 
 def noise_about(multiplier: float) -> float:
-    """Compute the largest distance from a stable orbit, in half-widths, attributable to integration errors.
+    """Compute the largest distance from a stable orbit that integration errors may cause.
 
-    The distance grows as the largest multiplier falls, since the basin boundary is then farther away.
+    The distance, in half-widths of the strobe window, grows as the largest absolute multiplier of the orbit
+    falls, since the basin boundary is then farther away.
     """
     return max(LIES_ON, DISTINCT * (1.0 - multiplier))
 
 
 def _by_states(points: FloatArray, scaled: FloatArray, period: int) -> Settled:
-    """Determine the settled orbit from the states alone, without derivatives of the strobe map."""
+    """Determine the settled orbit from the states alone, without derivatives of the strobe map.
+
+    `points` are the states, `scaled` the same states divided by the scales, with a leading axis.
+    """
     early, late = _apart(scaled, period, period)
     shrinking = [bool(_shrinking(scaled, d, period)[0]) for d in _largest_divisors(period)]
     if late[0] > max(AGREES, early[0]) or any(shrinking):
@@ -152,7 +159,11 @@ def _by_states(points: FloatArray, scaled: FloatArray, period: int) -> Settled:
 
 
 def _apart(points: FloatArray, count: int, period: int) -> tuple[FloatArray, FloatArray]:
-    """Compute the mean distance of states `count` firings apart, early and late in each scaled motion."""
+    """Compute the mean distance of states `count` firings apart, early and late in each motion.
+
+    `points` are scaled states, shape (n, m, k). The two means are taken over whole periods of `period`
+    firings, at the start and at the end of the motion, each about a quarter of its length.
+    """
     apart = np.abs(points[:, count:] - points[:, :-count]).max(axis=2)
     part = period * max(apart.shape[1] // (4 * period), 1)
     return apart[:, :part].mean(axis=1), apart[:, -part:].mean(axis=1)
@@ -164,7 +175,7 @@ def _shrinking(points: FloatArray, count: int, period: int) -> BoolArray:
 
 
 def _largest_divisors(period: int) -> list[int]:
-    """Return the largest proper divisors of a number: its quotients by its prime factors."""
+    """Return the maximal proper divisors of `period`: its quotients by each of its prime factors."""
     primes = [p for p in range(2, period + 1) if period % p == 0 and all(p % k for k in range(2, p))]
     return [period // p for p in primes]
 

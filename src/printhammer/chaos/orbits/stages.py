@@ -51,7 +51,7 @@ _STEPS: Final = Steps(most=150, precision=1e-10)
 
 
 def crossings(orbit: Orbit) -> list[FloatArray]:
-    """Follow an orbit's branch; return the states at which the branch returns to the drive period."""
+    """Follow the branch through an orbit; return the states at which it returns to the drive period."""
     regime, own = orbit.regime, orbit.regime.period
     if PERIOD not in regime.names:
         return []
@@ -134,7 +134,7 @@ class Search:
 
     Starts are divided into blocks, guesses into batches. The result of a stage depends only on stages with no
     more starts and no more guesses, so that a larger search never loses an orbit of a smaller search; only
-    the guesses of `_complete`, which end once the indices add up, may differ.
+    the guesses of `_complete`, which end once the fixed-point indices sum to 1, may differ.
     """
 
     regime: Regime
@@ -287,7 +287,7 @@ class Search:
                 reflected = self._reflect(fast, different, reflected)
 
     def _reflect(self, fast: FastMaps, different: list[_Known], begin: int) -> int:
-        """Try the mirror images of the known orbits from `begin` on; return the number of known orbits."""
+        """Try the mirror images of known orbits from index `begin` on; return the number of known orbits."""
         images = []
         for known in different[begin:]:
             states = [
@@ -300,7 +300,7 @@ class Search:
         return len(different)
 
     def _batch(self, guesses: list[Guess], batch: int, period: int) -> list[Guess]:
-        """Select the guesses that a batch adds to the preceding batches."""
+        """Select, from guesses for orbits of `period` firings, those that a batch adds to earlier batches."""
         begin, end = (_share(count, period) // 2 for count in (0, *self.batches)[batch : batch + 2])
         return guesses[begin:end]
 
@@ -323,7 +323,7 @@ class Search:
         stage: tuple[int, int],
         hits: int = 1,
     ) -> None:
-        """Converge guesses by Newton's method; append new orbits, and add `hits` to the hits of known orbits.
+        """Converge guesses by Newton's method; append new orbits to `different`, add `hits` to known orbits.
 
         Guesses derived from known orbits have no hits, since `Orbits.coverage` assumes independent guesses.
         """
@@ -343,7 +343,7 @@ class Search:
         return refined
 
     def _add(self, different: list[_Known], new: _Known) -> None:
-        """Append a closed orbit unless it shares a state with a known orbit; count a hit of that orbit."""
+        """Append a closed orbit to `different`, or count a hit of the known orbit that shares a state."""
         if not new.closing.closed:
             self.failures[new.closing.reason] += 1
             return
@@ -368,7 +368,7 @@ class Search:
         )
 
     def _describe(self, described: list[tuple[Orbit, int]], known: Sequence[tuple[Regime, _Known]]) -> None:
-        """Compute the properties of orbits; append each orbit that was not yet found at another section."""
+        """Compute properties of orbits; append to `described` each orbit not yet found at another section."""
         quiet = self.effort.quiet
         orbits = quiet.mapped(lambda pair: orbit_of(pair[0], pair[1].closing, quiet.tolerance), known)
         for orbit, (_regime, own) in zip(orbits, known, strict=True):
@@ -387,7 +387,7 @@ class Search:
                 described.append((orbit, own.hits))
 
     def _along(self, described: list[tuple[Orbit, int]]) -> None:
-        """Append orbits on the branches through short orbits, and concatenations with these new orbits."""
+        """Append to `described` orbits on the branches through short orbits, and concatenations with them."""
         first = [orbit for orbit, _hits in described]
         short = [orbit for orbit in first if orbit.firings <= self.follow and orbit.smooth]
         states = self.effort.quiet.mapped(crossings, short)
@@ -418,9 +418,9 @@ class Search:
             self._describe(described, [(every[0].regime, known) for known in different])
 
     def _mirror(self, described: list[tuple[Orbit, int]]) -> None:
-        """Append mirror images of orbits, x -> -x half a period later, if contacts and drive are symmetric.
+        """Append to `described` the mirror images of known orbits, x -> -x half a period later.
 
-        If the other forces are not odd, Newton's method finds no orbit, or a different orbit.
+        Contacts and drive must be symmetric. If other forces are not odd, Newton's method may find no orbit.
         """
         for orbit, _hits in list(described):
             regime = orbit.regime
@@ -445,18 +445,18 @@ class Search:
 
 
 def _index_sum(different: Sequence[_Known], period: int) -> int:
-    """Sum the fixed-point indices of known orbits over a number of firings."""
+    """Sum the fixed-point indices of known orbits over `period` firings; see `index_sums`."""
     own = [(int(known.closing.firings.sum()), multipliers_of(known.closing.jacobians)) for known in different]
     return index_sums(own, period)[period]
 
 
 def _share(guesses: int, period: int) -> int:
-    """Scale the number of guesses for a period, so that all periods take about the same computation."""
+    """Scale the number of guesses for a period, so that all periods take about the same computation time."""
     return guesses * max(1, _EVEN // period)
 
 
 def _doublings(first: int, below: int) -> list[int]:
-    """Return `first` times the powers of 2, as long as the product is below a limit."""
+    """Return `first` times the powers of 2, ascending, as long as the product is less than `below`."""
     return [first << k for k in range(below.bit_length()) if first << k < below]
 
 
@@ -485,7 +485,7 @@ def _converge(
     scales: FloatArray,
     options: Mapping[str, Any],
 ) -> list[Closing]:
-    """Converge guesses by Newton's method; return one outcome per guess, in input order."""
+    """Converge guesses by `close_orbits` with `options`; return one outcome per guess, in input order."""
     known: dict[int, Closing] = {}
     counts = [len(guess.firings) for guess in tried]
     for segments in sorted(set(counts)):

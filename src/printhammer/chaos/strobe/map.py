@@ -115,8 +115,8 @@ def image_of(
     """Compute the image of a state, (m, m/s), under the iterated strobe map, with its derivative.
 
     Pulses of earlier firings are still active at the start, as in an endless train. A run that ends early, or
-    a state outside the range of a force law, sets the status and raises no exception. Contacts and the margin
-    take about a third of the computation time.
+    a state outside the range of a force law, sets the status and raises no exception. If `contacts`, the
+    contacts and the distance from a grazing are computed, too, which takes about a third of the total time.
     """
     regime.check_planar()
     train, _ = regime.train(firings)
@@ -183,7 +183,7 @@ def _no_image(status: str) -> Image:
 
 
 def margin_of(problem: Problem, record: Record) -> float:
-    """Compute the signed distance of a run from a grazing; see the field `margin` of `Image`."""
+    """Compute the signed relative distance of a run from a grazing; see the field `margin` of `Image`."""
     hammer, (way, speed) = problem.hammer, problem.scales
     surfaces = [place for place in (hammer.position, hammer.front) if place is not None]
     _, x, sign = turns(problem, record)
@@ -196,7 +196,11 @@ def margin_of(problem: Problem, record: Record) -> float:
 
 
 def turns(problem: Problem, record: Record) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Locate the displacement extrema of a run: times [s], displacements [m] and signs (1: maximum)."""
+    """Locate the local extrema of the displacement in a run.
+
+    Returns the times [s] and the displacements [m] of the extrema, and their signs: 1 for a maximum, -1 for a
+    minimum.
+    """
     nodes = record.nodes
     before, after = nodes[:-1, 2], nodes[1:, 2]
     rows = np.flatnonzero(
@@ -248,7 +252,7 @@ def quiet_section(
     firings : int
         Number of firings after which the orbit repeats.
     tolerance : float
-        Error allowed in one step.
+        Tolerance of the integration.
 
     Returns
     -------
@@ -286,7 +290,11 @@ def is_on_impact(regime: Regime, state: FloatArray, firings: int, tolerance: flo
 def _around(
     regime: Regime, state: FloatArray, firings: int, tolerance: float
 ) -> tuple[Problem, Record, FloatArray] | None:
-    """Integrate an orbit; return problem, record, and sampled contact times modulo the period, s."""
+    """Integrate an orbit over `firings` drive periods from its state at the section; None if the run fails.
+
+    Returns the problem, the record of the run, and sampled times of contact [s]. These times are measured
+    from the section, modulo the drive period.
+    """
     train, _ = regime.train(firings + 1)
     begin, *_, end = (float(time) for time in regime.moments(train, firings))
     try:
@@ -301,7 +309,10 @@ def _around(
 
 
 def state_later(regime: Regime, state: FloatArray, phase: float, tolerance: float) -> FloatArray:
-    """Compute the state, (m, m/s), at the next section with another phase; NaN if the run ends early."""
+    """Follow a motion from its state at a section to the next time of the section phase `phase`.
+
+    Returns displacement [m] and velocity [m/s] at that time; NaN if the run ends early.
+    """
     train, _ = regime.train(2)
     begin = float(regime.moments(train, 1)[0])
     problem = Problem(regime.hammer, train, (float(state[0]), float(state[1])), begin, tolerance)
@@ -311,7 +322,7 @@ def state_later(regime: Regime, state: FloatArray, phase: float, tolerance: floa
 
 
 def mirror_image(regime: Regime, state: FloatArray, tolerance: float) -> FloatArray | None:
-    """Compute the state, (m, m/s), at which the mirror image of a motion passes the section.
+    """Compute the state (m, m/s) at which the mirror image of a motion passes the section.
 
     The mirror image, x -> -x about a center, half a period later, is a motion of the same hammer if the
     forces are odd about the center, as in Duffing's equation. The center is the hammer's origin, or the
@@ -336,7 +347,11 @@ def _center(hammer: Hammer) -> float | None:
 
 
 def _busy(contacts: FloatArray, begin: float, end: float) -> FloatArray:
-    """Sample every contact of a run at 20 evenly spaced times; return the times since the section, s."""
+    """Sample every contact of a run at 20 evenly spaced times; return these times minus `begin` [s].
+
+    The run lasts from `begin`, a section, to `end`. A contact that is open at either end is sampled up to
+    that end.
+    """
     times = [np.zeros(0)]
     for _surface, t_in, _v_in, t_out, *_ in contacts:
         low, high = (begin if np.isnan(t_in) else t_in), (end if np.isnan(t_out) else t_out)

@@ -216,7 +216,7 @@ def strobes(
         As for `strobe`, for all trains.
     states : sequence, optional
         Displacement [m], velocity [m/s] and further state components at the first firing of each train,
-        as for `printhammer.simulate`, all of one form; by default the rest state.
+        as for `printhammer.simulate`, the same components for all trains; by default the rest state.
     firings : tuple of int, optional
         First and last firing used for the classification; the very first firing is number 1.
     every_exponent : bool, optional
@@ -252,10 +252,11 @@ def strobes(
 
 
 def points_of(series: Any, firing: Firing) -> Any:
-    """Return the given points, or compute the settled strobe points of a hammer or regime.
+    """Return `series` unchanged, or compute strobe points if it is a hammer or a regime.
 
-    Raises InputError as `strobe` does, or if points are given together with keywords that describe the
-    firing.
+    The strobe points are recorded after a transient of a thousand firings. `firing` contains the keywords
+    that describe the firing of a hammer. Raises InputError as `strobe` does, or if such keywords are given
+    although nothing is computed.
     """
     if isinstance(series, Hammer | Regime):
         return strobe(series, points=_SETTLED, transient=_SETTLED, verdict=False, **firing)
@@ -269,7 +270,7 @@ def points_of(series: Any, firing: Firing) -> Any:
 def strobe_of(
     train: Train, firing: IntArray, states: States, tolerance: float, judged: Verdict | None
 ) -> Strobe:
-    """Build a `Strobe` from the states of a train at selected firings and the train's classification."""
+    """Build a `Strobe` from the states of a train at the firings `firing` and its classification `judged`."""
     return Strobe(
         hammer=train.hammer,
         drive=train.drive,
@@ -304,7 +305,7 @@ def scheme_strobes(
     scheme : str
         "runge-kutta-4" or "trapezoid".
     reading : str, optional
-        Rule that decides when a short step is taken; see `printhammer.run.scheme_runs.READINGS`.
+        Rule that decides when a short integration step is taken; see `printhammer.run.scheme_runs.READINGS`.
     points, firings, progress
         As for `printhammer.chaos.strobes`; the points begin at the first firing.
 

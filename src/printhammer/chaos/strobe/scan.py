@@ -102,7 +102,10 @@ def scan(
 def _classify_early(
     trains: Sequence[Train], states: Sequence[States], firings: tuple[int, int], effort: Effort
 ) -> list[Verdict | None]:
-    """Classify the trains that have settled early to a stable periodic motion; None for all other trains."""
+    """Classify the trains that have settled early to a stable periodic motion; None for all other trains.
+
+    `firings` are the first and the last firing at which the `states` were recorded.
+    """
     distances = [own.distances(train) for own, train in zip(states, trains, strict=True)]
     periods: dict[int, int] = {}
     for i, row in enumerate(distances):
@@ -122,10 +125,12 @@ def _classify_early(
 
 
 def largest_multiplier(train: Train, states: States, period: int, tolerance: float) -> float:
-    """Compute the largest absolute eigenvalue of the derivative of the state over a period.
+    """Compute the largest absolute Floquet multiplier of a motion that repeats after `period` firings.
 
-    The result is infinite if the period begins inside the pack, where the state has a memory, if the state
-    includes a shorted turn or a capacitor, or if the derivative is unknown.
+    The multipliers are the eigenvalues of the derivative of the state after the period with respect to the
+    state at its start, the last of `states`. The result is infinite if the period begins inside the pack,
+    where the state has a memory, if the state includes the current of a shorted turn or the voltage of a
+    capacitor, or if the derivative is unknown.
     """
     from printhammer.derivatives.states import tangent_map
 

@@ -36,7 +36,10 @@ from printhammer.support.arrays import FloatArray, IntArray
 
 
 def exact_cycle(states: FloatArray) -> int:
-    """Return the period, at most n // 2, of states, shape (n, k), that repeat exactly; 0 without a period."""
+    """Return the period of a series of states, shape (n, k), that repeats exactly; 0 without a period.
+
+    The series must contain the period at least twice.
+    """
     ended = np.flatnonzero((states[:-1] == states[-1]).all(axis=1))
     for count in (len(states) - 1 - int(place) for place in ended[::-1]):
         if count <= len(states) // 2 and np.array_equal(states[count:], states[:-count]):
@@ -45,7 +48,7 @@ def exact_cycle(states: FloatArray) -> int:
 
 
 def rests_of(regime: Regime, states: FloatArray, tolerance: float) -> int:
-    """Count the states, (m, m/s), from which the armature comes to rest before the next firing.
+    """Count the states (m, m/s) from which the armature comes to rest before the next firing.
 
     After a rest, the derivative of the next state with respect to the present state is 0.
     """
@@ -55,7 +58,7 @@ def rests_of(regime: Regime, states: FloatArray, tolerance: float) -> int:
 
 
 State = tuple[float, ...]
-"""State at a firing: displacement, m, velocity, m/s, and the fields of `printhammer.run.start.Beyond`."""
+"""State at a firing: displacement [m], velocity [m/s], and the fields of `printhammer.run.start.Beyond`."""
 
 NO_CURRENT: Final = AT_REST[2:]
 """Electric components of a state without current."""
@@ -76,7 +79,10 @@ have the same rounding, so that a motion that forgets its past repeats exactly.
 
 
 def pack_branches(x: FloatArray, branch: npt.NDArray[np.integer[Any]], front: float | FloatArray) -> IntArray:
-    """Determine the branch of the pack's law on which each state lies, 0 outside the pack."""
+    """Determine the branch of the pack's force law on which each state lies; 0 outside the pack.
+
+    `x` are the displacements [m], `branch` the modes of motion, and `front` the front of the pack [m].
+    """
     branches = np.where(x > front, branch, 0).astype(np.int64)
     for held, part_of in HELD_BRANCHES.items():
         branches[branches == held] = part_of
@@ -86,7 +92,7 @@ def pack_branches(x: FloatArray, branch: npt.NDArray[np.integer[Any]], front: fl
 def handed_on(
     hammer: Hammer, x: float, v: float, mode: int, memory: float, electric: Sequence[float] = NO_CURRENT
 ) -> State:
-    """Return the initial state of the next train: the final state if valid as a start, else `FROM_REST`."""
+    """Return the state from which the next train starts: the given final state, or `FROM_REST` if invalid."""
     begun = state_to_begin(hammer, x, v, mode, memory)
     return FROM_REST if begun is None else (*begun, *electric)
 
@@ -119,9 +125,9 @@ class Train(Declared):
 
     @classmethod
     def of(cls, regime: Regime, firings: int, state: tuple[float, ...] | None = None) -> Self:
-        """Build a train with enough firings to compute its states up to a given firing.
+        """Build a train of `firings` + 1 pulses, to compute its states at the first `firings` firings.
 
-        One more pulse is fired, so that no state depends on the end of the run.
+        The last pulse is fired so that no state depends on the end of the run.
         """
         return cls(regime, regime.pulses(firings + 1), state)
 
@@ -155,18 +161,18 @@ class States:
     current: FloatArray | None = None
 
     def distances(self, train: Train) -> FloatArray:
-        """Compute the largest distances of states q firings apart; see `verdict.repeats`."""
+        """Compute, for each q, the largest distance of states q firings apart; see `verdict.repeats`."""
         front = math.inf if train.hammer.front is None else train.hammer.front
         return repeats(self.points, pack_branches(self.x, self.branch, front), _scales(train))
 
     @property
     def points(self) -> FloatArray:
-        """States, one row per firing: displacement, velocity, memory and, with a driver, current."""
+        """Table of states, one row per firing: displacement, velocity, memory and, with a driver, current."""
         current = [] if self.current is None else [self.current]
         return np.column_stack([self.x, self.v, self.memory, *current])
 
     def scaled(self, train: Train) -> FloatArray:
-        """Return the states divided by the half-widths of the window and the current scale."""
+        """Return `points`, divided by the half-widths of the strobe window and by a typical current."""
         return np.asarray(self.points / _scales(train))
 
     def settled(self, train: Train, distances: FloatArray) -> Settled | None:
@@ -177,11 +183,11 @@ class States:
         return settled(train.regime.at_firings, self.points, period, _scales(train))
 
     def resting(self, train: Train, distances: FloatArray, tolerance: float) -> tuple[int, int] | None:
-        """Return cycle length [firings] and number of rests of a motion that comes to rest on the backstop.
+        """Return the cycle length [firings] and the number of rests of a motion that rests on the backstop.
 
-        None if the motion does not come to rest. The cycle is 0 if the motion does not repeat; then at least
-        two rests are required. Cycles shorter than `LONG_CYCLE` firings are excluded, since rounding does not
-        change their length.
+        None if the motion does not come to rest. The cycle length is 0 if the motion does not repeat; then at
+        least two rests are required. For cycles shorter than `LONG_CYCLE` firings the result is None, since
+        rounding does not change their length.
         """
         if not is_memoryless(train.regime):
             return None
@@ -208,8 +214,9 @@ def run_trains(
 ) -> tuple[list[States], list[Verdict | None]]:
     """Compute the states of trains at chosen firings, at the phases of their regimes; classify the trains.
 
-    A classification covers the firings from the first to the last of `judged`; None for no classification.
-    Exponents of periodic trains are computed only with `every_exponent`.
+    A classification is based on the firings from the first to the last of `judged`. If `judged` is None, no
+    train is classified. Exponents of periodic trains are computed only with `every_exponent`. Returns the
+    states and the classification of each train.
     """
     if not trains:
         return [], []
@@ -270,15 +277,16 @@ def run_trains(
 
 
 FINER: Final = (0.1, 0.01)
-"""Factors on the tolerance for recomputed periods of motions that come to rest on the backstop; arbitrary."""
+"""Factors on the tolerance for recomputed periods of motions that rest on the backstop; arbitrary."""
 
 
 def _at_finer(
     trains: Sequence[Train], judged: tuple[int, int], effort: Effort
 ) -> list[tuple[tuple[float, str], ...]]:
-    """Recompute the periods of trains at a tenth and a hundredth of the tolerance, as text.
+    """Recompute the periods of trains at a tenth and a hundredth of the tolerance.
 
-    Between two rests small errors grow; if they reach the size of the motion, rounding decides its period.
+    Returns, for each train, pairs of the tolerance and the period as text. Between two rests small errors
+    grow; if they reach the size of the motion, rounding decides its period.
     """
     firings = np.arange(judged[0], judged[1] + 1)
     rows: list[tuple[tuple[float, str], ...]] = [() for _ in trains]
@@ -297,7 +305,7 @@ def _at_finer(
 def _ensemble(
     trains: Sequence[Train], ends: Sequence[float], tolerance: float, states: FloatArray | None = None
 ) -> Ensemble:
-    """Build the ensemble that runs trains to given times [s]; `states` replace their initial states."""
+    """Build the ensemble that runs trains to the times `ends` [s]; `states` replace their initial states."""
     begun = [train.state for train in trains if train.state is not None]
     own = np.array(begun) if len(begun) == len(trains) else None
     return Ensemble(
@@ -312,9 +320,11 @@ def _ensemble(
 def _in_stretches(
     trains: Sequence[Train], every: Sequence[FloatArray], effort: Effort
 ) -> tuple[FloatArray, FloatArray, IntArray, FloatArray, list[str], FloatArray]:
-    """Compute the states of trains at given times [s], one row per train; also statuses and end times.
+    """Compute the states of trains at given times [s], by successive runs of one period each.
 
-    Each run lasts one period, so that the time and its rounding error stay small.
+    In a run of one period the time and its rounding error stay small. Returns, in this order: displacements
+    [m], velocities [m/s], modes and memories [m], each with one row per train; the status of each train; and
+    the time reached by each train [s].
     """
     shape = len(trains), max(len(times) for times in every)
     x, v, memory = (np.full(shape, np.nan) for _ in range(3))
@@ -361,9 +371,10 @@ def _in_stretches(
 def exponents_onward(
     begun: Sequence[tuple[Regime, tuple[float, ...]]], points: int, effort: Effort
 ) -> list[Exponent]:
-    """Compute the largest exponents of trains that continue from a state at a firing.
+    """Compute the largest Lyapunov exponents of trains that continue from a state at a firing.
 
-    The exponents are averaged over `points` firings, after a hundred discarded firings.
+    `begun` contains the regime and the state of each train. The exponents are averaged over `points` firings,
+    after a hundred discarded firings.
     """
     window = _BEFORE + 1, _BEFORE + points
     # The tails of earlier pulses are omitted: they are the same for all neighbouring motions.
@@ -372,7 +383,7 @@ def exponents_onward(
 
 
 def exponents_of(trains: Sequence[Train], firings: tuple[int, int], effort: Effort) -> list[Exponent]:
-    """Compute the exponents of trains over a range of firings, in parallel."""
+    """Compute the Lyapunov exponents of trains, averaged from the first to the last of `firings`."""
     from printhammer.derivatives.states import strobe_exponent
 
     return effort.mapped(

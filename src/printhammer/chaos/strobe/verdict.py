@@ -168,12 +168,13 @@ def _finite(number: float) -> float | None:
 def repeats(
     states: FloatArray, branches: IntArray, scales: FloatArray, longest: int = LARGEST_PERIOD
 ) -> FloatArray:
-    """Compute the largest distance of states q firings apart, for each q from 1, shape (longest,).
+    """Compute, for each q from 1 to `longest`, the largest distance of states q firings apart.
 
-    States, shape (n, 3), are displacement, velocity and memory of the pack at successive firings; their
-    `branches`, shape (n,), are those of the pack's force law, 0 outside the pack. A distance is the largest
-    absolute difference of a component, in units of its scale: infinite if states q apart lie on different
-    branches, if a state is unknown, or if q exceeds half of n, so that every state is compared at least once.
+    The n states at successive firings contain displacement, velocity, memory of the pack and, with a driver,
+    current, one row per firing. `branches`, shape (n,), are the branches of the pack's force law on which the
+    states lie, 0 outside the pack. The distance of two states is the largest absolute difference of a
+    component, in units of its scale. The result is infinite if states q firings apart lie on different
+    branches, if a state is unknown, or if q exceeds n / 2, so that not every state could be compared.
     """
     scaled = states / scales
     count = len(scaled)
@@ -206,8 +207,8 @@ def verdict(
     `exponent` is the largest exponent over the firings from the first to the last of `firings`, None if it
     was not computed; `stopped` is the status of a run that ended before the last firing. `settled` is the
     orbit to which the motion has settled; if None, the period is the smallest number of firings after which
-    states agree. `resting` is the period of a motion that comes to rest, in firings, 0 if unknown, and the
-    number of rests.
+    states agree. `resting` contains the period of a motion that comes to rest on the backstop, in firings (0
+    if unknown), and its number of rests; None for every other motion.
     """
     period = None if stopped else period_of(distances)
     closest = period
@@ -251,7 +252,7 @@ def verdict(
 
 
 def is_positive(exponent: Exponent) -> bool:
-    """Whether an exponent exceeds zero by `SIGNIFICANT` standard errors; False for an unknown exponent."""
+    """Whether an exponent exceeds zero by `SIGNIFICANT` standard errors; False if the exponent is unknown."""
     return bool(exponent.ok and exponent.smooth and exponent.value > SIGNIFICANT * exponent.standard_error)
 
 
