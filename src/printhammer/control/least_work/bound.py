@@ -47,7 +47,7 @@ class Bound(Declared):
     loading: float = scalar("J", "loading work of the pack for one dot")
 
     def burst(self, dots: int) -> float:
-        """Return the lower bound on the positive work of a burst, J."""
+        """Return the lower bound on the positive coil work of a burst of `dots` dots, J."""
         return self.first + (dots - 1) * min(self.later, self.bounced)
 
 
@@ -79,7 +79,10 @@ def bound(hammer: Hammer, single: Nominal, force: float, largest: float) -> Boun
 
 
 def _strongest(static: StaticForce, x: FloatArray, largest: float) -> FloatArray:
-    """Return the largest force [N] of magnet and spring at displacements, over all allowed currents."""
+    """Return the largest force [N] of magnet and spring at each displacement `x` [m].
+
+    The maximum is over currents up to `largest` [A] of either sign.
+    """
     currents = np.linspace(-largest, largest, _CURRENTS).tolist()
     force = np.array([[static.free(place, current) for current in currents] for place in x.tolist()])
     rows, best = np.arange(x.size), np.clip(force.argmax(axis=1), 1, _CURRENTS - 2)
@@ -115,7 +118,10 @@ def _given_back(hammer: Hammer, most: float) -> float:
 
 
 def _indentation(static: StaticForce, single: Nominal, force: float) -> tuple[float, float]:
-    """Return the indentation [m] and the loading work [J] at `force` times the single-pulse force."""
+    """Return the indentation of the pack [m] and the loading work [J] of a dot.
+
+    The peak force of the dot is `force` times the single-pulse force.
+    """
     wanted, front = force * single.force, static.front
     deepest = single.indentation
     while -static.pack(front + deepest) < wanted:

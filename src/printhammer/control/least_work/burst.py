@@ -174,7 +174,7 @@ class LeastWork(Result, rows="node"):
 
     @property
     def deviations(self) -> FloatArray:
-        """Touch minus slot time of each dot, s; empty if contacts and dots differ in number."""
+        """Touch time minus requested time of each dot, s; empty if contacts and dots differ in number."""
         if len(self.contacts) != self.count:
             return np.zeros(0)
         return np.array([contact.t_in for contact in self.contacts]) - self.slots
@@ -215,7 +215,7 @@ class LeastWork(Result, rows="node"):
 
     @cached_property
     def rest_time(self) -> float:
-        """Time after which the energy above rest stays below 1 % of the pack loss of a dot, s."""
+        """Time after which the energy, relative to rest, stays below 1 % of the pack loss of a dot, s."""
         motion, hammer = self.motion, self.hammer
         rest = stored_energy(hammer, rest_state(hammer))
         stored = np.array([stored_energy(hammer, x) for x in motion.x.tolist()])
@@ -346,7 +346,7 @@ class LeastWork(Result, rows="node"):
 
 
 def _current_of(hammer: Hammer) -> Waveform:
-    """Return the current pulse of a hammer; InputError for missing parts or another kind of waveform."""
+    """Return a hammer's waveform; raise `InputError` unless it is a current and no component is missing."""
     waveform = hammer.waveform
     absent = [role for role in ("magnet", "spring", "backstop", "pack") if getattr(hammer, role) is None]
     faults = [f"the hammer has no {' and no '.join(absent)}"] if absent else []

@@ -43,12 +43,12 @@ _WRONG: Final = 10.0
 
 
 class PulsePlan:
-    """Plan of a burst of pulses: firings so far, and the armature's state at the end of the last slot.
+    """Partial plan of a burst of pulses: firings so far, and the hammer's state at the end of the last slot.
 
-    The widths of `waveform` are optimised; the slope limit of the task is ignored. Arguments are times, s:
-    the slot `period`, the time `past` from a pack contact to the end of its slot, the length `lead` of the
-    first slot, and the length `landing` of the landing. The plan begins at rest at the displacement `rest`,
-    m.
+    The pulses have the shape of `waveform`, with optimised widths; the slope limit of the task is ignored.
+    Arguments are times [s]: the slot `period`, the time `past` between a pack contact and the end of its
+    slot, the length `lead` of the first slot, and the length `landing` of the landing. The plan begins at
+    rest at the displacement `rest`, m.
 
     Raises
     ------
@@ -132,7 +132,11 @@ class PulsePlan:
         return PulseSequence(waveforms, [time for time, _width in fired])
 
     def _pulses(self, row: FloatArray, arrival: float) -> list[tuple[float, float]]:
-        """Decode variables in [0, 1] to pulse times [s] and widths [s] in the current slot."""
+        """Convert optimisation variables to the firing times [s] and widths [s] of the pulses of a slot.
+
+        `row` contains two variables in [0, 1] for each pulse: its delay after the earliest possible firing,
+        and its width. No pulse ends later than `arrival` [s] after the start of the slot, if possible.
+        """
         shortest = _SHORTEST * self._widest
         free = self._begin
         if self._fired:
@@ -153,7 +157,11 @@ class PulsePlan:
         return float(decay) * -float(np.log(GONE)) + 1e-9 * width
 
     def _evaluate(self, rows: FloatArray, duration: float, arrival: float) -> FloatArray:
-        """Evaluate cost, arrival deviation and excess force for many rows of delays and widths in [0, 1]."""
+        """Simulate a slot of `duration` [s] for each row of optimisation variables; see `_pulses`.
+
+        The dot is due at `arrival` [s] after the start of the slot. The result has three rows: the cost, and
+        the deviation of the arrival and the excess force, normalised as in `search.deviations`.
+        """
         task, begin = self._task, self._begin
         end = begin + duration
         drives = [self._drive([*self._fired, *self._pulses(row, arrival)]) for row in rows]

@@ -1,8 +1,8 @@
 """Search for the optimal current of a slot, and for the current that lands the armature softly.
 
 The currents at the nodes are optimised by sequential quadratic programming (SLSQP). A search starts from the
-current of the preceding slot, or from the best profiles of a few levels: brake, wait and throw for a dot;
-brake and lower for the landing.
+current of the preceding slot, or from the best profiles. A profile is a current with a few levels: brake,
+wait and throw for a dot; brake and lower for the landing.
 
 Profiles are parameterised by a few numbers in [0, 1], called shares. A Sobol sequence of profiles is
 evaluated, and each of the best is refined by a deterministic local search over a shrinking cloud of points.
@@ -48,11 +48,12 @@ def descend(
 ) -> tuple[FloatArray, float]:
     """Minimise an objective by SLSQP, with optional constraints; `measured` evaluates all functions.
 
-    `measured` maps k points, shape (k, n), to rows, shape (1 or 3, k). With `conditions` there are three
-    rows: the objective, an equality constraint (second row = 0) and an inequality constraint (third row >=
-    0). `bounds` apply to every variable. `linear`, an offset and a matrix, are linear inequality constraints,
-    offset + matrix @ y >= 0. With `inward`, the difference step points away from the nearer of the bounds 0
-    and 1. Returns the final point and its objective.
+    The search begins at the point `start` and ends after at most `rounds` iterations. `measured` evaluates k
+    points of n variables, shape (k, n), and returns one row, the objective, shape (1, k). With `conditions`
+    it returns two more rows: an equality constraint (row = 0) and an inequality constraint (row >= 0).
+    `bounds` apply to every variable. `linear`, an offset and a matrix, are linear inequality constraints,
+    offset + matrix @ y >= 0, on a point y. With `inward`, the finite-difference step points away from the
+    nearer of the bounds 0 and 1. Returns the final point and its objective.
     """
     from scipy import optimize
 
@@ -89,15 +90,16 @@ def descend(
 
 
 def deviations(late: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Normalise arrival deviations and excess forces by their tolerances.
+    """Normalise the deviations of dots: arrival by `ARRIVAL`, excess of the force over 1 by `_FORCE`.
 
-    `late` [s] is not finite for a lost dot; `force` is relative to the requested force.
+    `late` is the deviation of the arrival, s, not finite for a lost dot; `force` is relative to the requested
+    force.
     """
     return np.where(np.isfinite(late), late / ARRIVAL, LOST), (force - 1.0) / _FORCE
 
 
 def is_acceptable(missed: float, spare: float) -> bool:
-    """Whether a dot is acceptable, from its normalised deviations of arrival and force."""
+    """Whether a dot is acceptable, from its normalised arrival deviation and excess force."""
     return abs(missed) < _MISSED and spare > -_SLACK
 
 
@@ -107,7 +109,7 @@ def best_of(
     tries: int,
     most: int | None = None,
 ) -> FloatArray | None:
-    """Run a multi-start search from the most promising starts; return the outcome of least cost.
+    """Run a multi-start search from the most promising starts; return the outcome of least cost, or None.
 
     Starts are ordered by `badness`, lowest first. `attempt` maps the index of a start to its cost and
     outcome, or to None if the search fails. The first `tries` starts are always run; if all fail, further
@@ -192,7 +194,11 @@ def refined(
 
 
 def _in_steps(levels: FloatArray, edges: FloatArray, duration: float, nodes: int) -> FloatArray:
-    """Average piecewise constant currents, with switching times `edges` [s], over the steps between nodes."""
+    """Average piecewise constant currents over the steps between nodes, shape (n, nodes).
+
+    `levels` are the successive currents [A] of each profile, and `edges` the times [s] at which the current
+    changes to the next level.
+    """
     ends = np.pad(edges, ((0, 0), (1, 1)), constant_values=((0.0, 0.0), (0.0, duration)))
     times = node_times(duration, nodes)
     past = np.clip(times, ends[:, :-1, np.newaxis], ends[:, 1:, np.newaxis]) - ends[:, :-1, np.newaxis]
@@ -222,8 +228,8 @@ _INSIDE: Final = 1.0 - 1e-9  # Factor on current and slope limits: rounding erro
 class NodePlan:
     """Partial plan of a burst with piecewise-linear current: planned nodal currents and resulting state.
 
-    Arguments are times [s]: the slot `period`, `past` from a pack contact to the end of its slot, the
-    node `spacing`, and the `flight` time of the single pulse.
+    Arguments are times [s]: the slot `period`, the time `past` between a pack contact and the end of its
+    slot, the `spacing` of the nodes, and the `flight` time of the single pulse.
     """
 
     def __init__(self, task: Task, period: float, past: float, spacing: float, flight: float) -> None:
@@ -281,9 +287,10 @@ def printing_current(
 ) -> FloatArray | None:
     """Optimise the current of a slot: print the dot of the slot at least cost.
 
-    The slot lasts `duration`, and the dot is due at `arrival`, s after its beginning. The current has `nodes`
-    nodes after the first. The first search starts from `before`, the current of the preceding slot. Returns
-    the currents at the nodes, A; None if no start leads to an acceptable dot.
+    The slot lasts `duration` [s] and starts from the state `begin`; the dot is due `arrival` [s] after its
+    start. The current has `nodes` nodes, not counting the node at the start. The first search starts from
+    `before`, the current of the preceding slot. Returns the currents at the nodes, A; None if no start leads
+    to an acceptable dot.
     """
 
     def asked(outcomes: Outcomes) -> tuple[FloatArray, FloatArray]:
@@ -328,7 +335,11 @@ def printing_current(
 
 
 def landing_current(task: Task, begin: SlotState, duration: float, nodes: int) -> FloatArray:
-    """Optimise the nodal currents [A] that land the armature softly after the last dot of a burst."""
+    """Optimise the current that lands the armature softly after the last dot of a burst.
+
+    The landing lasts `duration` [s] and starts from the state `begin`. Returns the currents at the `nodes`
+    nodes after the start, A; the last is zero.
+    """
 
     def rated(currents: FloatArray, tolerance: float) -> FloatArray:
         outcomes = task.run(begin, np.pad(currents, ((0, 0), (0, 1))), duration, tolerance)
@@ -362,9 +373,11 @@ def _descend(
     *,
     printing: bool,
 ) -> tuple[float, FloatArray]:
-    """Minimise the cost by SLSQP within the current limits; return the cost and the currents, A.
+    """Minimise the cost by SLSQP within the limits on value and slope; return the cost and the currents, A.
 
-    For a landing (not `printing`), the current must be able to return to zero in one more step.
+    `measured` is as for `descend`, and `start` is the initial guess of the nodal currents; the current at the
+    start of the slot is `begin`. For a landing (not `printing`), the current must be able to return to zero
+    in one more step.
     """
     steps = start.size if printing else start.size + 1
     slope = (np.eye(steps) - np.eye(steps, k=-1))[:, : start.size]
@@ -385,7 +398,11 @@ def _descend(
 
 
 def _within(task: Task, wanted: FloatArray, begin: float, reach: float, to_zero: bool) -> FloatArray:
-    """Clip nodal currents [A] to the limits on value and slope."""
+    """Clip the nodal currents `wanted` [A] to the limits on value and slope.
+
+    The current at the start is `begin` and changes by at most `reach` per step, both in A. With `to_zero`,
+    the current must be able to reach zero one step after the last node.
+    """
     result = np.empty(wanted.size)
     current = begin
     for node, value in enumerate(wanted.tolist()):

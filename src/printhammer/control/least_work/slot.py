@@ -130,7 +130,10 @@ class Task:
     tolerance: float  # Error tolerance per integration step
 
     def run(self, begin: SlotState, currents: FloatArray, duration: float, tolerance: float) -> Outcomes:
-        """Simulate M slots of `duration` [s] with nodal currents [A], (M, nodes), first node omitted."""
+        """Simulate a slot of `duration` [s] from the state `begin` with each of M trial currents.
+
+        `currents` are the currents [A] at the nodes, shape (M, nodes), without the node at the start.
+        """
         front = self.hammer.front
         assert front is not None
         grid = np.linspace(0.0, duration, _SAMPLES)
@@ -160,13 +163,13 @@ class Task:
         )
 
     def end(self, begin: SlotState, currents: FloatArray, duration: float) -> SlotState:
-        """Return the state at the end of a slot with given nodal currents [A], shape (nodes,)."""
+        """Return the state at the end of a slot with given nodal currents [A], as in a row of `run`."""
         path = np.concatenate([[begin.current], currents])[np.newaxis]
         ensemble = self._ensemble(begin, path, duration, self.tolerance)
         return end_of(ensemble, duration, float(currents[-1]))
 
     def cost(self, outcomes: Outcomes, duration: float) -> FloatArray:
-        """Compute the objective of currents, normalised by the loading work of a dot.
+        """Compute the objective of trial currents from their outcomes, in units of the loading work of a dot.
 
         The net work is included since it grows with the backstop loss. A slow or interrupted departure from
         the pack is penalised: if the armature re-enters the pack during unloading, the pack law of the paper
@@ -201,9 +204,9 @@ _BEHIND: Final = 0.2  # Range of the spline behind the backstop, as a fraction o
 class CoilForce:
     """Coil force Fm(x, I) - Fm(x, 0) as a spline, for fast evaluation in searches.
 
-    Its error is about 1e-8 of the largest force. Results of a search are recomputed with the law itself, see
-    `printhammer.run.energy`. The hammer needs magnet, pack and backstop; the spline covers currents up to
-    `largest` [A] of either sign.
+    The error of the spline is about 1e-8 of the largest force. The results of a search are recomputed with
+    the law of the magnet itself, see `printhammer.run.energy`. The hammer needs magnet, pack and backstop;
+    the spline covers currents up to `largest` [A] of either sign.
     """
 
     def __init__(self, hammer: Hammer, largest: float) -> None:

@@ -173,7 +173,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
 
     @property
     def worst(self) -> FloatArray:
-        """Largest deviation at each rate, as a fraction of the limits, shape (R,); NaN where unknown."""
+        """Largest deviation at each rate, as a fraction of the limits, shape (rates,); NaN where unknown."""
         return np.asarray(self.deviation.max(axis=1))
 
     def at(self, rate: float | str) -> Settings:
@@ -203,7 +203,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return mixed(low_row, high_row, share)
 
     def fired_by(self, driver: str, hammer: Hammer) -> CompensationTable:
-        """Return a copy for `driver`, whose dots arrive as with the hammer's own driver.
+        """Return a copy for the coil driver `driver`, with dots that arrive as with the hammer's own driver.
 
         The present pulses must be tuned for `driver`; all are shifted by the difference between the flight
         times from rest with either driver.
@@ -305,7 +305,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
 
     @property
     def look_ahead(self) -> IntArray:
-        """Number of slots in advance at which a dot must be known, shape (rates, entries)."""
+        """Number of slots by which a dot must be known in advance, shape (rates, entries)."""
         times = {name: getattr(self, name) for name in COLUMNS}
         return look_ahead(times, self.rates, self.gaps, self.reach)
 

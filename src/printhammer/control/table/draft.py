@@ -45,7 +45,11 @@ _DENSE: Final = 6
 
 @dataclass(frozen=True)
 class Draft:
-    """A table under construction: `values` of shape (5, rates, entries), named by `VALUES`."""
+    """A table under construction, at slot rates `rates` [Hz].
+
+    `values`, shape (5, rates, entries), contains advance, width, brake delay, brake width and deviation of
+    each entry; see `VALUES`.
+    """
 
     task: Task
     rates: FloatArray
@@ -68,7 +72,7 @@ class Draft:
 
     @property
     def worst(self) -> FloatArray:
-        """Largest deviation at each rate, shape (rates,)."""
+        """Largest deviation of an entry at each rate, as a fraction of the limits, shape (rates,)."""
         return np.asarray(self.deviation.max(axis=1))
 
     def rows(self, which: IntArray) -> Draft:
@@ -91,15 +95,15 @@ class Draft:
         )
 
     def places(self, cells: Cells) -> tuple[IntArray, IntArray]:
-        """Return the row (rate) and column (history) indices of table entries."""
+        """Return the row and column indices of entries, each given as a rate index and a history."""
         columns = [number_of(history, self.task.reach) for _row, history in cells]
         return np.array([row for row, _history in cells], np.int64), np.array(columns, np.int64)
 
     def judge(self, level: Sequence[History] | None = None) -> None:
-        """Evaluate the deviations of histories at all rates; by default of all histories.
+        """Evaluate and store the deviations of all entries, or of the entries with the histories `level`.
 
-        With all histories, the deviation of a history of equal gaps becomes infinite if errors grow along a
-        long row of such dots.
+        If all entries are evaluated, the deviation of a history of equal gaps becomes infinite where errors
+        grow along a long row of such dots.
         """
         lengths = range(1, self.task.gaps + 1)
         levels = [histories_of_length(self.task, n) for n in lengths] if level is None else [level]
@@ -143,14 +147,15 @@ class Draft:
         dense: bool = True,
         whole: bool = False,
     ) -> FloatArray:
-        """Simulate patterns; return the normalised force and arrival deviations of their last dots.
+        """Simulate patterns that end with given entries; return the deviations of their last dots.
 
-        `values`, shape (cells, 2), are advance and width of the last dots, s, and `shifts`, shape (shifts,
-        2), are trial changes of both. With `dense`, each entry is evaluated in several patterns, see
-        `gaps_before`; an entry with fewer patterns than another repeats its first pattern. With `whole`,
-        the result is the largest deviation of all dots of a pattern that share the history of the last dot.
-        The result, shape (cells, shifts, deviations), is a fraction of the limits; the last axis runs over
-        hammers, patterns, force and arrival. NaN marks a lost dot or a pattern with extra contacts.
+        `cells` are the entries, each a rate index and a history. `values`, shape (cells, 2), are advance and
+        width of the last dots, s, and `shifts`, shape (shifts, 2), are trial changes of both. With `dense`,
+        each entry is evaluated in several patterns, see `gaps_before`; an entry with fewer patterns than
+        another repeats its first pattern. With `whole`, the result is the largest deviation of all dots of a
+        pattern that share the history of the last dot. The result, shape (cells, shifts, deviations), is a
+        fraction of the limits; the last axis runs over hammers, patterns, force and arrival. NaN marks a lost
+        dot or a pattern with extra contacts.
         """
         task = self.task
         gaps = [gaps_before(history, task.reach) if dense else [()] for _row, history in cells]

@@ -332,7 +332,7 @@ def checked_driver(driver: str) -> Driver:
 
 
 def driven_by(hammer: Hammer, driver: str, largest: float) -> Hammer:
-    """Return a copy of the hammer with another driver's pulse, whose width gives the same print force.
+    """Return a copy of the hammer with the pulse of another driver, at the width that keeps the print force.
 
     `largest` is the current of a switch or an H-bridge, A.
 

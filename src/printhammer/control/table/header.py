@@ -147,7 +147,7 @@ def header_text(
         Arrays (rates, entries) by name, s; with an axis (values, rates, entries). All history numbers,
         aliases included, have entries, so that the firmware can index directly.
     multipliers : array
-        Dot-to-dot multipliers, of the shape of a time; NaN for unknown multipliers.
+        Dot-to-dot multipliers, of the same shape as an array of `times`; NaN for unknown multipliers.
     tick : float
         Tick of the timer, s.
     axis : tuple, optional
@@ -258,7 +258,10 @@ def thousandths(multipliers: FloatArray) -> IntArray:
 
 
 def _most(prefix: str, values: int, entries: int, array: str, *, signed: bool = False) -> str:
-    """Return the C code of the loops that compute the largest (absolute) value of an array at one rate."""
+    """Return the C code of the loops that compute the largest value of an array at one rate.
+
+    The loops run over all histories and axis values; if `signed`, the largest absolute value is computed.
+    """
     place = f"{prefix}_{array}{'[value]' if values else ''}[rate][history]"
     loops = f"  for (unsigned history = 0; history < {entries}u; history++)\n"
     if values:

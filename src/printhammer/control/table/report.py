@@ -262,7 +262,7 @@ def _is_applicable(hammer: Hammer, by: Perturbation) -> bool:
 
 
 def _growth(driven: Sequence[Hammer], rate: float, strategy: Strategy, effort: Effort) -> FloatArray:
-    """Compute the larger multiplier of two rows, with a dot in every and in every second slot, per hammer."""
+    """Compute, for each hammer, the dot-to-dot multiplier of rows of dots; see `TableReport.multiplier`."""
     rates = [rate] * len(driven)
     each = np.array([multipliers(driven, rates, strategy, effort, step) for step in (1, 2)])
     largest = np.nan_to_num(np.abs(each), nan=-1.0).argmax(axis=0)
@@ -270,7 +270,7 @@ def _growth(driven: Sequence[Hammer], rate: float, strategy: Strategy, effort: E
 
 
 def _sets(seed: int) -> dict[str, tuple[Sequence[tuple[int, ...]], int | Sequence[int]]]:
-    """Return the pattern sets by name: patterns, and index of the first evaluated slot."""
+    """Return, by name, the patterns of each set, and the index of the first slot that is evaluated."""
     long = {kind: [each for each in long_patterns() if each.kind == kind] for kind in KINDS}
     judged = {
         kind: ([each.slots for each in some], [each.judged_from for each in some])
@@ -286,7 +286,7 @@ def _largest(values: FloatArray) -> float:
 
 
 def between(table: CompensationTable) -> list[float]:
-    """Return the rates [Hz] at which to validate a table: its own or, for a long table, five midpoints."""
+    """Return the rates [Hz] at which to validate a table: its own or, if it is long, five between them."""
     rates = table.rates
     if rates.size < _LONG:
         return [float(rate) for rate in rates]
@@ -296,7 +296,10 @@ def between(table: CompensationTable) -> list[float]:
 
 
 def random_patterns(seed: int) -> list[tuple[int, ...]]:
-    """Return long random patterns of densities from 0.2 to 0.9, with at least one dot each."""
+    """Return `RANDOM` random patterns of `RANDOM_SLOTS` slots, with at least one dot each.
+
+    The fraction of slots with a dot increases from 0.2 in the first pattern to 0.9 in the last.
+    """
     rng = np.random.default_rng(seed)
     shares = np.linspace(0.2, 0.9, RANDOM)
     drawn = [slots_of(rng.random(RANDOM_SLOTS) < share) for share in shares.tolist()]

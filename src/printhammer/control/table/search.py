@@ -185,7 +185,10 @@ def searched(task: Task, period: float) -> Ways:
 
 
 def _grid(task: Task, period: float, brakes: Sequence[tuple[float, float]], fine: int = 1) -> Ways:
-    """Return the feasible grid cells over firing time and width, for each brake pulse."""
+    """Return the feasible grid points over firing time and width, for each brake pulse.
+
+    `brakes` contains delay and width of each brake pulse, s; `fine` is the refinement factor of the grid.
+    """
     room = _ROOM * task.scale
     fired = np.linspace(max(period - room, task.single.left), period + room, fine * _GRID[0]).tolist()
     widths = np.linspace(LEAST_OF_OWN * task.width, task.widest, fine * _GRID[1]).tolist()
@@ -194,7 +197,10 @@ def _grid(task: Task, period: float, brakes: Sequence[tuple[float, float]], fine
 
 
 def _best(task: Task, cells: Ways, more: int = 1) -> Ways:
-    """Solve for pulses from the best cells of a grid; return the solutions of least cost."""
+    """Solve for pulses from the best points of a grid; return the solutions of least cost.
+
+    `more` is a factor on the number of starts per brake pulse.
+    """
     if not cells.size:
         return cells
     off, apart = largest_of(seconds(task, cells)), _APART * task.scale
@@ -229,7 +235,9 @@ def _distinct(ways: Ways) -> Ways:
 
 
 def _path(ways: Ways, groups: Sequence[IntArray], jump: float) -> IntArray:
-    """Choose one candidate per group by dynamic programming over costs and branch changes; return indices.
+    """Choose one candidate per group by dynamic programming over costs and branch changes.
+
+    The groups contain indices of `ways`, one group per period; returns the indices of the chosen candidates.
 
     A table can be interpolated between two periods only if the branch is the same: if firing times
     relative to the slots differ by at most `jump` [s].

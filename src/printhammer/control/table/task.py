@@ -147,12 +147,16 @@ class Task:
         """Return the earliest firing time [s] measured from the slot of the preceding dot.
 
         By then the armature has left the pack, so that no dot uses energy returned by the pack of the
-        preceding dot, and a brake pulse has decayed so far that the current stays within its limit.
+        preceding dot. A brake pulse of the width `brake`, which begins at `delay`, has decayed so far that
+        the current stays within its limit.
         """
         return np.asarray(np.where(brake > 0.0, delay + brake + self.wait, self.single.left))
 
     def latest(self, width: FloatArray) -> FloatArray:
-        """Return the latest firing time [s] after the slot that leaves time for the next brake pulse."""
+        """Return the latest firing time, s after the slot of the dot, that leaves time for a brake pulse.
+
+        `width` is the width of the print pulse, s.
+        """
         return np.asarray(self.brake_from - self.faded - width)
 
     def deviations(

@@ -261,7 +261,7 @@ def tune(
 
 
 def _spread(hammer: Hammer) -> list[Hammer]:
-    """Return the perturbed hammers; perturbations that the hammer's laws do not admit are skipped."""
+    """Return copies of a hammer with each of the perturbations `SPREAD` that its laws admit."""
     hammers = []
     for by in SPREAD:
         with suppress(InputError):
@@ -270,7 +270,7 @@ def _spread(hammer: Hammer) -> list[Hammer]:
 
 
 def _counter(effort: Effort, total: int) -> Callable[[], None]:
-    """Return a progress function that counts one step per call."""
+    """Return a function that reports one more finished step of `total` at each call."""
     steps = iter(range(1, total + 1))
 
     def count() -> None:
@@ -281,7 +281,10 @@ def _counter(effort: Effort, total: int) -> Callable[[], None]:
 
 
 def _all_rates(single: Single, scale: float) -> FloatArray:
-    """Return the default rates [Hz] of a table, up to the rate at which pack contacts nearly overlap."""
+    """Return the default rates [Hz] of a table, up to the rate at which pack contacts nearly overlap.
+
+    `scale` is the time scale of the device relative to the paper's hammer.
+    """
     first, step = FIRST / scale, STEP / scale
     lowest = step * np.floor(1.0 / (single.settled * step))
     rates = np.arange(lowest, 1.0 / single.left, step)

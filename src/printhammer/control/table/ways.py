@@ -40,7 +40,7 @@ def solve(
     bounded: Bounded,
     longest: float = LONGEST_STEP,
 ) -> FloatArray:
-    """Minimise each dot's deviation; return the firing times and widths, s, shape (dots, 2).
+    """Minimise the deviations of dots; return the firing time and width of each dot, s, shape (dots, 2).
 
     The method is Levenberg-Marquardt (J. Nocedal and S. J. Wright, *Numerical Optimization*, ch. 10).
 
@@ -135,10 +135,11 @@ _ROUNDING: Final = 1e-12
 
 
 class Ways(NamedTuple):
-    """Candidate pulses for a dot: arrays (ways,) of times after the slot of the preceding dot, s.
+    """Candidate pulses for a dot that follows another dot: arrays with one element per candidate.
 
-    The dot is due at `period`. A brake pulse of width `brake` begins at `delay`, both 0 if omitted; the dot
-    is `fired` with a pulse of `width`. `cost` is the deviation of a row of such dots; see `costs`.
+    Times are in s, measured from the slot of the preceding dot. The dot is due at `period`. A brake pulse of
+    the width `brake` begins at `delay`; both are 0 without a brake pulse. The dot is fired at `fired` with a
+    pulse of the width `width`. `cost` is the deviation of a row of such dots; see `costs`.
     """
 
     period: FloatArray
@@ -188,7 +189,8 @@ def fits(task: Task, ways: Ways) -> BoolArray:
 def solved(task: Task, ways: Ways) -> Ways:
     """Solve for the firing times and widths with which the second dot equals the single-pulse dot.
 
-    See `solve`. A candidate that does not converge keeps its best iterate.
+    The first dot is printed from rest. A candidate that does not converge keeps its best iterate; see
+    `solve`.
     """
     if not ways.size:
         return ways
@@ -285,9 +287,10 @@ def rows_of(task: Task, ways: Ways, dots: int) -> list[Drive]:
 
 
 def _deviations(task: Task, hammer: Hammer, ways: Ways, drives: Sequence[Drive]) -> FloatArray:
-    """Simulate drives; return normalised deviations of force and arrival, shape (ways, dots, 2).
+    """Simulate the drive of each candidate on a hammer; return the deviations of all dots.
 
-    A lost dot, and a dot with extra contacts, is NaN.
+    The deviations of force and arrival are fractions of the limits, shape (candidates, dots, 2); NaN for a
+    lost dot and for a dot with extra contacts.
     """
     count = len(drives[0].times) if drives else 2
     slots = np.arange(count) * ways.period[:, np.newaxis]
