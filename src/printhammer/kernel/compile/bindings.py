@@ -1,4 +1,4 @@
-"""Bindings of a kernel to a hammer: law functions, choices, and digests of the sources of the laws."""
+"""Bindings of a kernel to a hammer: law functions, compile-time choices, and digests of the law sources."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Bindings(NamedTuple):
 
 
 def bindings_of(laws: Laws) -> Bindings:
-    """Return the law functions, choices and source digests of `laws`.
+    """Return the law functions, the compile-time choices and the source digests of `laws`.
 
     Raises ImportError if a module named in `laws` cannot be imported.
     """
@@ -92,7 +92,8 @@ def code_digest(sources: Iterable[str]) -> str:
 def syntax_text(node: Any, replaced: Callable[[ast.AST], str | None] = lambda _node: None) -> str:
     """Return a text form of a syntax tree, without docstrings, that is the same in all Python versions.
 
-    `replaced` returns a replacement text for a node, or None; a node whose replacement is empty is omitted.
+    `replaced` returns a replacement text for a node, or None to keep the node. A node whose replacement is
+    the empty string is omitted.
     """
     if isinstance(node, list):
         return "[" + ",".join(filter(None, (syntax_text(each, replaced) for each in node))) + "]"

@@ -77,7 +77,7 @@ def _folders() -> Iterator[Path]:
 
 
 def _is_safe(folder: Path) -> bool:
-    """Whether only the user can write to a cache folder; only the temporary folder is tested."""
+    """Whether only the user can write to a cache folder; assumed for all but the temporary folder."""
     if folder != _temporary_folder():
         return True
     try:
@@ -112,7 +112,7 @@ def _content(path: Path) -> bytes | None:
 
 
 def sealed(payload: bytes) -> bytes:
-    """Return the content of a cache file: the mark, the digest of the payload, and the payload."""
+    """Return the content of a cache file: `_MARK`, the SHA-256 digest of the payload, and the payload."""
     return _MARK + hashlib.sha256(payload).digest() + payload
 
 
@@ -222,8 +222,8 @@ class Code(File):
 
     `kind` is the name of the code in the records of compile times; `label` describes the laws in messages.
     `is_lowered` returns whether all modules of the code are already lowered, as in a wheel. `shipped` is the
-    path of the machine code in the wheel; the file may be missing. `circuit` states whether the coil has a
-    circuit.
+    path of the machine code in the wheel; the file may be missing. `circuit` states whether the hammer has a
+    coil circuit.
     """
 
     def __init__(
@@ -247,7 +247,10 @@ class Code(File):
         return _content(self.shipped) or super().read()
 
     def get(self, make: Callable[[], bytes]) -> bytes:
-        """Return the machine code; if neither shipped nor cached, announce, compile, and record the time."""
+        """Return the machine code; compile the code if it is neither shipped nor cached.
+
+        A compilation is announced to the listeners, and its duration is recorded.
+        """
         code = self.read()
         if code is not None:
             return code
@@ -265,12 +268,12 @@ class Code(File):
 
     @property
     def work(self) -> str:
-        """Kind of compilation in the records of compile times, such as "run", with suffixes for variants."""
+        """Kind of compilation in the records of compile times, such as "runs", with suffixes for variants."""
         variants = {records.CIRCUIT: self._circuit, records.LOWERED: not self._is_lowered()}
         return ", ".join([self.kind, *(name for name, holds in variants.items() if holds)])
 
     def _noted(self, work: str, make: Callable[[], bytes]) -> bytes:
-        """Compile the machine code, and record the compile time."""
+        """Compile the machine code with `make`; record the compile time under the kind `work`."""
         begun = thread_time()
         code = make()
         if self._written is not None:

@@ -2,8 +2,8 @@
 
 The arguments of an entry point are numbers, arrays and nested tuples of them. The caller writes the flattened
 arguments to a block of memory, eight bytes each, and passes the address of the block. An array is passed as
-the address of its object, from which the module reads the address and shape of the data. A C function with
-seventy arguments would take five times as long for a short call.
+the address of its object, from which the module reads the address and shape of the data. With seventy
+separate arguments instead of a block, a short call would take five times as long.
 """
 
 from __future__ import annotations
@@ -96,11 +96,12 @@ def _flat(value: Any) -> Iterator[Any]:
 
 
 def calling_code(entry: str, signature: Signature, name: str, *, bare: bool = False) -> str:
-    """Return the source of a function that reads a block of arguments and calls the function `entry`.
+    """Return LLVM assembly of a function `name` that reads a block of arguments and calls `entry`.
 
-    The function returns 0, the number of the first slot whose array does not match the signature, or -1 for
-    an exception. The results follow the arguments in the block. Outside Python (WebAssembly), arrays are
-    passed `bare`: the address of the elements, then the length along each axis, eight bytes each.
+    The function returns 0 after success, -1 after an exception, or the number of the first slot whose array
+    does not match the signature. In the block, the results follow the arguments. Outside Python (in
+    WebAssembly), arrays are passed `bare`: the address of the elements, then the length along each axis,
+    eight bytes each.
     """
     code: list[str] = []
     passed: list[tuple[str, str]] = []
@@ -138,7 +139,10 @@ ret i64 %returned
 
 
 def _array_code(i: int, kind: str, code: list[str]) -> list[tuple[str, str]]:
-    """Append code that checks the array in slot `i` and reads its fields; return the arguments to pass."""
+    """Append to `code` the assembly that checks the array in slot `i` and reads its fields.
+
+    `kind` is the type code of the array. Returns the arguments to pass for the array; see `_passed`.
+    """
     dtype, _size = _ELEMENTS[kind[0]]
     count = int(kind[1])
 
@@ -177,7 +181,10 @@ def _array_code(i: int, kind: str, code: list[str]) -> list[tuple[str, str]]:
 
 
 def _bare_array_code(i: int, kind: str, code: list[str]) -> list[tuple[str, str]]:
-    """Append code that reads address and lengths of a bare array; return the arguments to pass."""
+    """Append to `code` the assembly that reads address and lengths of the bare array in slot `i`.
+
+    `kind` is the type code of the array. Returns the arguments to pass for the array; see `_passed`.
+    """
     count = int(kind[1])
     data, lengths = f"%data.{i}", [f"%length{axis}.{i}" for axis in range(count)]
     code.append(f"{data} = load ptr, ptr %p{i}")
@@ -196,8 +203,9 @@ def _passed(
 ) -> list[tuple[str, str]]:
     """Return the arguments that pass an array to a function compiled by numba, as (type, value) pairs.
 
-    Numba expects two owner pointers, unused here, the number and size of the elements, the address of the
-    data, the shape and the strides.
+    Numba expects two owner pointers (unused here), the number and size of the elements, the address of the
+    data, the shape and the strides. `data`, `lengths` and `steps` are the LLVM names of address, shape and
+    strides; the assembly that counts the elements is appended to `code`.
     """
     items, size = "1", _ELEMENTS[kind[0]][1]
     for axis, length in enumerate(lengths):

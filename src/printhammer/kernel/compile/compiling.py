@@ -29,7 +29,7 @@ _CALLED: dict[str, Any] = {**_OPTIONS, "forceinline": False}
 
 
 class _Helper(CPUDispatcher):
-    """Dispatcher of a kernel function: compiled callers link its module, Python calls a separate copy."""
+    """Numba dispatcher of a kernel function: compiled callers link its module, Python calls another copy."""
 
     @cached_property
     def alone(self) -> Any:
@@ -57,7 +57,7 @@ _inline_all = False
 
 @contextmanager
 def all_inlined() -> Iterator[None]:
-    """Make `compiled` and `called` inline as well, since only a loop without calls is vectorised."""
+    """Context in which `compiled` and `called` also inline, since only a loop without calls is vectorised."""
     global _inline_all  # noqa: PLW0603
     _inline_all = True
     try:
@@ -74,7 +74,7 @@ def compiled(function: Function) -> Function:
 
 
 def called(function: Function) -> Function:
-    """Mark a long helper for lazy compilation as a function that is not inlined, except in `all_inlined`."""
+    """Mark a long helper for lazy compilation; it is inlined only in the context `all_inlined`."""
     if _inline_all:
         return inlined(function)
     return _helper(function, KeptCompiler, _CALLED)

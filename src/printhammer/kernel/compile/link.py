@@ -42,7 +42,7 @@ _OURS: Final = (ENTRY, LAW, CHOICE, "_ZN")
 
 
 def law_symbol(name: str, for_lanes: bool) -> str:
-    """Return the symbol of a law function, in the version for arrays of constants or for lanes."""
+    """Return the symbol of a law function: of its version for lanes or for arrays of constants."""
     return f"{LAW}lane.{name}" if for_lanes else LAW + name
 
 
@@ -102,7 +102,7 @@ def link(template: bytes, laws: Iterable[bytes], choices: Mapping[str, int], cal
 
 
 def is_readable(bitcode: bytes) -> bool:
-    """Whether the installed LLVM can read a module; bitcode of a later version may be unreadable."""
+    """Whether the installed LLVM can read a module; bitcode of a later LLVM version may be unreadable."""
     try:
         llvm.parse_bitcode(bitcode)
     except RuntimeError:

@@ -28,7 +28,7 @@ class _Part(JITCodeLibrary):
         self._finalized = True
 
     def own_module(self) -> Any:
-        """Return the helper's module without callees; its functions may occur in several linked modules."""
+        """Return the helper's module without callees; other linked modules may define the same functions."""
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == Linkage.external:
                 function.linkage = "linkonce_odr"
@@ -63,7 +63,7 @@ class _Part(JITCodeLibrary):
         return module
 
     def _callees(self) -> list[Any]:
-        """Return the libraries of all direct and indirect callees, callers first."""
+        """Return the libraries of all direct and indirect callees, each before its own callees."""
         ordered: dict[Any, None] = {}
         self._add_callees(ordered)
         # The linker adds a function only if the module already refers to it, so callers come first.

@@ -2,7 +2,7 @@
 
 The template of an entry point is a module of the entry point and all its callees, in which laws and choices
 stay undefined, so that one template serves every hammer. The laws of a part are a separate module. Since the
-types of all arguments are fixed, there are two templates: with and without a coil circuit.
+types of all arguments are fixed, most entry points have only two templates: with and without a coil circuit.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def template(entry: str, variant: Mapping[str, bool]) -> bytes:
 
 
 def plain(name: str, entry: Plain, circuit: bool | None, packing: Mapping[str, Any]) -> bytes:
-    """Lower a plain function as an entry point; return LLVM bitcode.
+    """Lower a function outside the kernel as the entry point `name`; return LLVM bitcode.
 
     `circuit` states whether the hammer has a coil circuit; None for a function that uses no names of the
     kernel. `packing` holds, by name, the functions that pack constants.
@@ -69,7 +69,10 @@ def plain(name: str, entry: Plain, circuit: bool | None, packing: Mapping[str, A
 
 
 def _entry(function: Any, name: str, signature: Any, results: int) -> bytes:
-    """Lower a compiled function as an entry point, with its callees; return LLVM bitcode."""
+    """Lower a compiled function and its callees as an entry point `name`; return LLVM bitcode.
+
+    Raises TypeError if the function does not return `results` integers.
+    """
     library, symbol, kind = _lowered(function, tuple(map(_types, signature)))
     expected = {0: types.none, 1: types.int64}.get(results, _tuple([types.int64] * results))
     if types.unliteral(kind) != expected:  # type: ignore[no-untyped-call]
@@ -78,7 +81,7 @@ def _entry(function: Any, name: str, signature: Any, results: int) -> bytes:
 
 
 def laws(role: str, functions: Mapping[str, Callable[..., Any]], for_lanes: bool) -> bytes:
-    """Lower the law functions of a part to one module; return LLVM bitcode."""
+    """Lower the law functions of the part `role`, e.g. "pack", to one module; return LLVM bitcode."""
     whole = llvm.parse_assembly("")
     for name in LAW_FUNCTIONS[role]:
         constants: Any = types.Array(types.float64, 1, "C")

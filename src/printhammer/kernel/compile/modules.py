@@ -83,7 +83,7 @@ def _versions() -> str:
 
 
 def require_numba(needs: str) -> None:
-    """Raise InputError if numba is missing; the message names the extra `laws` and the purpose `needs`."""
+    """Raise InputError if numba is missing; the message states `needs` and names the extra `laws`."""
     try:
         import numba  # noqa: F401
     except ImportError:
@@ -137,7 +137,7 @@ class WebModule(Module):
         self._label = label
 
     def content(self) -> bytes:
-        """Return the content of the module; announce its compilation, about half a minute of computation."""
+        """Return the content of the module; announce the compilation, if necessary (about half a minute)."""
         if not self.is_there():
             time = "about half a minute of processor time"
             say_once(f"compiling WebAssembly ({self._label}): {time}; once, kept on disk")
@@ -231,7 +231,7 @@ class Entry:
     bindings : Bindings
         Law functions and choices of the hammer.
     choices : mapping
-        Additional choices, by name.
+        Additional compile-time choices, by name.
     label : str
         Description of the laws, for messages.
     plain : Plain, optional

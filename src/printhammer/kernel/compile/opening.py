@@ -51,7 +51,7 @@ class _ChoiceType(types.Type):
         super().__init__(f"choice({base})")
 
     def can_convert_to(self, typingctx: Any, other: Any) -> Any:
-        """Return the conversion from the choice's base type to another type, ranked no better than safe."""
+        """Return numba's rank of the conversion to another type: that of the base type, at best `safe`."""
         conversion = typingctx.can_convert(self.base, other)
         return None if conversion is None else max(conversion, Conversion.safe)
 
@@ -96,7 +96,7 @@ def _cast(context: Any, builder: Any, source: Any, target: Any, value: Any) -> A
 @_infer(operator.not_)
 class _Truth(AbstractTemplate):
     def generic(self, args: Any, kws: Any) -> Any:
-        """Return the type of the truth value of a choice, which is boolean."""
+        """Return the signature of a truth test of a choice, with a boolean result; None for other types."""
         return _signature(types.boolean, *args) if isinstance(args[0], _ChoiceType) and not kws else None
 
 
@@ -111,7 +111,10 @@ def _not(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
 
 
 def law(name: str, symbol: str, floats: int) -> Callable[..., float]:
-    """Return the stub of a law for compiling its callers; the stub takes constants and `floats` numbers."""
+    """Return a stub of the law `name`, from which its callers are compiled as calls of `symbol`.
+
+    The arguments of the stub are the array of constants and `floats` numbers.
+    """
     arguments = ", ".join(f"a{i}" for i in range(floats))
     scope: dict[str, Any] = {"__name__": __name__}
     exec(f"def {name}(c, {arguments}):\n    return 0.0\n", scope)

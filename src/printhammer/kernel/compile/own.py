@@ -77,7 +77,7 @@ def laws(role: str, functions: Mapping[str, Callable[..., Any]], for_lanes: bool
 
 
 def _alone(text: str, symbol: str) -> Any:
-    """Parse the LLVM assembly of a function; return its module, where only `symbol` is visible."""
+    """Return a function's LLVM assembly as a module from which only the function, as `symbol`, is visible."""
     module = llvm.parse_assembly(text)
     (name,) = (
         function.name.removeprefix(_FOR_C)

@@ -75,7 +75,7 @@ def read(folder: Path) -> list[dict[str, Any]]:
 
 
 def note(folder: Path, name: str, seconds: float) -> None:
-    """Record the compile time of an entry point, s; raise OSError if the record cannot be written."""
+    """Record the compile time [s] of an entry point; raise OSError if the record cannot be written."""
     mine = maker()
     entries = read(folder)
     if (own := _own(entries, mine)) is None:
@@ -104,7 +104,7 @@ def expected(folders: Iterable[Path], name: str) -> float:
 
 
 def mismatch(folder: Path) -> str:
-    """Return the reason why the machine code in a folder cannot be used; empty if usable or absent."""
+    """Return why this process cannot use the machine code in a folder; empty if usable or absent."""
     mine = maker()
     entries = read(folder)
     if not entries or _own(entries, mine) is not None:

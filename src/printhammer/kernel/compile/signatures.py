@@ -72,7 +72,7 @@ def signature_of(entry: str, variant: Mapping[str, bool]) -> Any:
 
 
 class Plain(NamedTuple):
-    """Entry point outside the kernel: an ordinary function of numbers and arrays, and its types.
+    """Entry point outside the kernel: an ordinary function of numbers and arrays, with its argument types.
 
     The function allocates nothing and raises nothing; it returns None, an integer, or a tuple of integers.
     Its module may leave names of laws, of choices and of functions of the kernel's templates undefined; these

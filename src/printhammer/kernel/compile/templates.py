@@ -55,7 +55,10 @@ def source_file(name: str) -> Path:
 
 
 def execute_all(templates: Sequence[str], namespace: dict[str, Any], tag: str) -> dict[str, Any]:
-    """Execute templates in order, each with the functions of earlier templates; return all names."""
+    """Execute templates in order, each with `namespace` and the functions of earlier templates predefined.
+
+    Returns `namespace`, extended by the functions of all templates. `tag` is as for `execute`.
+    """
     names = dict(namespace)
     for name in templates:
         module = execute(name, tag, names)
@@ -74,7 +77,10 @@ def _functions_of(module: ModuleType) -> dict[str, Any]:
 
 
 def compile_law(function: Callable[..., Any], compiled: Callable[..., Any], **names: Any) -> Any:
-    """Compile a law and the helpers that it calls; `names` overrides global names in their code."""
+    """Apply the decorator `compiled` to a law and the helpers that it calls.
+
+    `names` overrides global names in their code.
+    """
     helpers = helpers_of(function) if isinstance(function, FunctionType) else {}
     if helpers or names:
         scope = {**function.__globals__, **names}
@@ -84,9 +90,10 @@ def compile_law(function: Callable[..., Any], compiled: Callable[..., Any], **na
 
 
 def bind(function: Any, namespace: Mapping[str, Any], compiled: Callable[..., Any], known: Any = None) -> Any:
-    """Compile a plain function and its helpers; `namespace` defines the names missing in their modules.
+    """Apply the decorator `compiled` to a plain function and its helpers.
 
-    The dictionary `known` collects the compiled functions, so that each is compiled once.
+    `namespace` defines the names that are missing in their modules. The dictionary `known` collects the
+    compiled functions, so that each function is compiled once.
     """
     known = {} if known is None else known
     if function not in known:

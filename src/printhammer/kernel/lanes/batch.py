@@ -6,13 +6,12 @@ from typing import Any, NamedTuple
 
 
 class Batch(NamedTuple):
-    """Inputs of an ensemble: hammers, drives, initial states and end times of M members.
+    """Inputs of an ensemble of M members with H hammers and W sets of waveforms.
 
     Attributes
     ----------
     hammer_of, waveform_of : int64 array, shape (M,)
-        Row of `hammers`, `controls` and `bounds` for each member, and index of the waveform set for each
-        member.
+        For each member: row of `hammers`, `controls` and `bounds`, and index of the waveform set.
     hammers, controls, bounds : float64 array, shape (H, any), (H, 4), (H, 4)
         Parameter array, step-size control and bounds of each hammer, as in
         :class:`printhammer.kernel.single.carry.Setup`.
@@ -28,8 +27,8 @@ class Batch(NamedTuple):
         Whether a firing ends all earlier pulses.
     states : float64 array, shape (M, 8)
         Initial states: time [s], displacement [m], velocity [m/s], mode (negative: to be derived from the
-        state), memory [m], currents in coil and shorted turn [A], reservoir voltage [V] (NaN if
-        full).
+        state), latest local maximum in the pack [m], currents in coil and shorted turn [A], reservoir
+        voltage [V] (NaN if full).
     ends : float64 array, shape (M,)
         End times of the runs [s].
     max_steps : int
@@ -54,7 +53,9 @@ class Batch(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """Requested times and output arrays of an ensemble of M members; NaN after an early end of a run.
+    """Requested times and output arrays of an ensemble of M members.
+
+    Strobes and displacements after an early end of a run are NaN.
 
     Attributes
     ----------
@@ -70,8 +71,8 @@ class Kept(NamedTuple):
         Number of extra contacts of each member.
     dot_starts, dots
         Start index of each member, and the concatenated rows of dot data of all members, see
-        :mod:`printhammer.kernel.model.dots`: a row for each firing, then extra contacts up to the
-        capacity.
+        :mod:`printhammer.kernel.model.dots`: a row for each firing, then a row for each extra contact that
+        fits.
     strobes : float64 array, shape (strobe times, 4), with a coil circuit (strobe times, 7)
         States at the strobe times; see :mod:`printhammer.kernel.single.stretch`.
     x : float32 array, shape (M, T)

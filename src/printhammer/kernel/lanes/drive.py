@@ -1,4 +1,4 @@
-"""Drive between two edges as one closed formula: the sum of a cubic, two exponentials and a sine.
+"""Value of the drive between two edges as one formula: the sum of a cubic, two exponentials and a sine.
 
 Exponentials of equal rate and sines of equal frequency are combined, so that the cost of an evaluation does
 not depend on the number of active pulses.
@@ -37,7 +37,8 @@ def drive_value(t: float, drive: Any) -> float:
 def add_up(t: float, live: Any, rates: Any, pool: Any, lane: int) -> None:
     """Combine the active pulses at time `t` [s] into one formula in the drive rows of a lane.
 
-    `rates` holds the rates of the two exponentials [1/s] and the angular frequency of the sine [rad/s].
+    `live` holds the active waveform pieces. `rates` holds the rates of the two exponentials [1/s] and the
+    angular frequency of the sine [rad/s].
     """
     c0, c1, c2, c3 = 0.0, 0.0, 0.0, 0.0
     first, second, along, across = 0.0, 0.0, 0.0, 0.0

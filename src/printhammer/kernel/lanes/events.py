@@ -75,7 +75,8 @@ def quintic(part: float, h: float, x0: float, v0: float, a0: float, x1: float, v
 def sixth_term(pool: Any, i: int, which: int) -> float:
     """Return the coefficient k of the correction k u^3 (u - 1)^3 to the latest step's quintic interpolant.
 
-    The correction matches the acceleration at the middle of the step, u = 1/2, to the force there.
+    Here u is the fraction of the step. With the correction, the acceleration of the interpolant at the middle
+    of the step, u = 1/2, agrees with the force there.
     """
     h = pool[R.LENGTH * R.BLOCK + i]
     x0, x1 = pool[R.OLD_X * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
@@ -94,7 +95,11 @@ def sixth_term(pool: Any, i: int, which: int) -> float:
 
 @compiled
 def position_in_step(pool: Any, i: int, which: int, time: float, b: float, sixth: float, fine: bool) -> float:
-    """Return the displacement [m] at a time [s] inside the latest step of a lane, by interpolation."""
+    """Return the displacement [m] at a time [s] inside the latest step of a lane, by interpolation.
+
+    `b` is the backstop position [m], and `sixth` the result of `sixth_term`, or 0. With `fine`, a backstop
+    contact is always interpolated in the regularised variable s, otherwise in time where that is smooth.
+    """
     x0, x1 = pool[R.OLD_X * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
     v0, v1 = pool[R.OLD_V * R.BLOCK + i], pool[R.NEW_V * R.BLOCK + i]
     a0, a1 = pool[R.OLD_A * R.BLOCK + i], pool[R.NEW_A * R.BLOCK + i]
@@ -158,9 +163,10 @@ def note_samples(
     x: Any,
     b: float,
 ) -> None:
-    """Store the samples of a lane's latest step that are due before time `until` [s]; at `until`, if `last`.
+    """Store the displacement samples of a lane's latest step whose times lie before `until` [s].
 
-    With `fine`, an additional force evaluation raises the order of the interpolation by one.
+    With `last`, a sample at the time `until` is stored as well. With `fine`, an additional force evaluation
+    raises the order of the interpolation by one. `b` is the backstop position [m].
     """
     m = int(slot[R.MEMBER])
     sample = int(slot[R.NEXT_SAMPLE])
@@ -188,9 +194,10 @@ def note_strobes(
     train: Train,
     hammer: Hammer,
 ) -> None:
-    """Store the strobes of a lane's latest step that are due before time `until` [s]; at `until`, if `last`.
+    """Store the strobes of a lane's latest step whose times lie before `until` [s].
 
-    A strobe at the end of a step is stored with the next step, which determines its mode.
+    With `last`, a strobe at the time `until` is stored as well. Otherwise, a strobe at the end of a step is
+    stored with the next step, which determines its mode.
     """
     strobe = int(slot[R.NEXT_STROBE])
     t0 = pool[R.OLD_T * R.BLOCK + i]
@@ -217,7 +224,7 @@ def note_strobes(
 
 @compiled
 def enter_contact(pool: Any, i: int, v: float, slot: Any, control: Any) -> int:
-    """Start a backstop contact at zero compression with velocity `v` [m/s]; return the contact pool."""
+    """Start a backstop contact at zero compression with velocity `v` [m/s]; return the index of its pool."""
     unit = contact_unit(v, control)
     slot[R.UNIT] = unit
     pool[R.X * R.BLOCK + i] = 0.0
@@ -266,8 +273,8 @@ def turn_in_pack(
 ) -> int:
     """Select the next mode after the velocity has become zero inside the pack at displacement `x`.
 
-    The rule is that of :func:`printhammer.kernel.single.around.reversed_mode`. A member whose armature
-    would rest leaves the lanes.
+    Returns the index of the pool for this mode, or LEAVES if the armature would rest. The rule is that of
+    :func:`printhammer.kernel.single.around.reversed_mode`.
     """
     # As in the scalar kernel, oscillations too small to distinguish from rest would never end.
     still = R.STILL * control[1] * control[1] / control[0]
@@ -343,7 +350,10 @@ def new_edge(
     train: Train,
     rates: Any,
 ) -> None:
-    """Update the drive of a lane at an edge: active pulses, time of the next edge, and acceleration."""
+    """Update the active pulses, the acceleration and the next edge of a lane at an edge of the drive.
+
+    The end of the run, `end` [s], counts as an edge.
+    """
     t = pool[R.T * R.BLOCK + i]
     _first, _last, edge = edges_at(t, train)
     add_up(t, train.live, rates, pool, i)
@@ -368,10 +378,11 @@ def close_member(pool: Any, i: int, which: int, slot: Any, dots: Any, hammer: Ha
 def locate(
     pool: Any, i: int, which: int, hammer: Hammer, live: Drive, control: Control
 ) -> tuple[int, float, float, float]:
-    """Locate the event in a lane's latest step by the scalar kernel; return its code, time and state.
+    """Locate the event in a lane's latest step with the functions of the scalar kernel.
 
-    In the contact pool, w replaces the position. The code is NO_SWITCH if the step contains no event,
-    UNRESOLVED if the step must be halved.
+    Returns the code of the event, and time, position and velocity at the event. In the contact pool, w =
+    sqrt(b - x) replaces the position. The code is NO_SWITCH if the step contains no event, UNRESOLVED if the
+    step must be halved.
     """
     start = (pool[i], pool[R.X * R.BLOCK + i], pool[R.V * R.BLOCK + i], pool[R.A * R.BLOCK + i])
     h = pool[R.LENGTH * R.BLOCK + i]

@@ -1,8 +1,8 @@
-"""Event location in lanes: estimate the event, step to the estimate, and close the remainder.
+"""Event location in lanes: estimate the time of the event, step to that time, and correct the estimate.
 
 The quintic interpolant of the step that contains the event gives the estimate. The next step of the lane ends
-at the estimate, and a Taylor expansion closes the remainder. If that is too inaccurate, the scalar kernel
-locates the event.
+at the estimated time, and a Taylor expansion from there yields the event. If the expansion is too inaccurate,
+the scalar kernel locates the event.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.forces import Hammer
 
 CLOSE = 1e-3
-"""Largest remainder, as a fraction of the step, that the Taylor expansion may close."""
+"""Largest time from the end of a step to the event for a Taylor expansion, as a fraction of the step."""
 
 GOES_ON = -1
 """Return value instead of an event code: the lane takes another step before the event is located."""
@@ -40,7 +40,7 @@ def ends_of_step(pool: Any, i: int, sign: float) -> tuple[float, float, float, f
 
 @inlined
 def rises_in_step(pool: Any, i: int, level: float, sign: float) -> int:
-    """Decide whether sign * x rises through sign * `level` in the latest step; see `rises_through`."""
+    """Return the code of `rises_through` for sign * x and sign * `level` in a lane's latest step."""
     return rises_through(*ends_of_step(pool, i, sign), sign * level)
 
 
@@ -52,7 +52,10 @@ def level_part(pool: Any, i: int, level: float, sign: float) -> float:
 
 @compiled
 def guess_free(pool: Any, i: int, hammer: Hammer) -> tuple[int, float]:
-    """Return the first event inside the latest step in free flight, and its estimated step fraction."""
+    """Return the code of the first event in a lane's latest step in free flight, and where it occurs.
+
+    The place of the event is an estimate, as a fraction of the step.
+    """
     down = rises_in_step(pool, i, hammer[POSITION], -1.0)
     up = rises_in_step(pool, i, hammer[FRONT], 1.0)
     if M.UNRESOLVED in (down, up):
@@ -71,7 +74,10 @@ def guess_free(pool: Any, i: int, hammer: Hammer) -> tuple[int, float]:
 
 @compiled
 def guess_in_pack(pool: Any, i: int, which: int, hammer: Hammer) -> tuple[int, float]:
-    """Return the first event inside the latest step in the pack, and its estimated step fraction."""
+    """Return the code of the first event in a lane's latest step in the pack, and where it occurs.
+
+    The place of the event is an estimate, as a fraction of the step.
+    """
     h = pool[R.LENGTH * R.BLOCK + i]
     turn = -1.0 if which == R.UNLOADING_POOL else 1.0
     v0, a0 = turn * pool[R.V * R.BLOCK + i], turn * pool[R.A * R.BLOCK + i]
@@ -95,7 +101,10 @@ def guess_in_pack(pool: Any, i: int, which: int, hammer: Hammer) -> tuple[int, f
 
 @compiled
 def guess_in_contact(pool: Any, i: int) -> tuple[int, float]:
-    """Return the first event inside the latest step in backstop contact, and its step fraction."""
+    """Return the code of the first event in a lane's latest step in backstop contact, and where it occurs.
+
+    The place of the event is an estimate, as a fraction of the step in the regularised variable s.
+    """
     t0, t1 = pool[i], pool[R.NEW_T * R.BLOCK + i]
     w0, w1 = pool[R.X * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
     v0, v1 = pool[R.V * R.BLOCK + i], pool[R.NEW_V * R.BLOCK + i]
@@ -119,7 +128,10 @@ def guess_in_contact(pool: Any, i: int) -> tuple[int, float]:
 
 @compiled
 def guess(pool: Any, i: int, which: int, hammer: Hammer) -> tuple[int, float]:
-    """Return the first event inside the latest step of a lane, and its estimated step fraction."""
+    """Return the code of the first event in a lane's latest step, and where it occurs.
+
+    The place of the event is an estimate, as a fraction of the step.
+    """
     if which == R.CONTACT_POOL:
         return guess_in_contact(pool, i)
     if which == R.FREE_POOL:
@@ -140,12 +152,13 @@ def aim(pool: Any, i: int, slot: Any, switch: int, part: float) -> None:
 def land(
     pool: Any, i: int, which: int, slot: Any, hammer: Hammer, control: Any
 ) -> tuple[int, float, float, float]:
-    """Close the remainder between the end of a lane's step and the event that the step was aimed at.
+    """Compute the event at which a lane's latest step was aimed, by a Taylor expansion from its end.
 
     Returns
     -------
     tuple
-        The event, or GOES_ON, and time, displacement (w in the contact pool) and velocity at the event.
+        Code of the event, and time, displacement (w in the contact pool) and velocity at the event. The code
+        is GOES_ON if the expansion is too inaccurate, so that another step is needed.
     """
     switch = int(pool[R.LANDING * R.BLOCK + i])
     h = pool[R.LENGTH * R.BLOCK + i]

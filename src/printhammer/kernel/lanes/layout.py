@@ -11,7 +11,8 @@ BLOCK = 16
 """Number of lanes of a block, which the compiled loops process together."""
 
 MANY_STEPS, SHORT = 2e4, 1e-12
-"""Step count above which, and step size over elapsed time below which, a member leaves the lanes.
+"""A member leaves the lanes if it takes more steps than the first number, and its latest step is shorter than
+the second number times the elapsed time.
 
 In a runaway, steps become ever shorter without underflow; the scalar kernel then determines the status.
 """

@@ -1,8 +1,8 @@
 """Elementary functions without branches or calls, for loops that the compiler vectorises.
 
 For lanes, the laws of the parts are compiled with this module in place of :mod:`math`, and each function is
-inlined. Sources: Cody and Waite, Software Manual for the Elementary Functions (1980), for the
-reductions; the polynomials are Taylor and atanh series, long enough for the reduced range. Relative errors:
+inlined. The arguments are reduced as in Cody and Waite, Software Manual for the Elementary Functions
+(1980); the polynomials are Taylor and atanh series, long enough for the reduced range. Relative errors:
 exp and log 2e-16, pow 2e-16 (1 + |y ln x|); sin and cos: that of rounding the argument. Arguments
 outside the domain, for which `math` raises, give NaN or an infinity.
 """

@@ -59,7 +59,8 @@ def members(
     under_way, live : array, shape (2, any)
         Working space, as in :class:`printhammer.kernel.model.layout.Train`, for the run and for its record.
     nodes, contacts, carry
-        Working space as in :func:`printhammer.kernel.single.run.run`.
+        Working space: the arguments `nodes`, `contacts` and `state` of
+        :func:`printhammer.kernel.single.run.run`.
 
     Returns
     -------

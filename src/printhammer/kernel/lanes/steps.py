@@ -56,7 +56,10 @@ def hammer_at(pool: Any, i: int) -> Any:
 
 @inlined
 def factor(ratio: float) -> float:
-    """Return the factor of the next step size for an error `ratio`; the smallest factor if not finite."""
+    """Return the size of the next step divided by the size of the latest step, from 0.2 to 5.
+
+    `ratio` is the error of the latest step as a multiple of the tolerance; it may be NaN or infinite.
+    """
     f = 0.85 / math.sqrt(math.sqrt(math.sqrt(max(ratio, 1e-7))))
     f = min(5.0, max(0.2, f))
     return f if ratio < 1e6 else 0.2
@@ -66,7 +69,11 @@ def factor(ratio: float) -> float:
 def settle(
     pool: Any, i: int, start: State, h: float, end: State, ratio: float, sure: bool, edge: bool, outside: bool
 ) -> None:
-    """Accept or reject a step of a lane; store its results, the next step size and the event flags."""
+    """Accept or reject a step of a lane; store its results, the next step size and the event flags.
+
+    `ratio` is the error as a multiple of the tolerance. The flags state whether the step cannot contain a
+    switching event (`sure`), ends at an edge of the drive (`edge`), or may exceed a bound (`outside`).
+    """
     t, x, v, a = start
     t1, x1, v1, a1 = end
     small = ratio <= 1.0
@@ -258,5 +265,5 @@ def lane_acceleration(pool: Any, i: int, t: float, x: float, v: float, mode: int
 
 @compiled
 def lane_contact_rate(pool: Any, i: int, t: float, w: float, v: float) -> float:
-    """Return dv/ds of the member in a lane at a state in backstop contact."""
+    """Return dv/ds of the member in a lane at a state in backstop contact; s is the regularised variable."""
     return 2.0 * w * backstop_acceleration(t, w, v, hammer_at(pool, i), drive_at(pool, i))

@@ -2,10 +2,10 @@
 
 Each entry point becomes one object, from the same bitcode as its machine code. The linker joins the objects
 of a kernel with the mathematical functions that they call, from zig's C library, which is musl. The module
-imports nothing, so that every browser computes the same bits; it exports its memory, its entry points, which
-take the address of a block of arguments (:func:`printhammer.kernel.compile.calls.calling_code`), and the
-address `__heap_base` from which memory is free. Its custom section `printhammer` is a JSON object that
-describes the arguments, from which `call.mjs` writes the block for a call.
+imports nothing, so that every browser computes the same bits. It exports its memory, its entry points, and
+the address `__heap_base` where free memory begins. An entry point takes the address of a block of arguments
+(:func:`printhammer.kernel.compile.calls.calling_code`). The custom section `printhammer` is a JSON object
+that describes the arguments; `call.mjs` follows the description when it writes the block for a call.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ MAGIC: Final = b"\0asm\1\0\0\0"
 """First bytes of a WebAssembly module: magic number and version."""
 
 _FEATURES: Final = "+bulk-memory,+mutable-globals,+nontrapping-fptoint,+sign-ext,+simd128"
-"""Features of WebAssembly 2.0, which browsers have had since 2023."""
+"""Features of WebAssembly 2.0, which browsers have supported since 2023."""
 _POINTERS: Final = "-p:32:32-"
 _PADDED: Final = "-p:32:64-"
 """Pointers in the data layout, with a size of four bytes and an alignment of eight.
@@ -55,7 +55,7 @@ def _machine() -> Any:
 
 
 def emit(module: Any, name: str) -> bytes:
-    """Compile a linked module to a WebAssembly object file, with `CALL` renamed to the symbol `name`."""
+    """Compile a linked module to a WebAssembly object file; its wrapper `CALL` is renamed to `name`."""
     module.get_function(link.CALL).name = name
     machine = _machine()
     layout = str(machine.target_data)
@@ -68,7 +68,7 @@ def emit(module: Any, name: str) -> bytes:
 
 
 def join(objects: Mapping[str, bytes], description: Mapping[str, Any]) -> bytes:
-    """Link object files, by entry-point name, into one WebAssembly module; append its description.
+    """Link the objects of entry points, by name, into one WebAssembly module; append its description.
 
     Raises
     ------
