@@ -72,9 +72,9 @@ _STATUS = ("ok", "newton failed", "diverged")
 
 @dataclass(frozen=True)
 class SchemeRun:
-    """Result of a run with a scheme of the 1983 paper: ``t``, ``x``, ``v``, ``memory``, SI, and ``status``.
+    """Result of a run with an integration scheme of the 1983 paper, in SI units.
 
-    The arrays have one element per end of a step or per requested time. The memory is the latest local
+    The arrays have one element per end of a step or per requested time. The `memory` is the latest local
     maximum while the armature moves out of the pack, and 0 elsewhere.
 
     The status is "ok", "newton failed" (no solution of an implicit step found) or "diverged" (the motion is
@@ -194,8 +194,8 @@ def integrate(
 def drive_value(time: float, table: Any, replace: bool) -> float:
     """Return the drive value [A or N] at a time: the sum of all active pulses, or the latest pulse alone.
 
-    The table holds firing times, first rows of the firings, rows of the waveforms and the number of earlier
-    firings.
+    The latest pulse alone counts with `replace`. `table` holds, in this order: the firing times; for each
+    firing, the row at which its waveform begins; the rows of all waveforms; the number of earlier firings.
     """
     firings, begins, segments, fired = table
     longest = segments[segments.shape[0] - 1, 0]
@@ -229,7 +229,10 @@ def drive_value(time: float, table: Any, replace: bool) -> float:
 
 
 def acceleration(time: float, x: float, v: float, peak: float, model: Any) -> float:
-    """Return the acceleration of the armature, m/s^2; `peak` is the latest local maximum in the pack, m."""
+    """Return the acceleration of the armature, m/s^2; `peak` is the latest local maximum in the pack, m.
+
+    `model` is as for `write_steps`, also in the functions below.
+    """
     packed, table, options, places = model
     replace, is_force, rigid, along = options
     drive = drive_value(time, table, replace)
@@ -269,7 +272,7 @@ def runge_kutta(
 def trapezoid(
     time: float, x: float, v: float, h: float, peak: float, model: Any
 ) -> tuple[float, float, bool]:
-    """Compute a step of the trapezoidal rule; return position, velocity, and whether Newton converged."""
+    """Compute a step of the trapezoidal rule; return position, velocity, and whether the step is solved."""
     # Substituting x1 = x + h/2 (v + v1) into the rule for v leaves one equation for v1.
     half = 0.5 * h
     a = acceleration(time, x, v, peak, model)
@@ -315,7 +318,10 @@ def one_step(
 
 
 def keep(row: Array, time: float, x: float, v: float, peak: float, front: float) -> None:
-    """Write a row of the result: time, position, velocity, and the memory while moving out of the pack."""
+    """Write time, position, velocity and memory to a row of the result.
+
+    The memory is 0, except while the armature moves out of the pack.
+    """
     row[0], row[1], row[2], row[3] = time, x, v, 0.0
     if x > front and v < 0.0:
         row[3] = max(peak, x)
@@ -324,7 +330,14 @@ def keep(row: Array, time: float, x: float, v: float, peak: float, front: float)
 def write_steps(
     model: Any, steps: Any, reading: int, implicit: bool, moments: Array, at_moments: bool, rows: Array
 ) -> tuple[int, int]:
-    """Write the states at the step ends, or at requested times; return their number and the status index."""
+    """Write the states at the ends of all steps to `rows`; return their number and the index of the status.
+
+    With `at_moments`, the states are those at the times `moments` [s] instead. `model` holds, in this order:
+    the packed constants of magnet, spring, pack and backstop; the table of `drive_value`; the options
+    `replace`, `is_force`, `rigid` and `reload_along_unloading` of `integrate`; and mass, front, backstop
+    position, end time, displacement limit, initial displacement and velocity, in SI units. `steps` holds the
+    step sizes [s] off the backstop, in contact, and late in the settle-out.
+    """
     packed, (firings, _begins, _segments, fired), (_replace, _is_force, rigid, along), places = model
     front, position, t_end, far = places[1], places[2], places[3], places[4]
     time, place, speed, peak = 0.0, places[5], places[6], places[5]

@@ -41,10 +41,10 @@ def contact_rate(w: float, v: float, t: float, hammer: Hammer, drive: Drive) -> 
 
 @compiled
 def length_while_pushed_in(left: float, w: float, v: float, kv: float) -> float:
-    """Return the increment of the regularised variable s over `left` [s], for acceleration into the backstop.
+    """Return the increment ds of the regularised variable s over the time `left` [s] in a backstop contact.
 
-    Solves 2 w ds - v ds^2 - kv ds^3 / 3 = left for ds by Newton's method, where `kv` is dv/ds; the left side
-    increases with ds.
+    Solves 2 w ds - v ds^2 - kv ds^3 / 3 = left for ds by Newton's method, where `kv` is dv/ds. The
+    acceleration must be directed into the backstop, so that the left side increases with ds.
     """
     ds = 0.0
     for _ in range(60):
@@ -132,7 +132,11 @@ def leave(
     drive: Drive,
     control: Control,
 ) -> tuple[float, float, float, float, float]:
-    """Locate the release from the backstop, at zero compression, up to the fraction `upper` of a step `h`."""
+    """Locate the release from the backstop, at zero compression, in a backstop step of length `h` in s.
+
+    The search begins at `fraction` and ends at `upper`, both as fractions of the step. Returns time, w = 0,
+    velocity, dv/ds = 0, and fraction of the step at the release.
+    """
     t, w, v, kv = start
     low, high = 0.0, upper
     negligible = 1e-12 * math.sqrt(control[0])
@@ -157,7 +161,10 @@ def leave(
 def reach_time(
     start: ContactState, h: float, upper: float, t_upper: float, target: float, hammer: Hammer, drive: Drive
 ) -> ContactState:
-    """Locate time `target` [s] in a backstop step `h` whose fraction `upper` ends at time `t_upper` [s]."""
+    """Return the state at the time `target` [s] in a backstop step of length `h` in s.
+
+    The search ends at the fraction `upper` of the step, where the time is `t_upper` [s].
+    """
     t, w, v, kv = start
     low, high = 0.0, upper
     fraction = upper * (target - t) / (t_upper - t)
@@ -184,7 +191,10 @@ def reach_time(
 
 @called
 def end_push(start: ContactState, h: float, upper: float, hammer: Hammer, drive: Drive) -> ContactState:
-    """Locate by bisection where the backstop ceases to push in a step `h`, up to the fraction `upper`."""
+    """Return the state in which the backstop ceases to push in a backstop step of length `h` in s.
+
+    The method is bisection; the search ends at the fraction `upper` of the step.
+    """
     t, w, v, kv = start
     low, high = 0.0, upper
     for _ in range(60):
@@ -209,9 +219,10 @@ def contact_switch(
     drive: Drive,
     control: Control,
 ) -> tuple[int, ContactState]:
-    """Return the first event in a backstop step of length `h` (in the regularised variable), and its state.
+    """Return the first event in a backstop step of length `h` in s, and the state at the event.
 
-    `leaves` states whether w falls to zero within the step, so that the armature leaves the backstop.
+    `leaves` states whether w falls to zero within the step, so that the armature leaves the backstop. An
+    event later than `t_next` [s] is replaced by EDGE at `t_next`.
     """
     _t, w, v, kv = start
     switch, upper = M.NO_SWITCH, 1.0
@@ -248,9 +259,9 @@ def advance_contact(
     Returns
     -------
     tuple
-        The event (EDGE at `t_next`, NO_SWITCH, FAILED, LEFT_BACKSTOP, PUSH_ENDED or CIRCUIT), the state at
-        the end of the step, the proposed length of the next step in the regularised variable s, and the
-        electric state at the end.
+        Code of the event (EDGE at `t_next`, NO_SWITCH, FAILED, LEFT_BACKSTOP, PUSH_ENDED or CIRCUIT), state
+        at the end of the step, proposed length of the next step in the regularised variable s, and electric
+        state at the end of the step.
     """
     t, w, v, kv = start
     shortest = 1e-14 * math.sqrt(control[0]) / control[1]

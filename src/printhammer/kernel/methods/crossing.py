@@ -1,4 +1,4 @@
-"""Event location within a step: change of the coil's current path, or end of a rest of the armature.
+"""Event location within a step: change of the coil's conduction path, or end of a rest of the armature.
 
 The event is the first root of an event function, called `gap`: a smooth function of the state that is
 positive until the event; see `printhammer.kernel.model.circuit.path_gap`. The Bernstein coefficients of the
@@ -34,7 +34,7 @@ STILL = 1e-12
 scale."""
 
 BEGUN = 1e-9
-"""Largest event-function value treated as zero at the start of a step, as on a new current path."""
+"""Largest event-function value treated as zero at the start of a step, e.g. on a new conduction path."""
 
 SHARE = 1e-5
 """Finite-difference step for the time derivative of an event function, as a fraction of the step."""
@@ -43,7 +43,7 @@ NARROW = 1e-15
 """Width of a bracket, as a fraction of a backstop step, at which the location of an event ends."""
 
 PATH_GAP, REST_GAP = 0, 1
-"""Codes of the event functions: change of the current path, and end of a rest of the armature."""
+"""Codes of the event functions: change of the coil's conduction path, and end of a rest of the armature."""
 
 
 @compiled
@@ -74,7 +74,10 @@ def closes(g0: float, d0: float, g1: float, d1: float) -> int:
 
 @inlined
 def rest_gap(a: float, mode: int, hammer: Hammer, control: Control) -> float:
-    """Return the event function of a rest: positive while an acceleration `a` keeps the armature at rest."""
+    """Return the event function for the end of a rest: positive while the armature stays at rest.
+
+    `a` is the acceleration [m/s^2] that all forces but friction and a rigid stop would cause.
+    """
     unit = control[1] * control[1] / control[0]
     if is_on_stop(mode):
         toward = a if mode == M.RESTING else -a
@@ -129,10 +132,10 @@ def gap_and_change(
 def land_on_gap(
     which: int, start: Any, end: Any, electric: Electric, guess: float, law: ForceLaw, control: Control
 ) -> tuple[float, float, float, float, Electric]:
-    """Locate the root of an event function in a step from `start` to `end`, near its fraction `guess`.
+    """Locate the root of an event function in a step from `start` to `end`.
 
-    The method is Newton's, with a bisection if a correction exceeds half the previous correction or leaves
-    the bracket.
+    The method is Newton's, from the fraction `guess` of the step, with a bisection if a correction exceeds
+    half the previous correction or leaves the bracket. `electric` is the electric state at `end`.
 
     Returns
     -------
@@ -171,12 +174,13 @@ def land_on_gap(
 def circuit_switch(
     start: Any, end: Any, electric: Electric, law: ForceLaw, control: Control
 ) -> tuple[int, Any, Electric]:
-    """Search a step off the backstop for a change of the coil's current path or the end of a rest.
+    """Search a step off the backstop for a change of the coil's conduction path or the end of a rest.
 
     Returns
     -------
     tuple
-        CIRCUIT, REST_ENDED, NO_SWITCH or UNRESOLVED, and the state and electric state at the event.
+        Code CIRCUIT, REST_ENDED, NO_SWITCH or UNRESOLVED, and state and electric state at the event or,
+        without an event, at the end of the step.
     """
     live = law.drive[0]
     result = M.NO_SWITCH
@@ -202,7 +206,7 @@ def circuit_switch(
 
 @compiled
 def contact_gap(w: float, v: float, electric: Electric, hammer: Hammer, live: Any) -> float:
-    """Evaluate `path_gap`, the event function for a change of current path, during a backstop contact."""
+    """Evaluate `path_gap`, the event function for a change of conduction path, in a backstop contact."""
     return path_gap(hammer[POSITION] - w * w, v, electric, hammer, live)
 
 
@@ -210,7 +214,7 @@ def contact_gap(w: float, v: float, electric: Electric, hammer: Hammer, live: An
 def contact_gap_and_change(
     t: float, w: float, v: float, kv: float, electric: Electric, h: float, hammer: Hammer, live: Any
 ) -> tuple[float, float]:
-    """Evaluate `path_gap` during a backstop contact, and its change over `h`."""
+    """Evaluate `path_gap` in a backstop contact, and its derivative with respect to s multiplied by `h`."""
     gap = contact_gap(w, v, electric, hammer, live)
     pause = SHARE * h
     pace = 2.0 * w * pause
@@ -223,9 +227,9 @@ def contact_gap_and_change(
 def land_on_gap_in_contact(
     start: Any, end: Any, electric: Electric, h: float, guess: float, hammer: Hammer, drive: Drive
 ) -> tuple[float, float, float, float, Electric]:
-    """Locate a change of the coil's current path in a backstop step `h` of the regularised variable s.
+    """Locate a change of the coil's conduction path in a backstop step of length `h` in s.
 
-    The method and `guess` are those of `land_on_gap`.
+    The method, `guess` and `electric` are those of `land_on_gap`.
 
     Returns
     -------

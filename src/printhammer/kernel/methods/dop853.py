@@ -68,7 +68,7 @@ def plus(total: Point, c: float, k: Point) -> Point:
 
 @inlined
 def _sum1(c: Numbers, k1: Point) -> Point:
-    """Return the weighted sum of one slope; `_sum2` to `_sum9` sum more slopes in a fixed order."""
+    """Return c[0] * k1; `_sum2` to `_sum9` return weighted sums of two to nine slopes, in a fixed order."""
     if HAS_CIRCUIT:
         return c[0] * k1[0], c[0] * k1[1], c[0] * k1[2], c[0] * k1[3], c[0] * k1[4], c[0] * k1[5]
     return c[0] * k1[0], c[0] * k1[1], c[0] * k1[2]
@@ -179,7 +179,7 @@ def time_slope(t: float, y: Point, law: ForceLaw) -> Point:
 
 @(called if HAS_CIRCUIT else inlined)
 def contact_slope(y: Point, hammer: Hammer, drive: Drive) -> Point:
-    """Return the derivative of the state vector with respect to s in backstop contact: dt = 2 w ds."""
+    """Return the derivative of the state vector with respect to s in backstop contact, where dt = 2 w ds."""
     pace = 2.0 * y[1]
     if HAS_CIRCUIT:
         electric, live = electric_of(y), drive[0]
@@ -191,7 +191,10 @@ def contact_slope(y: Point, hammer: Hammer, drive: Drive) -> Point:
 
 @inlined
 def slope_at(y: Point, place_rate: float, rate: float, law: ForceLaw) -> Point:
-    """Return the time derivative at the start of a step, reusing known rates of position and velocity."""
+    """Return the time derivative of the state vector `y` at the start of a step off the backstop.
+
+    `place_rate` and `rate` are the time derivatives of position and velocity, which are already known.
+    """
     if HAS_CIRCUIT:
         rates = electric_rates(y[0], y[1], y[2], electric_of(y), law.hammer, law.drive[0])
         if law.mode >= M.RESTING:
@@ -202,7 +205,10 @@ def slope_at(y: Point, place_rate: float, rate: float, law: ForceLaw) -> Point:
 
 @inlined
 def contact_slope_at(y: Point, rate: float, hammer: Hammer, drive: Drive) -> Point:
-    """Return the derivative d/ds of the state at the start of a backstop step; `rate` is dv/ds."""
+    """Return the derivative of the state vector `y` with respect to s at the start of a backstop step.
+
+    `rate` is the derivative of the velocity, dv/ds, which is already known.
+    """
     pace = 2.0 * y[1]
     if HAS_CIRCUIT:
         x = hammer[POSITION] - y[1] * y[1]
@@ -213,7 +219,10 @@ def contact_slope_at(y: Point, rate: float, hammer: Hammer, drive: Drive) -> Poi
 
 @inlined
 def electric_error(e5: Point, e3: Point, h: float, hammer: Hammer) -> float:
-    """Return the error estimate of the electric state, normalised by its scales."""
+    """Return the error estimate of the electric state, normalised by scales of flux linkage and voltage.
+
+    `e5` and `e3` are the weighted sums of slopes for the estimates of orders 5 and 3.
+    """
     if HAS_CIRCUIT:
         linkage = hammer[LINKAGE_SCALE]
         voltage = max(hammer[CHARGED], hammer[RESISTANCE] * hammer[CURRENT_SCALE])
@@ -283,7 +292,7 @@ def time_step(
 def whole_contact_step(
     t0: float, w0: float, v0: float, kv0: float, h: float, hammer: Hammer, drive: Drive, scales: Any
 ) -> tuple[float, float, float, float, float, Electric]:
-    """Compute the step of `contact_step` and of the electric state; the error includes both."""
+    """Compute the step of `contact_step` together with the electric state, whose error is included."""
     y = point(t0, w0, v0, drive)
     k1 = contact_slope_at(y, kv0, hammer, drive)
     k2 = contact_slope(along(y, h, _sum1(T.A02, k1)), hammer, drive)
@@ -326,7 +335,9 @@ def contact_step(
 def contact_state(
     t0: float, w0: float, v0: float, kv0: float, h: float, hammer: Hammer, drive: Drive
 ) -> tuple[float, float, float, float, Electric]:
-    """Compute the end of a step of `whole_contact_step`, in machine code shared by all callers.
+    """Compute the state at the end of a step of `whole_contact_step`, without the error estimate.
+
+    All callers share the machine code of the function.
 
     Returns
     -------

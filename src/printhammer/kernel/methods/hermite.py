@@ -91,7 +91,7 @@ def turns_down(x0: float, v0: float, a0: float, x1: float, v1: float, a1: float,
 def position_root(
     x0: float, v0: float, a0: float, x1: float, v1: float, a1: float, h: float, level: float, upper: float
 ) -> float:
-    """Return the fraction of the step, in (0, `upper`], at which the quintic rises through `level`."""
+    """Return the fraction of a step, in (0, `upper`], at which its quintic rises through `level`."""
     p1, p2, p3, p4 = control_points(x0, v0, a0, x1, v1, a1, h)
     low, high = 0.0, upper
     s = upper * (level - x0) / (x1 - x0) if x1 != x0 else 0.5 * upper
@@ -122,7 +122,7 @@ def position_root(
 
 @compiled
 def velocity_root(v0: float, a0: float, v1: float, a1: float, h: float) -> float:
-    """Return the fraction of the step, in (0, 1], at which the cubic interpolant of v falls to zero."""
+    """Return the fraction of a step, in (0, 1], at which the cubic interpolant of the velocity falls to 0."""
     c2 = 3.0 * (v1 - v0) - h * (2.0 * a0 + a1)
     c3 = 2.0 * (v0 - v1) + h * (a0 + a1)
     # If the step starts at rest, divide out the root at the start.

@@ -57,7 +57,7 @@ if TYPE_CHECKING:
 
 @inlined
 def value_at(t: float, x: float, hammer: Hammer, drive: Drive) -> float:
-    """Return the drive in amperes or newtons at time `t`; with a coil circuit, the magnetising current."""
+    """Return the value of the drive at time `t` [s], A or N; with a circuit, the magnetising current [A]."""
     if HAS_CIRCUIT:
         return magnetising_current(x, drive[1], hammer, drive[0])
     return drive_value(t, drive)
@@ -104,13 +104,16 @@ def slip(mode: int, memory: float) -> float:
 
 @inlined
 def friction(mode: int, memory: float, hammer: Hammer) -> float:
-    """Return the dry friction of the moving armature [N]; 0 at rest, where other forces determine it."""
+    """Return the dry friction force on the moving armature [N].
+
+    The value is 0 at rest, where the friction force balances the other forces.
+    """
     return -slip(mode, memory) * friction_force(hammer[DAMPING:SPRING], 0.0)
 
 
 @inlined
 def hold_limit(hammer: Hammer) -> float:
-    """Return the largest acceleration [m/s^2] due to other forces that static friction can balance."""
+    """Return the largest acceleration [m/s^2], due to all other forces, that static friction can balance."""
     return float(friction_force(hammer[DAMPING:SPRING], 1.0) * hammer[INVERSE_MASS])
 
 
@@ -122,16 +125,20 @@ def is_on_stop(mode: int) -> bool:
 
 @inlined
 def least_at_rest(mode: int, held: float) -> float:
-    """Return the lowest acceleration [m/s^2], without friction, at which an armature at rest stays at rest.
+    """Return the lower limit of the friction-free acceleration [m/s^2] for an armature to stay at rest.
 
-    `held` is the largest acceleration that friction can balance or that the run treats as zero.
+    The friction-free acceleration is the force without friction, divided by the mass. `held` is the largest
+    such acceleration that friction can balance or that the run treats as zero.
     """
     return -math.inf if mode == RESTING else -held
 
 
 @inlined
 def most_at_rest(mode: int, held: float) -> float:
-    """Return the highest acceleration [m/s^2] at which an armature stays at rest, like `least_at_rest`."""
+    """Return the upper limit of the friction-free acceleration [m/s^2] for an armature to stay at rest.
+
+    `held` is as for `least_at_rest`.
+    """
     if RIGID_FRONT and mode == RESTING_FRONT:
         return math.inf
     return held
@@ -139,7 +146,7 @@ def most_at_rest(mode: int, held: float) -> float:
 
 @inlined
 def pack_force(x: float, v: float, mode: int, memory: float, hammer: Hammer) -> float:
-    """Return the pack force [N], equation (5) of the paper, on the loading or unloading branch of `mode`."""
+    """Return the pack force [N], equation (5) of the paper, on the branch that `mode` states, else 0."""
     if mode == LOADING or (FRICTION and mode == HELD_LOADING):
         return pack_loading(hammer[PACK:BACKSTOP_PART], x, v)
     if mode in (UNLOADING, RELOADING) or (FRICTION and mode == HELD_UNLOADING):

@@ -1,4 +1,4 @@
-"""Declarations of the force laws and of the choices that a compiled kernel is specialised for.
+"""Declarations of the force laws and of the compile-time choices for which a kernel is specialised.
 
 The functions and flags below are declarations without values. The modules listed in
 :data:`printhammer.kernel.compile.templates.TEMPLATES` import the declarations for the type checker
@@ -39,7 +39,7 @@ class Laws:
     circuit : bool
         Whether the drive is a voltage applied to the coil circuit.
     pack_pulls, backstop_pulls : bool
-        Whether the contact force may become tensile, as the printed law allows.
+        Whether the contact force may become tensile, as the law printed in the paper allows.
     reload_along_unloading : bool
         Whether reloading during a pack contact follows the unloading branch instead of jumping to the
         loading branch.
@@ -131,7 +131,8 @@ magnet_emf: Law2
 """Derivative of the flux linkage with respect to displacement [Wb/m]; equals the derivative of the magnet
 force with respect to current [N/A]."""
 magnet_inductance: Law2
-"""Differential inductance: derivative of the flux linkage with respect to current [H]."""
+"""Differential inductance [H]: derivative of the flux linkage with respect to current; arguments:
+displacement [m], current [A]."""
 magnet_current: Law3
 """Current [A] for a given total flux linkage of magnet and constant inductance; arguments: displacement [m],
 flux linkage [Wb], inductance [H]."""

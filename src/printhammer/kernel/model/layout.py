@@ -59,8 +59,8 @@ SWITCHED_PIECE, DECAY_PIECE, RESERVOIR_PIECE = 4.0, 5.0, 6.0
 NODE_WIDTH = 5
 """Number of columns of a node in the record of a run; see `printhammer.kernel.single.record`."""
 ELECTRIC = NODE_WIDTH
-"""Index of the first of four additional columns of a node with a coil circuit: electric state, current
-path."""
+"""Index of the first of four additional columns of a node with a coil circuit: the three components of the
+electric state, and the conduction path of the coil current."""
 CIRCUIT_NODE_WIDTH = NODE_WIDTH + 4
 
 

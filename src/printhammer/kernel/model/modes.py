@@ -1,7 +1,7 @@
 """Integer codes of the modes, switching events and run statuses of the compiled kernel.
 
-A mode is a time interval of the motion under one smooth force law. A switching event, called `switch` in the
-code, ends a step: the mode changes, or a piece of the drive begins or ends.
+A mode is a phase of the motion, such as free flight, with one smooth force law. A switching event, called
+`switch` in the code, ends a step: the mode changes, or a piece of the drive begins or ends.
 """
 
 # Modes of the motion.

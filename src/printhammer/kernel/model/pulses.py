@@ -99,8 +99,8 @@ def pass_edges(
     """Start and end all waveform pieces with edges up to time `t` [s], and rewrite `train.live`.
 
     Pulses before index `first` have ended; pulses from `last` on have not been fired. For a pulse p in
-    between, ``under_way[p]`` is the row of its active piece, or the `END` row if it ended before an older
-    pulse. With `replace`, a firing ends all earlier pulses.
+    between, ``under_way[p]`` is the row of its active piece, or its `END` row if the pulse p ended before an
+    older pulse. With `replace`, a firing ends all earlier pulses.
 
     Returns
     -------
@@ -138,7 +138,10 @@ def pass_edges(
 
 @compiled
 def edges_at(t: float, train: Train) -> tuple[int, int, float]:
-    """Pass all edges up to time `t` [s], as `pass_edges` does, skipping pulses that have already ended."""
+    """Start and end all waveform pieces with edges up to time `t` [s], from the beginning of the train.
+
+    Pulses that ended long before `t` are skipped. The result is that of `pass_edges`.
+    """
     firings, pieces = train.firings, train.pieces
     # The last table holds the longest waveform.
     oldest = t - pieces[pieces.shape[0] - 1, 0]

@@ -1,4 +1,4 @@
-"""Table of mode transitions: the mode after each switching event, and the jump of a variation there."""
+"""Table of mode transitions: the mode after a switching event, and how a small variation jumps there."""
 
 from __future__ import annotations
 

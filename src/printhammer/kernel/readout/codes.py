@@ -1,4 +1,4 @@
-"""Frequency-time map computed in pieces: rates and firing times of its members, displacement codes."""
+"""Frequency-time map, computed in pieces: rates and firing times of its runs, displacements as codes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _STEEPEST = 1e38
 
 
 def write_rates(low: float, high: float, rates: Any) -> None:
-    """Write evenly spaced rates [Hz] from `low` to `high`, as `numpy.linspace` spaces them."""
+    """Write evenly spaced rates [Hz] from `low` to `high` to the array `rates`, like `numpy.linspace`."""
     last = rates.shape[0] - 1
     step = (high - low) / max(last, 1)
     for i in range(last + 1):
@@ -24,10 +24,10 @@ def write_rates(low: float, high: float, rates: Any) -> None:
 
 
 def write_trains(rates: Any, slots: Any, pattern: bool, starts: Any, firings: Any) -> None:
-    """Write the firing times [s] of a train at each rate, and the start index of each train.
+    """Write the firing times [s] of a pulse train at each rate, and the start index of each train.
 
-    `slots`, int64, are the slot numbers of the firings. The time of a firing is its slot number divided by
-    the rate in a `pattern`, otherwise its slot number multiplied by the rounded period.
+    `slots`, int64, are the slot numbers of the firings. With `pattern`, the time of a firing is its slot
+    number divided by the rate, otherwise its slot number multiplied by the rounded period.
     """
     count = slots.shape[0]
     starts[0] = 0
@@ -72,8 +72,9 @@ def write_codes(x: Any, low: float, high: float, codes: Any) -> None:
 
 
 def write_struck(dots: Any, starts: Any, firings: int, struck: Any) -> None:
-    """Write 1 to `struck` for each firing that made a dot, else 0; a member has `firings` firings.
+    """Write 1 to `struck` for each firing that made a dot, else 0.
 
+    Each member of the ensemble has `firings` firings.
     `dots` and `starts` are `Kept.dots` and `Kept.dot_starts` of :mod:`printhammer.kernel.lanes.batch`.
     """
     for member in range(starts.shape[0] - 1):

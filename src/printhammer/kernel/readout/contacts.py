@@ -52,7 +52,7 @@ def nodes_before(t: float, nodes: Any, included: bool) -> int:
 
 
 def write_steps(nodes: Any, steps: Any, starts: Any, ends: Any) -> None:
-    """Write the arguments with which `quadratures` integrates over each single step of a run."""
+    """Write `steps`, `starts` and `ends`, with which `quadratures` integrates over each step of a run."""
     for i in range(nodes.shape[0] - 1):
         steps[i], starts[i], ends[i] = i, nodes[i, 0], nodes[i + 1, 0]
 
@@ -113,7 +113,9 @@ def write_contacts(
 def write_loading(
     rows: Any, nodes: Any, increments: Any, work: Any, works: Any, steps: Any, starts: Any, ends: Any
 ) -> None:
-    """Write the work on the pack in whole steps before each contact's peak, and the remaining interval.
+    """Write, for each contact, the work done on the pack in the whole steps before the peak of the contact.
+
+    The interval from the last of these steps to the peak is written as well.
 
     Parameters
     ----------
@@ -183,8 +185,8 @@ def write_dots(firings: Any, t_end: float, rows: Any, works: Any, rests: Any, do
 def write_quality(dots: Any, count: int, out: Any) -> None:
     """Summarise the first `count` dots in `out`, shape (6,).
 
-    Numbers of dots struck and of extra contacts, least and largest force [N], least and largest flight
-    time [s]; NaN without a dot.
+    The elements are, in this order: number of dots struck; number of extra contacts; least and largest peak
+    force [N]; least and largest flight time [s]. Forces and times are NaN if no dot is struck.
     """
     for k in range(6):
         out[k] = 0.0 if k < 2 else math.nan

@@ -17,9 +17,10 @@ CURVES = 12
 def write_times(nodes: Any, fewest: int, most: int, out: Any) -> int:
     """Write the times of a curve's points [s], dense where the steps are short; return their number.
 
-    Every step is divided into parts of at most 1 / `fewest` of the run, and into at least three parts if
-    there are fewer than `fewest` steps. If there are more than `most` nodes, only `most` nodes, evenly spaced
-    by index, are used. The length of `out` must be at least `fewest` + 3 times the number of nodes.
+    Every step is divided into parts no longer than 1 / `fewest` of the duration of the run, and into at least
+    three parts if there are fewer than `fewest` steps. If there are more than `most` nodes, only `most` nodes
+    are used, evenly spaced by index. The length of `out` must be at least `fewest` + 3 times the number of
+    nodes.
     """
     last = nodes.shape[0] - 1
     used = min(last + 1, most)

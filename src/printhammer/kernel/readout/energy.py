@@ -76,9 +76,10 @@ _PIECES = 8
 
 
 def write_sums(increments: Any, work: Any, out: Any) -> None:
-    """Write the exact sum of each column [J] and, last, the throughput: the sum of all absolute values.
+    """Write to `out` the exact sum of each column of `increments` [J] and, as last element, the throughput.
 
-    `increments` is the result of `quadratures` for each step, `work` has the shape (`PARTIALS`,).
+    The throughput is the sum of the absolute values of all elements. `increments` is the result of
+    `quadratures` for each step; `work`, shape (`PARTIALS`,), is working space.
     """
     columns = increments.shape[1]
     out[columns] = 0.0
@@ -109,7 +110,7 @@ def write_ledger(
     sums : float64 array, shape (6,), with a circuit (10,)
         Result of `write_sums`.
     stored, field : float
-        Changes of the stored energy and of the energy of field and capacitor [J].
+        Changes of the stored energy and of the energy of magnetic field and capacitor [J].
     linked : bool
         Whether the supply provides the work of the coil, as it does with back-EMF.
     """
@@ -124,7 +125,7 @@ def write_ledger(
 
 
 def stored_at(x: float, hammer: Any) -> float:
-    """Return the energy stored in magnet (at zero current), spring and backstop at `x` [m], J."""
+    """Return the energy [J] stored in magnet (without current), spring and backstop at position `x` [m]."""
     total = magnet_energy(hammer[MAGNET:], x) + spring_energy(hammer[SPRING:PACK], x)
     if x < hammer[POSITION]:
         total += backstop_energy(hammer[BACKSTOP_PART:MAGNET], math.sqrt(hammer[POSITION] - x))
@@ -132,7 +133,7 @@ def stored_at(x: float, hammer: Any) -> float:
 
 
 def linkage_at(x: float, current: float, hammer: Any) -> float:
-    """Return the flux linkage of the main path of the coil [Wb]."""
+    """Return the main flux linkage of the coil [Wb], without leakage, for a magnetising current [A]."""
     own = hammer[INDUCTANCE] * current
     if hammer[COUPLED] != 0.0:
         own += magnet_linkage(hammer[MAGNET:], x, current)
@@ -140,7 +141,7 @@ def linkage_at(x: float, current: float, hammer: Any) -> float:
 
 
 def field_at(node: Any, row: Any, hammer: Any) -> float:
-    """Return the magnetic field energy due to the current at a node, plus the energy of a reservoir, J.
+    """Return the energy [J] of the magnetic field due to the current, and of the reservoir, at a node.
 
     With the flux linkage lambda(i), the field energy is i lambda minus the integral of lambda over the
     current from 0 to i. `row` is the row of the table of `resample` at the time of the node.

@@ -26,13 +26,13 @@ NOT_RUN, LOST, EXTRA, WEAK, LATE, GOOD = 0, 1, 2, 3, 4, -1
 
 
 def write_slots(slots: Any, rate: float, first: float, firings: Any) -> None:
-    """Write the times [s] of `slots`, int64, at the slot rate [Hz]; slot 0 is at the time `first`."""
+    """Write the times [s] of `slots`, int64, to `firings`; slot 0 is at the time `first` [s]."""
     for k in range(slots.shape[0]):
         firings[k] = first + slots[k] / rate
 
 
 def fault_of(ratio: float, late: float, more: float, limits: Any) -> int:
-    """Return the first fault of a dot on the paper.
+    """Return the code of the first fault of a dot on the paper; GOOD for a dot without fault.
 
     `ratio` is the peak force of the dot divided by the peak force of the single pulse, `late` the arrival
     time [s] relative to the single pulse, and `more` the number of extra contacts beyond those of the single
@@ -58,7 +58,9 @@ def write_line(
     dots: Any,
     extra_dots: Any,
 ) -> int:
-    """Write a row for each requested dot and for each extra contact; return the number of extra contacts.
+    """Write one row per requested dot to `dots` and one per extra contact to `extra_dots`.
+
+    Returns the number of extra contacts.
 
     Parameters
     ----------
@@ -123,10 +125,11 @@ def write_line(
 
 
 def write_totals(dots: Any, status: Any, out: Any) -> None:
-    """Summarise a line in `out`, shape (11,).
+    """Summarise the dots of a printed line in `out`, shape (11,).
 
-    Numbers of good dots and of dots with each of the five faults, least and largest force ratio and
-    placement error [m] of the printed dots (NaN without a printed dot), and number of runs that ended early.
+    The elements are, in this order: number of good dots; numbers of dots with each of the five faults; least
+    and largest force ratio, least and largest placement error [m] of the printed dots (NaN without a printed
+    dot); number of runs that ended early.
     """
     for k in range(11):
         out[k] = math.nan if 6 <= k < 10 else 0.0

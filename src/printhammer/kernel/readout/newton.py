@@ -49,7 +49,7 @@ derivative of the map by rows, four columns; all in half-widths of the window.""
 
 
 def write_guess(states: Any, scales: Any, period: int, count: int, orbit: Any, trial: Any) -> int:
-    """Write an initial guess of an orbit of `count` firings; return 0 if the states are not near it.
+    """Write an initial guess of an orbit of `count` firings; return 0 if the states are not near an orbit.
 
     If the states alternate about the orbit, their mean is closer to the orbit than any single state.
 
@@ -58,7 +58,8 @@ def write_guess(states: Any, scales: Any, period: int, count: int, orbit: Any, t
     states, scales
         As for `printhammer.kernel.readout.section.write_distances`.
     period, count : int
-        Number of firings after which the states repeat, and a divisor of this number.
+        Number of firings after which the states repeat, and number of firings of the orbit, a divisor of
+        `period`.
     orbit : float64 array, shape (count, 10)
         Output; see `ORBIT`.
     trial : float64 array, shape (count, 2)
@@ -125,10 +126,10 @@ def improve(images: Any, usable: bool, scales: Any, orbit: Any, trial: Any, sear
     images : float64 array, shape (m, 7)
         Images of the trial states; see `IMAGE`.
     usable : bool
-        Whether (x, v) is the complete state in all images; if not for the initial guess, the orbit has no
-        derivative.
+        Whether (x, v) is the complete state in all images. If (x, v) is incomplete for the initial guess, the
+        orbit counts as not differentiable.
     scales : float64 array
-        Half-widths of the window.
+        Half-widths of the strobe window, m and m/s.
     orbit : float64 array, shape (m, 10)
         See `ORBIT`.
     trial : float64 array, shape (m, 2)
@@ -176,7 +177,7 @@ def improve(images: Any, usable: bool, scales: Any, orbit: Any, trial: Any, sear
 
 
 def accept(images: Any, scales: Any, orbit: Any, search: Any) -> None:
-    """Store trial states and their derivatives; arrays as for `improve`."""
+    """Store the trial states as accepted states, with the derivatives of the map; arrays as for `improve`."""
     search[SMOOTH] = 1.0
     for i in range(images.shape[0]):
         for row in range(2):
@@ -189,10 +190,11 @@ def accept(images: Any, scales: Any, orbit: Any, search: Any) -> None:
 
 
 def is_aimed(images: Any, scales: Any, orbit: Any) -> bool:
-    """Write the clipped Newton step of each state; return False if the linear system is singular.
+    """Write the clipped Newton step of each state to `orbit`; return False if the linear system is singular.
 
-    The step of state i + 1 is J_i d_i + e_i with the defect e_i; around the orbit, d_0 = M d_0 + c. Steps are
-    clipped to `LONGEST_STEP`. Arrays as for `improve`.
+    The step d_i of state i obeys d_(i+1) = J_i d_i + e_i, with the derivative J_i of the map and the defect
+    e_i: image minus next state. Once around the orbit, d_0 = M d_0 + c, the linear system. All steps are
+    scaled so that the longest is at most `LONGEST_STEP`. Arrays as for `improve`.
     """
     m = images.shape[0]
     a, b, c, d = 1.0, 0.0, 0.0, 1.0
@@ -225,7 +227,7 @@ def is_aimed(images: Any, scales: Any, orbit: Any) -> bool:
 
 
 def largest_multiplier(orbit: Any) -> float:
-    """Return the largest absolute value of a Floquet multiplier, from trace and determinant.
+    """Return the larger absolute value of the two Floquet multipliers, from trace and determinant.
 
     `orbit`, shape (m, 10), is described by `ORBIT`.
     """
@@ -274,9 +276,10 @@ def has_settled(states: Any, scales: Any, orbit: Any, search: Any, outcome: int,
 
 
 def gap_at(states: Any, scales: Any, orbit: Any, block: int, shift: int) -> float:
-    """Return the largest distance of one period of states from an orbit, shifted by `shift` firings.
+    """Return the largest distance between the states of one period and an orbit shifted by `shift` firings.
 
-    Arrays as for `has_settled`; differences are divided by `scales`, the half-widths of the strobe window.
+    `block` is the index of the period in `states`; an incomplete period at the start of `states` is not
+    counted. Arrays as for `has_settled`; differences are divided by `scales`, the half-widths of the window.
     """
     count = orbit.shape[0]
     begin = states.shape[0] % count + block * count

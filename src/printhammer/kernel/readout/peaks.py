@@ -18,9 +18,10 @@ if TYPE_CHECKING:
 
 
 def write_pack_peaks(contacts: Any, nodes: Any, train: Any, hammer: Any, out: Any) -> None:
-    """Write time and value of the largest indentation, and peak force, of m contacts to `out`, (m, 3).
+    """Write the peaks of m contacts to `out`, shape (m, 3).
 
-    The row of a backstop contact holds the touch time and two zeros. Arguments as for
+    A row holds the time of the largest indentation [s], this indentation [m] and the peak force [N]; for a
+    backstop contact, the touch time and two zeros. Arguments as for
     :func:`printhammer.kernel.single.resample.peaks`.
     """
     named = Train(*train)

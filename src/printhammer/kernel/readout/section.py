@@ -49,7 +49,7 @@ def class_of(agreed: int, settled: int, value: float, error: float, smooth: bool
     agreed, settled : int
         Period after which the states agree, and the period that the states prove; 0 for none.
     value, error : float
-        Largest exponent per firing and its standard error; used only without a period.
+        Largest Lyapunov exponent per firing and its standard error; used only without a period.
     smooth : bool
         Whether the motion is differentiable with respect to its initial state.
     rests : int
@@ -81,7 +81,7 @@ def write_exponent(growth: Any, work: Any, out: Any) -> int:
     Parameters
     ----------
     growth : float64 array, shape (n, any)
-        Logarithm of the growth from each firing to the next; the largest in column 0.
+        Logarithm of the growth of small perturbations from each firing to the next; the largest in column 0.
     work : float64 array, shape (n + 1,)
         Working space.
     out : float64 array, shape (2,)
@@ -116,7 +116,7 @@ def write_exponent(growth: Any, work: Any, out: Any) -> int:
 
 
 def write_distances(states: Any, branches: Any, scales: Any, distances: Any) -> tuple[int, int]:
-    """Write the largest distance between states q firings apart; return the period and the closest q.
+    """Write the largest distance between states q firings apart, for q = 1, 2, and so on.
 
     Parameters
     ----------
@@ -127,13 +127,14 @@ def write_distances(states: Any, branches: Any, scales: Any, distances: Any) -> 
     scales : float64 array
         Scale of each component; the last element is the distance up to which states agree, in these units.
     distances : float64 array, shape (any,)
-        Largest absolute difference of a component in units of its scale: infinite if states q apart lie on
-        different branches, if a state is unknown, or if q exceeds half of n.
+        Output for each q: largest absolute difference of a component, in units of its scale; infinite if
+        states q firings apart lie on different branches, if a state is unknown, or if q exceeds half of n.
 
     Returns
     -------
     tuple
-        Smallest q at which all states agree, or 0; and that q or, without such a q, the q of least distance.
+        Period, i.e. the smallest q at which all states agree, or 0; and the period or, if 0, the q of least
+        distance.
     """
     n, parts = states.shape
     period, nearest, least = 0, 0, math.inf
@@ -156,7 +157,10 @@ def write_distances(states: Any, branches: Any, scales: Any, distances: Any) -> 
 
 
 def mean_apart(states: Any, scales: Any, count: int, period: int, late: bool) -> float:
-    """Return the mean distance between states `count` firings apart, late or early in the series."""
+    """Return the mean distance between states `count` firings apart, `late` or early in the series.
+
+    The mean is over the last or the first quarter of the series, in whole multiples of `period` firings.
+    """
     n, parts = states.shape
     pairs = n - count
     used = min(period * max(pairs // (4 * period), 1), pairs)
@@ -170,7 +174,7 @@ def mean_apart(states: Any, scales: Any, count: int, period: int, late: bool) ->
 
 
 def is_shrinking(states: Any, scales: Any, count: int, period: int) -> bool:
-    """Whether the distance between states `count` firings apart still decreases."""
+    """Whether states `count` firings apart are closer late than early in the series; see `mean_apart`."""
     early = mean_apart(states, scales, count, period, False)
     return early - mean_apart(states, scales, count, period, True) > SHRINKS * early + NOISE
 

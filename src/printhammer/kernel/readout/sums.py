@@ -16,7 +16,7 @@ _BLOCK = 128
 
 
 def eight_sums(table: Any, first: int, count: int, column: int) -> float:
-    """Sum at most 128 rows of a column, with eight accumulators as NumPy does."""
+    """Sum `count` rows, at most 128, of a column of `table`, with eight accumulators as NumPy does."""
     total = 0.0
     whole = count - count % 8
     if whole:

@@ -36,7 +36,10 @@ if TYPE_CHECKING:
 
 @compiled
 def first_mode(x: float, v: float, a: float, hammer: Hammer) -> int:
-    """Return the mode of an initial state; in the pack, the displacement is taken as the local maximum."""
+    """Return the mode of an initial state with the acceleration `a` [m/s^2] in free flight.
+
+    An armature that moves out of a pack with memory starts on the unloading branch from its displacement.
+    """
     if HAS_BACKSTOP:
         b = hammer[POSITION]
         if x < b and not RIGID:
@@ -77,7 +80,7 @@ def time_to_level(distance: float, v: float, a: float) -> float:
 
 @compiled
 def sensible_step(h: float, x: float, v: float, a: float, mode: int, hammer: Hammer) -> float:
-    """Shorten the step `h` [s] if it would overshoot the backstop or the pack front by more than 2 %."""
+    """Limit the step `h` [s] to 1.02 times the estimated time to reach the backstop or the pack front."""
     if HAS_BACKSTOP and mode == M.FREE:
         height = x - hammer[POSITION]
         if height > 0.0:
@@ -93,7 +96,10 @@ def sensible_step(h: float, x: float, v: float, a: float, mode: int, hammer: Ham
 
 @compiled
 def out_of_bounds(x: float, bounds: Any) -> int:
-    """Return OK, RANGE_LEFT or RUNAWAY for a displacement; `bounds` as from `run.problem.bounds_of`, m."""
+    """Return the status OK, RANGE_LEFT or RUNAWAY for a displacement `x` [m].
+
+    `bounds` is as in :class:`printhammer.kernel.single.carry.Setup`.
+    """
     if not (bounds[0] <= x <= bounds[1]):
         return M.RANGE_LEFT
     if abs(x - bounds[2]) > bounds[3]:
@@ -103,7 +109,10 @@ def out_of_bounds(x: float, bounds: Any) -> int:
 
 @compiled
 def left_range(start: State, end: State, law: ForceLaw, control: Control, bounds: Any) -> tuple[bool, State]:
-    """Return whether a step leaves the range of displacement, even briefly, and the state at the bound."""
+    """Return whether a step leaves the allowed range of displacement, even briefly, and a state.
+
+    The state is that at the bound or, if the step stays inside, at the end of the step.
+    """
     h = end[0] - start[0]
     for side in range(2):
         bound = bounds[side]
@@ -121,7 +130,7 @@ def left_range(start: State, end: State, law: ForceLaw, control: Control, bounds
 
 @compiled
 def failure(x: float, v: float, bounds: Any, control: Control) -> int:
-    """Return the status after a step became too short: RANGE_LEFT near a bound, else STEP_UNDERFLOW."""
+    """Return the status of a run whose steps are too short: RANGE_LEFT near a bound, else STEP_UNDERFLOW."""
     near = 0.05 * control[0]
     if (x - bounds[0] < near and v <= 0.0) or (bounds[1] - x < near and v >= 0.0):
         return M.RANGE_LEFT
@@ -132,7 +141,7 @@ def failure(x: float, v: float, bounds: Any, control: Control) -> int:
 def reversed_mode(
     t: float, x: float, mode: int, peak: float, memory: float, hammer: Hammer, drive: Drive
 ) -> tuple[int, float, float]:
-    """Return mode, local maximum [m] and memory after the velocity has become zero inside the pack."""
+    """Return next mode, latest local maximum [m] and its memory value after a reversal inside the pack."""
     if mode == M.LOADING:
         if acceleration(t, x, 0.0, M.LOADING, memory, hammer, drive) > 0.0:
             return M.LOADING, peak, memory

@@ -86,7 +86,7 @@ class Setup(NamedTuple):
     control : tuple of float
         Scales of displacement [m] and velocity [m/s], tolerances of the order 6 and order 7 error estimates.
     bounds : tuple of float
-        Lowest and highest displacement, origin, and largest distance from the origin [m].
+        Lowest and highest displacement, origin, and largest distance from the origin before a runaway [m].
     max_steps : int
         Maximum number of steps of the run.
     """

@@ -108,7 +108,7 @@ def rate_in_backstop(state: State, setup: Setup) -> None:
 
 @inlined
 def pass_edge(state: State, setup: Setup) -> None:
-    """Start and end waveform pieces with an edge at the present time; update the coil's current path."""
+    """Start and end waveform pieces with an edge at the present time; update the coil's conduction path."""
     train = setup.train
     first, last, edge = pass_edges(state[C.TIME], train, int(state[C.FIRST]), int(state[C.LAST]))
     state[C.FIRST], state[C.LAST], state[C.EDGE] = first, last, edge

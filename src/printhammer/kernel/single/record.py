@@ -2,7 +2,7 @@
 
 A node is ``[time, position, velocity, mode, memory]``. Mode and memory are valid from this node to the next;
 the memory is the displacement at the latest local maximum in the pack, w = sqrt(b - x) in backstop contact,
-and zero elsewhere. With a coil circuit, the electric state and the path of the current follow, see
+and zero elsewhere. With a coil circuit, the electric state and the path of the coil current follow, see
 `printhammer.kernel.model.circuit`. A contact is ``[surface, time in, velocity in, time out, velocity out,
 index of the last node before the contact, open at the start]``; the time out of a contact that is still open
 at the end of the run is NaN.
@@ -85,7 +85,10 @@ def close_contact(contacts: Rows, used: int, t: float, v: float) -> None:
 
 @compiled
 def carry_contact(contacts: Rows, mode: int) -> int:
-    """Resume after a pause: keep an open contact as row 0 of `contacts`; return the number of contacts."""
+    """Keep a contact that is open after a pause as row 0 of `contacts`; return the number of contacts.
+
+    The number is 0 in the mode FREE, and 1 otherwise.
+    """
     if mode == FREE:
         return 0
     contacts[0, 5] = -1.0

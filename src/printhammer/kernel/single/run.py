@@ -88,7 +88,10 @@ def begin(state: State, setup: Setup, contacts: Any) -> None:
 
 @inlined
 def count_step(state: State, setup: Setup) -> int:
-    """Count a step before it is taken; return `OK`, or the status of an exceeded step or progress limit."""
+    """Count the next step of a run; return `OK`, STEP_LIMIT or STEP_UNDERFLOW.
+
+    STEP_LIMIT is returned after too many steps, STEP_UNDERFLOW after too many steps without progress in time.
+    """
     time_scale = setup.control[0] / setup.control[1]
     t, before = state[C.TIME], state[C.TIME_BEFORE]
     state[C.STEPS] += 1.0

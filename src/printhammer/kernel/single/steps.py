@@ -50,7 +50,7 @@ def stillness(control: Any) -> float:
 
 @inlined
 def take_step(state: State, setup: Setup, t_next: float, nodes: Any) -> tuple[int, int]:
-    """Integrate over one step, up to `t_next` [s] at most, with the method of the current mode.
+    """Integrate over one step, up to `t_next` [s] at most, with the method of the present mode.
 
     Returns the switching event that ends the step, or `HOLDS`, and the status of the run.
     """
@@ -91,7 +91,10 @@ def circuit_is_quiet(state: State, setup: Setup) -> bool:
 
 @inlined
 def backstop_step(state: State, setup: Setup, t_next: float, still: float, nodes: Any) -> int:
-    """Integrate one step in backstop contact, in regularised variables; return the event that ends it."""
+    """Integrate one step in backstop contact, in regularised variables; return the event that ends it.
+
+    `still` is the result of `stillness`.
+    """
     hammer, control, live = setup.hammer, setup.control, setup.train.live
     if state[C.ENTERED] != 0.0:
         rate_in_backstop(state, setup)
@@ -184,7 +187,10 @@ def set_off(state: State, setup: Setup, nodes: Any) -> bool:
 
 @inlined
 def wait(state: State, setup: Setup, t_next: float, still: float, nodes: Any) -> int:
-    """Advance the time of an armature at rest; return the event that ends the rest, or `HOLDS`."""
+    """Advance the time of an armature at rest; return the event that ends the rest, or `HOLDS`.
+
+    `still` is the result of `stillness`.
+    """
     mode, t, x = int(state[C.MODE]), state[C.TIME], state[C.POSITION_NOW]
     time_scale = setup.control[0] / setup.control[1]
     pause = t_next - t

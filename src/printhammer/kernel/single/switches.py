@@ -1,4 +1,4 @@
-"""Handling of the event that ends a step: edge of the drive, change of current path, change of mode."""
+"""Handling of the event that ends a step: edge of the drive, change of conduction path, change of mode."""
 
 from __future__ import annotations
 
@@ -120,9 +120,10 @@ def reach_backstop(state: State, setup: Setup, nodes: Any, contacts: Any) -> Non
 def rebound(
     v: float, away: float, resting: int, state: State, setup: Setup, nodes: Any, contacts: Any
 ) -> None:
-    """Update the run state at an impact on a rigid surface: velocity `v`, or rest in the mode `resting`.
+    """Update the run state at an impact on a rigid surface, after which the velocity is `v` [m/s].
 
-    `away` is the direction from the surface, 1 or -1.
+    If the forces would return the armature to the surface almost at once, the armature comes to rest in the
+    mode `resting`. `away` is the direction away from the surface, 1 or -1.
     """
     hammer = setup.hammer
     note_node(M.FREE, state[C.MEMORY_NOW] if FRICTION else 0.0, state, setup, nodes)
@@ -161,7 +162,7 @@ def reach_front(state: State, setup: Setup, nodes: Any, contacts: Any) -> None:
 
 @inlined
 def leave(switch: int, state: State, setup: Setup, contacts: Any) -> None:
-    """Update the run state when the armature leaves a surface; set the displacement to the surface."""
+    """Update the run state when the armature leaves a surface, at the position of the surface."""
     hammer = setup.hammer
     close_now(state, contacts)
     state[C.POSITION_NOW] = hammer[POSITION] if switch == M.LEFT_BACKSTOP else hammer[FRONT]

@@ -1,4 +1,4 @@
-"""Coil circuit in the variational equations: derivatives of current, state rates and path changes.
+"""Coil circuit in the variational equations: derivatives of the currents and of the electric state.
 
 At a fixed flux linkage the current depends on the displacement by di/dx = -emf / L and di/d lambda = 1 / L,
 with L the differential inductance; the force depends on both through the current. While no current flows in a
@@ -137,7 +137,10 @@ def current_slopes(x: float, electric: Electric, hammer: Hammer, live: Any) -> t
 
 @inlined
 def whole_field_slope(x: float, y: Any, setting: Setting) -> float:
-    """Return d(magnet and spring force)/d(displacement) [N/m], at fixed flux linkage."""
+    """Return the derivative of magnet and spring force with respect to displacement, at fixed flux linkage.
+
+    The derivative is in N/m; `y` is a row of the working space.
+    """
     scales, bounds, hammer, live, _forcing = setting
     value = value_at(y[V.TIME], x, hammer, driven(live, electric_in(y)))
     field = field_slope(x, y[1], value, scales, bounds, hammer)
@@ -149,7 +152,11 @@ def whole_field_slope(x: float, y: Any, setting: Setting) -> float:
 
 @inlined
 def coil_change(dx: float, linkage: float, turn: float, slopes: Any, hammer: Hammer, live: Any) -> float:
-    """Return the change of the coil current [A] for given changes of displacement and flux linkages."""
+    """Return the change of the coil current [A] for given changes of displacement and flux linkages.
+
+    `dx`, `linkage` and `turn` are the changes of the displacement [m] and of the flux linkages of coil and
+    shorted turn [Wb]; `slopes` is the result of `current_slopes`.
+    """
     if path_of(live) == BLOCKED:
         return 0.0
     if hammer[TURN_RESISTANCE] > 0.0:
@@ -197,9 +204,10 @@ def linkage_change(x: float, k: int, forcing: Forcing) -> float:
 
 @called
 def add_circuit(rates: Any, y: Any, count: int, x: float, moves: bool, setting: Setting) -> None:
-    """Write the rates of the electric state and of its tangent rows; add their effect to the velocity rows.
+    """Write to `rates` the derivatives of the electric state and of the electric rows of `count` columns.
 
-    `moves` is false while the armature is held at rest.
+    The effect of the electric rows on the velocity is added to the velocity rows, except if `moves` is false,
+    i.e. while the armature is held at rest. `y` is a row of the working space.
     """
     hammer, live = setting.hammer, setting.drive
     electric, pace, t = electric_in(y), rates[V.TIME], y[V.TIME]
@@ -245,9 +253,10 @@ def circuit_pace(x: float, y: Any, setting: Setting) -> float:
 
 @compiled
 def hold_linkage(x: float, columns: Any, path: float, setting: Setting) -> None:
-    """Set the linkage rows of the tangent columns from the displacement rows while no current flows.
+    """Set the flux-linkage rows of the tangent columns from the displacement rows if `path` is blocked.
 
-    The rows of an absent shorted turn or reservoir are set to zero.
+    While no coil current flows, the flux linkage follows from the displacement or from the shorted turn. The
+    rows of an absent shorted turn or reservoir are set to zero.
     """
     hammer = setting.hammer
     has_turn = hammer[TURN_RESISTANCE] > 0.0
@@ -267,7 +276,11 @@ def hold_linkage(x: float, columns: Any, path: float, setting: Setting) -> None:
 
 @compiled
 def threshold_change(live: Any, k: int, forcing: Forcing) -> float:
-    """Return the derivative of the current threshold of the present path with respect to constant k."""
+    """Return the derivative, with respect to constant k, of the coil current that ends a conduction path.
+
+    On its present path through the driver, the coil current flows until it reaches a threshold of the
+    chopper; the derivative is that of this threshold, or 0 without a chopper.
+    """
     if kind_of(live) != SWITCHED_PIECE:
         return 0.0
     if path_of(live) == SOURCE:
@@ -277,9 +290,9 @@ def threshold_change(live: Any, k: int, forcing: Forcing) -> float:
 
 @called
 def pass_path(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
-    """Propagate the tangent columns through a change of the current path.
+    """Propagate the tangent columns through a change of the conduction path of the coil current.
 
-    Return whether the motion is differentiable there. The current and all forces are continuous at the
+    Return whether the motion is differentiable there. The coil current and all forces are continuous at the
     change; only the rate of the coil's flux linkage jumps.
     """
     hammer, live, forcing = setting.hammer, setting.drive, setting.forcing

@@ -124,9 +124,10 @@ def column_rates(
 
 @compiled
 def longest_step(mode: int, memory: float, peak: float, work: Any, setting: Setting) -> float:
-    """Return the largest step, from the state in row START of `work`, that resolves a perturbation.
+    """Return the largest step from the state in row START of `work` that resolves growth and oscillation.
 
-    The steps of the run may be longer, since they resolve only the motion itself, which is slow near rest.
+    The growth and oscillation are those of a small perturbation. The steps of the run may be longer, since
+    they resolve only the motion itself, which is slow near rest.
     """
     if HAS_CIRCUIT and mode >= RESTING:
         rate = circuit_pace(work[V.START, 0], work[V.START], setting)

@@ -135,7 +135,7 @@ def orthonormalise(columns: Any, scales: Any, grown: Any) -> None:
 
 @compiled
 def note_mark(node: Any, initial: Any, setting: Setting, carried: Carried) -> None:
-    """Store state, tangent columns and growth at an output time; initialise the columns at the first time."""
+    """Store state, tangent columns and growth at an output time; at the first, initialise the columns."""
     columns, work, track, states, changes, growth, _passed = carried
     hammer = setting.hammer
     mode = int(node[3])
@@ -167,7 +167,10 @@ def note_mark(node: Any, initial: Any, setting: Setting, carried: Carried) -> No
 
 @compiled
 def scale_or_note(factor: float, renormalise: bool, columns: Any, setting: Setting, grown: Any) -> None:
-    """Multiply the columns by exp(`factor`); with `renormalise`, add `factor` to their growth instead."""
+    """Multiply the columns by exp(`factor`); with `renormalise`, orthonormalise them instead.
+
+    With `renormalise`, `factor` is added to the logarithms of growth `grown`.
+    """
     if renormalise:
         for k in range(columns.shape[1]):
             grown[k] += factor
@@ -280,7 +283,7 @@ def flow(
             copy_columns(columns, passed[asked, 0])
         if not pass_node(node, after, columns, setting):
             track[SMOOTH] = 0.0
-        # The last node of an ended run already has the current path of the next segment, so it is skipped.
+        # The last node of an ended run already has the conduction path of the next segment: skip it.
         if HAS_CIRCUIT and not (ended and i + 2 == count):
             if t_end >= edge:
                 pass_edge_of_driver(after, columns, setting)

@@ -84,7 +84,10 @@ if TYPE_CHECKING:
 
 @compiled
 def set_live_moves(first: int, last: int, train: Train, forcing: Forcing) -> None:
-    """Update the derivatives of the active waveform pieces, in the order in which `pass_edges` lists them."""
+    """Write to `live_moves` the derivatives of the active waveform pieces with respect to all constants.
+
+    The order of the pieces is that of `pass_edges`.
+    """
     fire_moves, piece_moves, live_moves = forcing.fire_moves, forcing.piece_moves, forcing.live_moves
     for k in range(fire_moves.shape[0]):
         j = 0
@@ -293,7 +296,10 @@ def rebound_change(front: bool, v_in: float, k: int, forcing: Forcing) -> float:
 
 @compiled
 def stored_change(x: float, dx: float, k: int, hammer: Hammer, forcing: Forcing) -> float:
-    """Return d(energy stored in the backstop)/d(constant k); `dx` is the derivative of displacement `x`."""
+    """Return the derivative of the elastic energy of the backstop with respect to constant k.
+
+    `dx` is the derivative of the displacement `x` with respect to the constant.
+    """
     varied, moves, of_hammer = forcing.varied, forcing.moves, forcing.of_hammer
     w = math.sqrt(max(hammer[POSITION] - x, 0.0))
     change = backstop_elastic(hammer[BACKSTOP_PART:MAGNET], w) * (moves[k, POSITION] - dx)

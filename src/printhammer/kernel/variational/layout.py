@@ -55,6 +55,8 @@ DELAYED = 5
 class Forcing(NamedTuple):
     """Derivatives of the kernel's input arrays with respect to n constants, and working space.
 
+    The parameter array of the hammer has h elements, the pulse train f firings and m waveform pieces.
+
     Attributes
     ----------
     varied, moves : float64 arrays, shapes (n, 9, h) and (n, h)
@@ -83,7 +85,8 @@ class Forcing(NamedTuple):
 class Carried(NamedTuple):
     """Tangent columns during their propagation along a run, and their values at requested times and nodes.
 
-    A column has r = 3 rows without forcing and 8 rows with forcing; a circuit adds four rows.
+    There are n columns, m requested times (marks) and q requested nodes. A column has r = 3 rows without
+    forcing and 8 rows with forcing; a circuit adds four rows.
 
     Attributes
     ----------
@@ -96,7 +99,7 @@ class Carried(NamedTuple):
         Before the first segment, all elements are zero except element 1, which is one.
     states : float64 array, shape (m, 4), with a circuit (m, 8)
         Displacement, velocity, mode and latest local maximum at the marks; with a circuit, also electric
-        state and current path.
+        state and conduction path of the coil current.
     changes, growth : float64 array, shapes (m, r, n) and (m, n)
         Columns at the marks, and the logarithms of their growth since the preceding mark.
     passed : float64 array, shape (q, 2, r, n)
@@ -146,7 +149,7 @@ def changing(forced: bool, damped: bool = True, circuit: bool = False) -> int:
 
 
 def work_width(columns: int, forced: bool, circuit: bool = False) -> int:
-    """Return the length of a row of the working space, at least 5: one row stores five pack memories.
+    """Return the length of a row of the working space, at least 5, since one row stores five memory values.
 
     The electric state is stored in the last elements of a row.
     """

@@ -108,7 +108,10 @@ def length_in_contact(
 
 @compiled
 def place_of_rest(t: float, node: Any, k: int, columns: Any, setting: Setting) -> float:
-    """Return the derivative of the rest position [m] with respect to constant k."""
+    """Return the derivative of the displacement at rest with respect to constant k, at time `t` [s].
+
+    The rest is the step of the run that begins at `node`.
+    """
     scales, bounds, hammer, live, forcing = setting
     x, mode, moves = node[1], int(node[3]), forcing.moves
     if mode == M.RESTING:
@@ -261,7 +264,10 @@ def set_in(t: float, t_to: float, node: Any, columns: Any, work: Any, setting: S
 
 @compiled
 def add_stored(sign: float, columns: Any, work: Any, hammer: Hammer, forcing: Forcing) -> None:
-    """Add the derivative of the energy stored in a released backstop, times `sign`, to the backstop loss."""
+    """Add the derivatives of the energy stored in a released backstop to the backstop-loss rows.
+
+    The derivatives are multiplied by `sign`.
+    """
     for k in range(columns.shape[1]):
         columns[BACKSTOP_LOSS, k] += sign * stored_change(work[START, 0], columns[0, k], k, hammer, forcing)
 
@@ -282,7 +288,7 @@ def carry(t_to: float, node: Any, after: Any, columns: Any, work: Any, setting: 
 
 @compiled
 def carry_state(t_to: float, node: Any, after: Any, columns: Any, work: Any, setting: Setting) -> float:
-    """Propagate state and tangent columns to `t_to` [s], except linkage rows of a currentless coil.
+    """Propagate state and columns like `carry`, except the flux-linkage rows of a coil without current.
 
     Returns the logarithm of a factor that has been divided out of the columns.
     """

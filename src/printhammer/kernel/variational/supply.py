@@ -114,13 +114,17 @@ def latest_edge(t: float, train: Train, first: int, last: int) -> tuple[int, int
 
 @compiled
 def rates_at(node: Any, setting: Setting) -> tuple[float, float, float]:
-    """Return the time derivatives of the electric state at a node, for the piece and path in `live`."""
+    """Return the time derivatives of the electric state at a node, for the present drive in `setting`."""
     return electric_rates(node[0], node[1], node[2], electric_at_node(node), setting.hammer, setting.drive)
 
 
 @called
 def move_edge(node: Any, before: Any, pulse: int, piece: int, columns: Any, setting: Setting) -> None:
-    """Propagate the columns through a driver edge whose time varies; `before`: rates before the edge."""
+    """Propagate the columns through an edge of the driver whose time depends on constants.
+
+    `before` holds the time derivatives of the electric state before the edge; `pulse` and `piece` are the
+    indices that `latest_edge` returns.
+    """
     live, forcing = setting.drive, setting.forcing
     behind = rates_at(node, setting)
     off_time = kind_of(live) == SWITCHED_PIECE and live[7] < 0.0

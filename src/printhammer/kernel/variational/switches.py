@@ -86,7 +86,10 @@ RELEASE_SPACING = 1e-3
 
 @compiled
 def acceleration_at(node: Any, mode: int, kept: float, v: float, hammer: Hammer, drive: Drive) -> float:
-    """Return the acceleration [m/s^2] at a node with the force law of `mode`, for velocity `v`."""
+    """Return the acceleration [m/s^2] at the position of a node, with the force law of `mode`.
+
+    `v` is the velocity [m/s], `kept` the memory as stored in a node.
+    """
     if mode == M.BACKSTOP:
         return backstop_acceleration(node[0], 0.0, v, hammer, drive)
     return acceleration(node[0], node[1], v, mode, memory_of(mode, kept, hammer), hammer, drive)
@@ -94,13 +97,19 @@ def acceleration_at(node: Any, mode: int, kept: float, v: float, hammer: Hammer,
 
 @compiled
 def powers_at(node: Any, mode: int, kept: float, v: float, hammer: Hammer, drive: Drive) -> Any:
-    """Return the powers [W] at a node with the force law of `mode`, for an uncompressed backstop."""
+    """Return the powers [W] at a node with the force law of `mode`, in the order of the energy rows.
+
+    The backstop is taken as uncompressed; `v` and `kept` are as for `acceleration_at`.
+    """
     return powers(node[0], node[1], v, 0.0, mode, memory_of(mode, kept, hammer), hammer, drive)
 
 
 @compiled
 def add_energies(columns: Any, k: int, later: float, before: Any, behind: Any) -> None:
-    """Add to the energy rows the effect of delaying an event by `later` [s]: (before - behind) * later."""
+    """Add (before - behind) * later to the energy rows: the effect of a delay of an event by `later` [s].
+
+    `before` and `behind` are the powers [W] before and after the event.
+    """
     for i in range(ENERGIES):
         columns[ENERGY + i, k] += (before[i] - behind[i]) * later
 
@@ -333,7 +342,10 @@ def value_of_piece(t: float, fired: float, piece: int, pieces: Any) -> float:
 def pass_edge(
     node: Any, value: float, change: float, pulse: int, piece: int, columns: Any, setting: Setting
 ) -> float:
-    """Propagate the columns through an edge where the drive jumps by `change`; return the new drive value."""
+    """Propagate the columns through an edge of the drive; return the drive value after the edge.
+
+    The drive value [A or N] jumps from `value` by `change`; `pulse` and `piece` identify the edge.
+    """
     hammer, forcing = setting.hammer, setting.forcing
     new = value + change
     if HAS_CIRCUIT:
@@ -379,7 +391,7 @@ def leave_at_edge(node: Any, pulse: int, piece: int, columns: Any, setting: Sett
 
 @compiled
 def pass_moving_edges(node: Any, train: Train, first: int, last: int, columns: Any, setting: Setting) -> None:
-    """Propagate the columns through the drive edges at a node that `pass_edges` has yet to process."""
+    """Propagate the columns through all drive edges at a node, before `pass_edges` processes the edges."""
     firings, begins, pieces, replace, under_way, live = train
     t = node[0]
     value = drive_value(t, live)
