@@ -83,7 +83,7 @@ def _versions() -> str:
 
 
 def require_numba(needs: str) -> None:
-    """Raise InputError if numba is missing; the message states `needs` and names the extra `laws`."""
+    """Raise InputError with the text `needs` if numba, installed by the optional extra `laws`, is missing."""
     try:
         import numba  # noqa: F401
     except ImportError:
@@ -163,7 +163,9 @@ def template_of(entry: str, variant: Mapping[str, bool]) -> Module:
 
 
 def plain_template(name: str, plain: Plain, circuit: bool, packing: Mapping[str, Any] = _NONE) -> Module:
-    """Return the template of a plain function, without lowering it; `circuit` selects the kernel's variant.
+    """Return the template of a function outside the kernel, without lowering it.
+
+    `circuit` states whether to use the variant of the kernel with a coil circuit.
 
     `packing` holds the functions that pack constants, for a function that uses them.
     """
@@ -322,7 +324,7 @@ class Entry:
 
 
 def web_module_of(entries: Sequence[Entry]) -> WebModule:
-    """Return the WebAssembly module of several entry points; building it needs the extra `page`."""
+    """Return the WebAssembly module of several entry points; its build needs the optional extra `page`."""
 
     def make() -> bytes:
         description = {

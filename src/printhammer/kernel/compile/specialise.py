@@ -87,7 +87,8 @@ class Kernel:
 
         The names may include "flow", the variational equations for derivatives with respect to the state.
         The calling convention is described in :mod:`printhammer.kernel.compile.web.build`. The wheel contains
-        the modules for the laws of shipped hammers; building other modules needs the extra `page`.
+        the modules for the laws of shipped hammers; the build of other modules needs the optional extra
+        `page`.
         """
         plain = [_plain_entry(name, function, self.laws) for name, function in further.items()]
         known = dict(self._entries)

@@ -141,7 +141,10 @@ def guess(pool: Any, i: int, which: int, hammer: Hammer) -> tuple[int, float]:
 
 @compiled
 def aim(pool: Any, i: int, slot: Any, switch: int, part: float) -> None:
-    """Set the next step of a lane to end at an event, estimated at the fraction `part` of the latest step."""
+    """Set the next step of a lane to end at the event `switch`.
+
+    The event is estimated to occur at the fraction `part` of the latest step, which is repeated.
+    """
     slot[R.SAVED_STEP] = pool[R.FOLLOWING * R.BLOCK + i]
     slot[R.ATTEMPTS] = 0.0
     pool[R.H * R.BLOCK + i] = part * pool[R.LENGTH * R.BLOCK + i]

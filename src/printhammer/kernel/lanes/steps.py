@@ -42,7 +42,7 @@ def twelve_at(pool: Any, at: int) -> Any:
 
 @inlined
 def drive_at(pool: Any, i: int) -> Any:
-    """Return the drive of a lane as a tuple: coefficients and rates of the closed formula."""
+    """Return the drive of a lane as a tuple: coefficients and rates, as `drive_value` expects them."""
     return twelve_at(pool, R.DRIVE * BLOCK + i)
 
 

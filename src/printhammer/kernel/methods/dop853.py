@@ -282,7 +282,8 @@ def time_step(
     Returns
     -------
     tuple of float
-        Position [m], velocity [m/s] and acceleration [m/s^2] at the end, and their error estimates.
+        Position [m], velocity [m/s] and acceleration [m/s^2] at the end of the step, and the error estimates
+        of position and velocity.
     """
     x, v, a, error_x, error_v, _electric, _error_e = whole_time_step(t0, x0, v0, a0, h, law)
     return x, v, a, error_x, error_v

@@ -48,7 +48,10 @@ def keep_electric(electric: Electric, state: State) -> None:
 
 @inlined
 def electric_at_start(x: float, hammer: Hammer, state: State, live: Any) -> Electric:
-    """Return the electric state where a run starts or continues; restore the path of the coil current."""
+    """Return the electric state at the start or the continuation of a run.
+
+    The conduction path of the coil current is restored in `live`.
+    """
     if HAS_CIRCUIT:
         if state[C.STATE] == C.GOES_ON:
             take_path(live, state[C.PATH], state[C.UNTIL])
@@ -64,7 +67,7 @@ def electric_at_start(x: float, hammer: Hammer, state: State, live: Any) -> Elec
 
 @inlined
 def keep_path(state: State, live: Any) -> None:
-    """Store the path of the coil current in the run state, for the continuation of the run."""
+    """Store the conduction path of the coil current in the run state, for the continuation of the run."""
     if HAS_CIRCUIT:
         state[C.PATH] = path_of(live)
         state[C.UNTIL] = live[live.size - UNTIL]
@@ -120,7 +123,7 @@ def pass_edge(state: State, setup: Setup) -> None:
 
 @inlined
 def note_path(state: State, setup: Setup, nodes: Any) -> None:
-    """Write the electric state and the path of the coil current to the latest node of the record."""
+    """Write the electric state and the conduction path of the coil current to the record's latest node."""
     if HAS_CIRCUIT:
         note_circuit(nodes, int(state[C.USED]), electric_of(state), path_of(setup.train.live))
 

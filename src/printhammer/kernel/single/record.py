@@ -39,7 +39,7 @@ def add_node(nodes: Rows, used: int, t: float, x: float, v: float, mode: int, me
 
 @compiled
 def note_circuit(nodes: Rows, used: int, electric: Any, path: float) -> None:
-    """Write the electric state and the path of the coil current to the latest node."""
+    """Write the electric state and the conduction path of the coil current to the latest node."""
     i = min(used, nodes.shape[0]) - 1
     for j in range(3):
         nodes[i, ELECTRIC + j] = electric[j]

@@ -75,7 +75,7 @@ def take_step(state: State, setup: Setup, t_next: float, nodes: Any) -> tuple[in
 
 @inlined
 def circuit_is_quiet(state: State, setup: Setup) -> bool:
-    """Whether the electric state of an armature at rest stays constant until the next edge of the drive."""
+    """Whether the electric state is constant until the next edge of the drive, with the armature at rest."""
     if HAS_CIRCUIT:
         control = setup.control
         return is_quiet(

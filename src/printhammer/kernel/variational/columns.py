@@ -184,7 +184,7 @@ def take_in(work: Any, columns: Any) -> None:
 
 @compiled
 def bring_back(work: Any, columns: Any) -> None:
-    """Copy the rows that changed from row START of `work` back to the tangent columns."""
+    """Copy the rows that `take_in` has copied to row START of `work` back to the tangent columns."""
     for k in range(columns.shape[1]):
         j = V.FIRST_COLUMN + CHANGING * k
         for i in range(V.STATE):

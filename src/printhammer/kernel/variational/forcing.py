@@ -224,7 +224,7 @@ def friction_change(rests: float, k: int, forcing: Forcing) -> float:
 
 @compiled
 def note_changed_memories(peak: float, forcing: Forcing) -> None:
-    """Compute the memory values of the pack law for shifted constants, at the fixed depth of `peak` [m]."""
+    """Compute the memory values of the pack law for shifted constants, with a fixed depth of `peak` [m]."""
     varied, moves, of_hammer, memories = forcing.varied, forcing.moves, forcing.of_hammer, forcing.memories
     for k in range(of_hammer.size):
         if of_hammer[k] & V.PACK_MOVES:
