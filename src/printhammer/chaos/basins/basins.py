@@ -228,7 +228,10 @@ class Basins(Result, rows="v x"):
         return f"basins of {self.regime.hammer.name}, every {self.regime.period:.9g} s"
 
     def summary(self, box: int | None = None) -> Summary:
-        """Summarise attractors with their fractions of the cells, undecided cells, and the basin entropy."""
+        """Summarise attractors with their fractions of the cells, undecided cells, and the basin entropy.
+
+        `box` is the number of cells along a side of the boxes of the basin entropy.
+        """
         rows: list[FactRow] = []
         for row, (attractor, share, error) in enumerate(zip(self.attractors, *self.shares, strict=True), 1):
             x, v = attractor.states[0].tolist()
@@ -353,8 +356,8 @@ def basins(
 
     An initial state inside the pack meets fresh paper, compressed to that depth: it starts on the loading
     branch if the armature moves inward, else on the unloading branch. A state inside the backstop starts with
-    that indentation. With a voltage drive, all states start without current and with a charged supply
-    capacitor. Cells outside the range of the magnet's law, or behind a rigid backstop, have no state.
+    the corresponding indentation. With a voltage drive, all states start without current and with a charged
+    supply capacitor. Cells outside the range of the magnet's law, or behind a rigid backstop, have no state.
 
     Parameters
     ----------
@@ -362,8 +365,9 @@ def basins(
         The hammer, or a regime; a hammer requires the keywords of `printhammer.Regime.of`. States are those
         at a firing, independent of the phase of the regime.
     x, v : tuple, optional
-        Smallest and largest displacement [m] and velocity [m/s] or text with a unit, and number of values,
-        both ends included; by default the window of `printhammer.run.regime` and 128 values.
+        Smallest value, largest value and number of values of the displacement [m] and of the velocity [m/s];
+        the two limits, which are included, may be text with a unit. By default the strobe window of
+        `printhammer.run.regime`, and 128 values.
     firings : int, optional
         Number of firings per round, at least 4; the last half of them, at most 128, is classified.
     rounds : int, optional

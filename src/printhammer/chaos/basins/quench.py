@@ -223,12 +223,12 @@ def quench_map(
     hammer : Hammer
         A hammer with a pack.
     gaps : tuple, optional
-        Smallest and largest time between the two firings, s, or text with a unit, and the number of times,
-        both ends included; by default 128 from 0.5 to 0.9 ms, multiplied by
-        `printhammer.run.window.time_scale` of the device.
+        Smallest value, largest value and number of values of the time between the two firings, s; the two
+        limits, which are included, may be text with a unit. By default 128 values from 0.5 to 0.9 ms,
+        multiplied by `printhammer.run.window.time_scale` of the device.
     widths : tuple, optional
-        As `gaps`, for the width of the second pulse; by default 128 from 0.5 to 1.5 times the width of the
-        first pulse.
+        As `gaps`, for the width of the second pulse; by default 128 values from 0.5 to 1.5 times the width of
+        the first pulse.
     waveform : Waveform, optional
         The first pulse, which needs a width; by default the waveform of the hammer.
     tail : float or str, optional

@@ -241,7 +241,7 @@ class Bifurcation(Result, rows="direction column"):
         return lambda value: f"{from_si(value, si, unit):.{digits}g}", unit
 
     def _windows_grid(self, direction: str) -> Grid:
-        """Tabulate number, total width and widest window of each classification in one direction."""
+        """Tabulate the windows of one direction by classification: number, total width, and widest window."""
         windows = sorted(self.windows(direction), key=lambda window: (window.period or 1000, window.verdict))
         total = sum(window.width for window in windows) or 1.0
         groups = [
@@ -281,7 +281,10 @@ class Bifurcation(Result, rows="direction column"):
         ]
 
     def _sensitive(self) -> list[str]:
-        """Return a sentence on the number of periods that change at finer tolerances; [] if none changes."""
+        """Return a list of one sentence, on the number of periods that change at finer tolerances.
+
+        The list is empty if no period changes.
+        """
         count = int(self.sensitive.sum())
         whose = "1 period changes" if count == 1 else f"{count} periods change"
         return [f"{whose} at a finer tolerance: rounding decides the length of long cycles."] if count else []

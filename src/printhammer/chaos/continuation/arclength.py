@@ -6,10 +6,10 @@ tangent, then Newton's method on
 
     G(u, p) - u = 0,   t . z = t . z_0 + ds
 
-with the tangent t at z_0 as last row (H. B. Keller, in P. H. Rabinowitz (ed.), *Applications of Bifurcation
-Theory*, Academic Press 1977, 359; E. L. Allgower and K. Georg, *Introduction to Numerical Continuation
-Methods*, SIAM 2003). The system is regular at folds, where the parameter turns back. Lengths are measured in
-scaled variables, u and p each divided by its scale.
+with the tangent t at the previous point z_0 (H. B. Keller, in P. H. Rabinowitz (ed.), *Applications of
+Bifurcation Theory*, Academic Press 1977, 359; E. L. Allgower and K. Georg, *Introduction to Numerical
+Continuation Methods*, SIAM 2003). The system is regular at folds, where the parameter turns back. Lengths are
+measured in scaled variables, u and p each divided by its scale.
 
 Bifurcations on the curve, such as folds and period doublings, are located by
 `printhammer.chaos.continuation.branch_points`.

@@ -172,7 +172,7 @@ class Tracer:
         The first of `nodes` is the last orbit; `quiet` contains the regime at the new phase and the state of
         this orbit there. The direction is that of the chord from an earlier orbit, since the tangent is
         useless: a contact at the section has no derivative, and at a fold the sign of the parameter is
-        ambiguous. None if no orbit is far enough away, or if a run ends early.
+        ambiguous. None if no orbit is far enough from the last orbit, or if a run ends early.
         """
         last = nodes[0]
         end = np.append(quiet[1], last.parameter) / self.scales

@@ -1,18 +1,18 @@
 """Effect of a bifurcation on neighbouring orbits: coefficients of normal forms.
 
-*Period doubling.* With A = J, A q = -q, p A = -p, p . q = 1, and the second and third derivatives B and C of
-the strobe map
+*Period doubling.* Let A, B and C be the first, second and third derivatives of the strobe map over one period
+of the orbit, and q and p the eigenvectors with A q = -q, p A = -p and p . q = 1. The coefficient is
 
     c = p . (C(q, q, q) + 3 B(q, (I - A)^-1 B(q, q))) / 6
 
 (Yu. A. Kuznetsov, *Elements of Applied Bifurcation Theory*, Springer 2004, equation 5.35). If c > 0 the
 doubling is supercritical: the orbits of twice the period are stable where the orbit of the single period is
-not. B and C are differences of J along q, in half-widths of the strobe window.
+not. B and C are computed as finite differences of A along q; states are in half-widths of the strobe window.
 
 *Grazing of a rigid backstop.* A touch of depth h adds (1 + e) sqrt(2 a h) to the velocity, with the
-acceleration a at the touch, so that the strobe map has a square root (A. B. Nordmark, J. Sound Vib. 145
-(1991) 279). To first order, orbits with the touch exist where the square root of the depth is positive, and
-orbits without the touch where they stay off the surface.
+acceleration a at the touch and the restitution e, so that the strobe map contains a square root (A. B.
+Nordmark, J. Sound Vib. 145 (1991) 279). To first order, orbits with the touch exist where the square root of
+the depth is positive, and orbits without the touch where they stay off the surface.
 """
 
 from __future__ import annotations
@@ -101,8 +101,9 @@ def grazing_sides(plane: Plane, place: CurvePoint) -> tuple[int, ...]:
     Returns
     -------
     tuple of int
-        Side on which the orbit without the touch exists, then the orbits with one touch in 1, 2, 3 and 4
-        periods: 1 for larger values of the parameter, -1 for smaller values, 0 for neither side.
+        Five sides, in this order: the side on which the orbit without the touch exists, and the sides on
+        which orbits with one touch in 1, 2, 3 and 4 periods exist. A side is 1 for larger values of the
+        parameter, -1 for smaller values, and 0 for neither.
     """
     matrix, root = place.jacobian, root_coefficient(plane, place)
     if place.slope is None or not math.isfinite(root):

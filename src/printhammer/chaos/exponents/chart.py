@@ -206,7 +206,7 @@ LEVELS: Final = (0.05, 0.25, 0.5, 0.75, 0.95)  # Quantile levels of the distribu
 
 
 class FiniteTime(Result, rows="length"):
-    """Distribution of the largest exponent over successive stretches of a train, for several lengths."""
+    """Distribution of the largest exponent over successive stretches of a train, by length of a stretch."""
 
     lengths: IntArray = coordinate(
         "1", "length of a stretch, in firings", "length", name="length", dtype=np.int32

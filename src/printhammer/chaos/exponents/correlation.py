@@ -72,7 +72,7 @@ class CorrelationDimension(Result, rows="radius"):
 
     @property
     def message(self) -> str:
-        """Dimension with its interval and plateau, or the reason why there is no dimension, in one line."""
+        """Dimension with error interval and plateau, or the reason why there is no dimension, in one line."""
         if math.isnan(self.dimension):
             return f"no plateau over a factor of 8 with slopes within {self.flat:.2g}: no dimension"
         near, far = self.plateau

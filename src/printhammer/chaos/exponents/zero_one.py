@@ -8,8 +8,8 @@ For a regular series the point stays bounded; for a chaotic series it performs a
 square displacement M_c(n) grows in proportion to n. The growth is measured by the correlation K_c of M_c(n)
 with n (G. A. Gottwald and I. Melbourne, Proc. R. Soc. Lond. A 460 (2004) 603; SIAM J. Appl. Dyn. Syst. 8
 (2009) 129; the correlation method and its limits: the same authors, Springer Lect. Notes Phys. 915 (2016)
-221). K is the median over many angles, since at the few angles that resonate with a regular series its path
-grows, too.
+221). K is the median of K_c over many angles, since at the few angles that resonate with a regular series the
+path of the point grows, too.
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ class ZeroOne(Result):
         return {"shown_angle": float(self.angles[self.shown])}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return the Dataset variables: correlations along `angle`, displacements and path along steps."""
+        """Return the Dataset variables: correlation by `angle`, displacement by `step`, path by `number`."""
         places = {"step": ("number of steps", len(self.displacement)), "number": ("place", self.length)}
         return super().entries() | {
             name: (
@@ -268,7 +268,10 @@ def _paths(rest: FloatArray, angles: FloatArray) -> npt.NDArray[np.complex128]:
 
 
 def _displacements(paths: npt.NDArray[np.complex128], resolution: float) -> FloatArray:
-    """Compute the damped mean square displacements of paths, at lags up to a tenth of the path length."""
+    """Compute the mean square displacements of paths, at lags up to a tenth of the path length.
+
+    The oscillation of the amplitude (resolution)^2 is added, which damps weak noise; see `zero_one`.
+    """
     moved = mean_square_displacements(paths, paths.shape[1] // _CUT)
     steps = np.arange(1, moved.shape[1] + 1)
     return np.asarray(moved + resolution**2 * np.sin(math.sqrt(2.0) * steps))

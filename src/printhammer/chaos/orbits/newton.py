@@ -74,10 +74,14 @@ class Images:
 
 
 class StrobeMaps(Protocol):
-    """Interface of a strobe map: images of many states, shape (n, 2), each with its number of firings."""
+    """Interface of strobe maps that compute the images of many states at once."""
 
     def __call__(self, states: FloatArray, firings: IntArray) -> Images:
-        """Compute the images of states under the strobe map, with derivatives."""
+        """Compute the images of states under the strobe map, with derivatives.
+
+        `states`, shape (n, 2), are displacements [m] and velocities [m/s]; each has its own number of
+        firings.
+        """
 
 
 class Guess(Declared):
@@ -281,7 +285,10 @@ class ExactMaps:
 
 
 class FastMaps:
-    """Strobe map evaluated as one ensemble, up to `longest` firings; finite-difference derivatives."""
+    """Strobe map evaluated for all states as one ensemble, with finite-difference derivatives.
+
+    `longest` is the largest number of firings between a state and its image.
+    """
 
     def __init__(self, regime: Regime, longest: int, effort: Effort) -> None:
         regime.check_planar()

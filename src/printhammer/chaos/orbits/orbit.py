@@ -283,7 +283,10 @@ def no_orbit(regime: Regime, firings: int, tolerance: float, status: str) -> Orb
 
 
 def orbit_of(regime: Regime, closing: Closing, tolerance: float) -> Orbit:
-    """Compute the properties of a converged orbit; after a failure, return a result with the reason."""
+    """Compute the properties of the orbit to which Newton's method converged.
+
+    If Newton's method failed, the status of the result is the reason.
+    """
     firings = int(closing.firings.sum())
     if not closing.closed:
         return no_orbit(regime, firings, tolerance, closing.reason)

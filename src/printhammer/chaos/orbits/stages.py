@@ -117,7 +117,7 @@ def shortest(closing: Closing, scales: FloatArray) -> Closing:
 
 @dataclass
 class _Known:
-    """Orbit found by a search: number of hits, and the stages (block, batch) that found the orbit."""
+    """Orbit found by a search: number of guesses that led to it, and stages (block, batch) that found it."""
 
     closing: Closing
     stages: list[tuple[int, int]]
@@ -469,7 +469,7 @@ def _steps(ladder: Sequence[int], most: int) -> list[int]:
 
 
 def _guess(orbit: Orbit, maps: ExactMaps) -> Guess:
-    """Build a guess from the states of an orbit at its sections; one segment if a section is in the pack."""
+    """Build a guess from the states of an orbit at its sections; a single segment if one is in the pack."""
     states = [orbit.section]
     for _ in range(orbit.firings - 1):
         images = maps(states[-1][np.newaxis], np.ones(1, np.int64))

@@ -67,7 +67,7 @@ def scan(
     periods : array
         Times between firings, s.
     exponents : bool, optional
-        Whether to compute exponents; without them, aperiodic trains are left undecided.
+        Whether to compute Lyapunov exponents; without exponents, aperiodic trains are left undecided.
 
     Returns
     -------
