@@ -85,7 +85,10 @@ def plot_timings(motion: Motion, *, until: float | None = None) -> Figure:
 
 
 def _trace(ax: Axes, motion: Motion, name: str, row: int, end: float, time: Scale) -> None:
-    """Draw the state of a contact against time as a rectangular trace, high while the contact is closed."""
+    """Draw the state of the contact `name` against time as a rectangular trace, high while it is closed.
+
+    `row` is the baseline of the trace, and `end` the end of the time axis, s.
+    """
     own = [each for each in motion.closings if each.contact == name]
     is_closed = bool(own) and own[0].initial
     edges: list[float] = [] if is_closed else [motion.start]

@@ -281,7 +281,10 @@ def _in_points(ax: Axes, length: float) -> float:
 
 
 def _differences(figure: Figure, ax: Axes, page: Page, above: float) -> None:
-    """Draw the placement errors of a page in colours, lost dots as crosses, and a colour bar above."""
+    """Draw the placement errors of a page in colours, lost dots as crosses, and a colour bar.
+
+    `above` is an additional distance of the colour bar from the axes below it, inches.
+    """
     from matplotlib.colors import LinearSegmentedColormap, Normalize
 
     on, head, (across, down) = page.printed, page.head, page.places

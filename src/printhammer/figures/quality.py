@@ -119,7 +119,10 @@ def plot_safe_rate(*safe_rates: SafeRate) -> Figure:
 
 
 def _box(ax: Axes, limits: Limits, late: FloatArray, share: FloatArray) -> None:
-    """Draw the limits as a box, and set axes limits that include box and dots."""
+    """Draw the limits as a box, and set axes limits that include box and dots.
+
+    `late` and `share` are the deviations of the dots in arrival time [us] and force [%].
+    """
     from matplotlib.patches import Rectangle
 
     x, y = _US * limits.arrival, 100.0 * limits.force

@@ -51,7 +51,10 @@ def plot_manifolds(manifolds: Manifolds) -> Figure:
 def draw(
     ax: Axes, manifolds: Manifolds, way: Scale, speed: Scale, colours: dict[str, str] = _LIGHT
 ) -> list[Line2D]:
-    """Draw manifolds and their saddle into given axes; return one legend handle per kind of mark."""
+    """Draw manifolds and their saddle into given axes; return one legend handle per kind of mark.
+
+    `way` and `speed` are the scales of the axes; `colours` are the colours of stable and unstable manifolds.
+    """
     from matplotlib.patheffects import withStroke
 
     from printhammer.chaos.orbits.manifolds import KINDS
@@ -93,7 +96,7 @@ _FEW: Final = 4  # Entries beyond which the legend has two columns; arbitrary
 
 
 def shade(number: int) -> str:
-    """Return the colour of an attractor's basin, by the number of the attractor, from 1."""
+    """Return the colour of the basin of attractor `number`, counted from 1."""
     turn, place = divmod(number - 1, len(SHADES))
     parts = [int(SHADES[place][k : k + 2], 16) for k in (1, 3, 5)]
     for _ in range(min(turn, 2)):

@@ -64,8 +64,8 @@ def plot(
         else open circles), branches of `printhammer.continuation` (solid if stable, else dotted), and
         collections of both.
     limits : tuple of float, optional
-        Range of displacement or velocity shown, SI; by default it excludes one point in a thousand at each
-        end, and the number of excluded points is stated.
+        Range of the vertical axis, SI. The default range excludes one point in a thousand at each end, and
+        the figure states the number of excluded points.
 
     Raises
     ------
@@ -159,7 +159,10 @@ def _each(orbits: Iterable[Any]) -> Iterable[Any]:
 
 
 def _orbit(ax: Axes, diagram: Bifurcation, orbit: Any, show: str, across: Scale, up: Scale) -> None:
-    """Draw a periodic orbit as circles, or a branch as curves, over a diagram."""
+    """Draw a periodic orbit as circles, or a branch as curves, over a diagram.
+
+    `show` is the quantity on the vertical axis; `across` and `up` are the scales of the axes.
+    """
     states = up.shown(getattr(orbit, show))
     if states.ndim == 2:
         if orbit.parameter != diagram.parameter or orbit.phase != diagram.phase:

@@ -89,7 +89,10 @@ def plot(
 
 
 def axis_of(name: str, si: str) -> tuple[str, float]:
-    """Return the axis label of a parameter, and the factor that converts its values."""
+    """Return the axis label of a parameter, and the factor from its SI unit to the unit of the axis.
+
+    `si` is the SI unit of the parameter.
+    """
     unit, factor = _AXIS.get(si, (si, 1.0))
     title = name[:1].upper() + name[1:] if "." not in name else name
     return f"{title}  [{unit}]" if unit else title, factor
@@ -114,7 +117,11 @@ def draw(ax: Axes, branch: Branch, show: str, factors: tuple[float, float]) -> N
 
 
 def _with_points(branch: Branch, show: str) -> tuple[FloatArray, FloatArray, list[bool]]:
-    """Return parameter and quantity along a branch, bifurcations included, and each segment's stability."""
+    """Return the curve of a branch, with its bifurcations inserted as points.
+
+    The result is the parameter values, the values of the quantity `show`, and whether each segment between
+    consecutive points is stable.
+    """
     table = getattr(branch, show)
     values, rows, stable = [branch.values[0]], [table[0]], []
     inside: dict[int, list[Any]] = {}
@@ -138,7 +145,10 @@ def _with_points(branch: Branch, show: str) -> tuple[FloatArray, FloatArray, lis
 
 
 def _at_event(branch: Branch, event: Any, table: FloatArray) -> FloatArray:
-    """Interpolate a quantity at an event of a branch, along the arc length."""
+    """Interpolate a quantity at an event of a branch, such as a fold, by the arc length of the branch.
+
+    `table` contains the values of the quantity, one row per point of the branch.
+    """
     i, nodes = event.after, branch.curve.nodes
     span = nodes[i + 1].arc - nodes[i].arc
     share = min(max((event.point.node.arc - nodes[i].arc) / span, 0.0), 1.0) if span > 0.0 else 0.5
@@ -148,7 +158,10 @@ def _at_event(branch: Branch, event: Any, table: FloatArray) -> FloatArray:
 def _mark(
     ax: Axes, branches: Sequence[Branch], show: str, factors: tuple[float, float], grazings: bool
 ) -> list[str]:
-    """Mark the events of branches with symbols; return the kinds of events that occur."""
+    """Mark the bifurcations and, with `grazings`, the grazings of branches; return the kinds that occur.
+
+    `factors` convert parameter and quantity to axis units.
+    """
     kinds: list[str] = []
     for branch in branches:
         table = getattr(branch, show)
@@ -186,7 +199,7 @@ def _legend(ax: Axes, branches: Sequence[Branch], kinds: Sequence[str]) -> None:
 
 
 def _remarks(branches: Sequence[Branch]) -> list[str]:
-    """Return remarks that count the branches ending before the bounds, by reason."""
+    """Return a remark on the branch ends before the parameter bounds, with the number for each reason."""
     reasons = {
         "length": "at the maximum number of steps",
         "lost": "where Newton's method does not converge",

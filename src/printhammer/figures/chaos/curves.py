@@ -141,7 +141,10 @@ def plot(curve: BifurcationCurve, *, attractors: bool = True) -> Figure:
 
 
 def _shade(ax: Axes, curve: BifurcationCurve, factors: tuple[float, ...]) -> list[Patch]:
-    """Colour the plane by the period to which trains from rest settle; return the legend entries."""
+    """Colour the plane by the period to which trains from rest settle; return the legend entries.
+
+    `factors` convert the two parameters to axis units.
+    """
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 

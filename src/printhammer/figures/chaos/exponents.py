@@ -171,9 +171,10 @@ def _remarks(chart: LyapunovChart, agree: Any) -> list[str]:
 
 @styled
 def plot_zero_one(test: ZeroOne) -> Figure:
-    """Draw the data of a 0-1 test: path in the plane, mean square displacement, and correlations.
+    """Draw the data of a 0-1 test: translation variables, mean square displacement, and correlations.
 
-    Path and displacement belong to the angle with the median correlation, which is ringed in the right panel.
+    The path of the translation variables (p, q) and their mean square displacement are those for the angle
+    with the median correlation, which is ringed in the right panel.
     """
     figure = new_figure(2.9)
     path, growth, angles = figure.subplots(1, 3)
@@ -223,7 +224,7 @@ _BINS: Final = 60  # Bins of a histogram; arbitrary
 
 @styled
 def plot_finite_time(finite: FiniteTime) -> Figure:
-    """Draw the density of finite-time exponents for each length, and the exponent of the whole train."""
+    """Draw histograms of finite-time exponents, one per averaging length, and the exponent of the train."""
     figure, ax = new_panel(4.2)
     ends = min(row.min() for row in finite.values), max(row.max() for row in finite.values)
     bins = np.linspace(*ends, _BINS + 1).tolist() if ends[0] < ends[1] else _BINS

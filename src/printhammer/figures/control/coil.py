@@ -74,7 +74,10 @@ def plot_duty(duty: ThermalDuty) -> Figure:
 
 @styled
 def plot_limit(limit: ThermalLimit) -> Figure:
-    """Draw the manufacturer's rates and the fitted limit against ambient temperature, by rail voltage."""
+    """Draw the manufacturer's highest rates against ambient temperature, one colour per rail voltage.
+
+    Lines show the highest rates for the fitted temperature limit of the winding.
+    """
     figure, ax = new_panel(3.4)
     for number, rail in enumerate(np.unique(limit.voltage).tolist()):
         rows = limit.voltage == rail

@@ -81,7 +81,11 @@ def _style_of(feedback: Feedback, number: int) -> tuple[str, str]:
 
 
 def _histogram(ax: Axes, feedback: Feedback, values: FloatArray, limit: float) -> None:
-    """Draw one histogram of deviations per strategy."""
+    """Draw one histogram of deviations per strategy.
+
+    `values` has one row per strategy; the axis covers a multiple of `limit`, and the end bins contain the
+    deviations beyond the axis.
+    """
     reach = _REACH * limit
     edges = np.linspace(-reach, reach, _BINS + 1)
     for number, name in enumerate(feedback.strategies):
@@ -104,7 +108,10 @@ def _histogram(ax: Axes, feedback: Feedback, values: FloatArray, limit: float) -
 
 
 def _by_gap(ax: Axes, feedback: Feedback, values: FloatArray, limit: float) -> None:
-    """Draw the deviation of the second of two dots against the gap, one line per strategy."""
+    """Draw the deviation of the second of two dots against the time between their slots.
+
+    `values` has one row per strategy; dashed lines mark plus and minus `limit`.
+    """
     gaps = from_si(1.0, "s", "ms") * feedback.gaps
     reach = _REACH * limit
     for number, name in enumerate(feedback.strategies):

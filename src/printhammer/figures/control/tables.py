@@ -157,7 +157,7 @@ _SMALLEST: Final = 0.1  # Smallest area of a dot, as a fraction of the area at n
 def plot_learning(learning: Learning) -> Figure:
     """Draw the printed dots of each learning stage as a line of dots on the paper.
 
-    Each dot is drawn at its position, with its force deviation exaggerated in its area. Dots beyond the
+    Each dot is drawn at its position on the paper; its area exaggerates the force deviation. Dots outside the
     limits are orange; a lost dot is a cross at its slot.
     """
     stages = learning.dots.size

@@ -169,7 +169,11 @@ def _strokes(
     borders: FloatArray,
     rows: npt.NDArray[np.intp] | slice = slice(None),
 ) -> tuple[FloatArray, FloatArray]:
-    """Return x and y of one line segment per row, from its lower to its upper border, separated by NaN."""
+    """Return x and y of one line segment per map row, from the lower to the upper border of the row.
+
+    At the rate of its row, in `rates`, a segment has x in `at` and the slope in `slopes`, in x per rate;
+    `borders` are the borders of all map rows. The segments are separated by NaN.
+    """
     centre, place, slope = rates[rows], at[rows], slopes[rows]
     ends = np.column_stack([borders[:-1][rows], borders[1:][rows], np.full_like(centre, np.nan)])
     across = place[:, np.newaxis] + slope[:, np.newaxis] * (ends - centre[:, np.newaxis])

@@ -99,7 +99,7 @@ _BELOW: Final = 30.0
 def place_lines(ax: Axes, hammer: Hammer, shown: Scale, side: Literal["x", "y"] = "y") -> None:
     """Draw lines at the positions of backstop, pack and platen; label vertical lines.
 
-    `side` is the axis of the displacement; the limits of the axes must be set already.
+    `side` is the axis of the displacement, `shown` its scale; the limits of the axes must be set already.
     """
     low, high = ax.get_ylim() if side == "y" else ax.get_xlim()
     for name, place in places(hammer).items():
@@ -288,7 +288,10 @@ def arrows(
 
 
 def firings(ax: Axes, times: Iterable[float], shown: Scale, color: str = BLUE, foot: float = 0.022) -> None:
-    """Mark firing times [s] by small triangles at the lower edge of the axes."""
+    """Mark firing times [s] by small triangles near the lower edge of the axes.
+
+    `shown` is the scale of the time axis, and `foot` the height of the triangles, as a fraction of the axes.
+    """
     at = [float(shown.shown(t)) for t in times]
     how = {"transform": ax.get_xaxis_transform(), "clip_on": False, "zorder": 5.0, "gid": "firings"}
     dots(ax, at, [foot] * len(at), 4.5, color, marker="^", **how)
@@ -299,8 +302,8 @@ def drive_strip(
 ) -> None:
     """Draw the drive currents, or forces, of motions in the slim strip below a panel.
 
-    `times` [s] and `colours` have one entry per motion. A motion driven by a force is skipped if the first
-    motion is driven by a current, and vice versa.
+    `times` [s] and `colours` have one entry per motion; the time axis ends at `until` [s]. A motion driven
+    by a force is skipped if the first motion is driven by a current, and vice versa.
     """
     quantity = motions[0].driven
     time, value = scale("time", until), scale(quantity)

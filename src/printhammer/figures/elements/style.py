@@ -139,7 +139,10 @@ def new_panel(height: float, width: float = WIDTH) -> tuple[Figure, Axes]:
 
 
 def with_strip(figure: Figure, ratio: float = 5.5) -> tuple[Axes, Axes]:
-    """Divide a figure into a panel and a slim strip below it that share the time axis."""
+    """Divide a figure into a panel and a slim strip below it that share the time axis; return both axes.
+
+    `ratio` is the height of the panel divided by the height of the strip.
+    """
     grid = figure.add_gridspec(2, 1, height_ratios=(ratio, 1.0), hspace=0.03)
     panel = figure.add_subplot(grid[0])
     strip = figure.add_subplot(grid[1], sharex=panel)

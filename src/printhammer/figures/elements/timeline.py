@@ -111,7 +111,7 @@ def between_surfaces(ax: Axes, hammer: Hammer, motion: Motion, above: float) -> 
 
 
 def current_between(ax: Axes, motion: Motion, largest: float) -> None:
-    """Draw the current of a motion, A, against time, ms, with its limits as dashed lines."""
+    """Draw current [A] against time [ms], with dashed lines at plus and minus the limit `largest` [A]."""
     ax.plot(scale("time").factor * motion.t, motion.current, color=style.BLUE, lw=style.THIN, gid="current")
     ax.axhline(0.0, color=style.FAINT, lw=style.HAIR, zorder=0)
     marks.dashed(ax.axhline, -largest, largest)

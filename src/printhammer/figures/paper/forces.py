@@ -145,7 +145,11 @@ def _annotate(
     way: Scale,
     force: Scale,
 ) -> None:
-    """Add the inset of the settle-out, if any, and a note on the meaning of the loops."""
+    """Add the inset of the settle-out, if any, and a note on the meaning of the loops.
+
+    `x` and `total` are the displacement [m] and the total force [N]; `late` is the mask of the settle-out;
+    `way` and `force` are the scales of the axes.
+    """
     points = occupied(ax)
     if late.any():
         left, bottom, width, height = box = _place(points)
@@ -164,7 +168,10 @@ def _annotate(
 
 
 def _place(points: FloatArray) -> tuple[float, float, float, float]:
-    """Choose left, bottom, width and height of the inset: as large as possible, preferably upper right."""
+    """Choose left, bottom, width and height of the inset, as fractions of the axes.
+
+    The inset is as large as possible without covering `points`, and preferably upper right.
+    """
     boxes = []
     for width, height in _INSERTS:
         corners = [

@@ -266,7 +266,11 @@ def _mark(
     color: str = INK,
     **options: Any,
 ) -> None:
-    """Draw a tick at a position on an axis, with a text at its end."""
+    """Draw a tick at a position `at` on an axis, with a text at its end.
+
+    `way` is the vector of the tick, in data units; `shift` is the offset of the text from the end of the
+    tick, in points; and `side` is the alignment of the text.
+    """
     end = at[0] + way[0], at[1] + way[1]
     ax.plot([at[0], end[0]], [at[1], end[1]], color=color, lw=HAIR, **options)
     _text(ax, text, end, shift, side, color=color)

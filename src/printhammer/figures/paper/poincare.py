@@ -122,7 +122,10 @@ def _strobe_points(
 
 
 def _edge(ax: Axes, side: Literal["x", "y"], shown: Scale, here: bool, opposite: bool) -> None:
-    """Label the axis of a panel at the figure's edge, and its secondary axis in the other unit system."""
+    """Label the axis of a panel, and its secondary axis in the other unit system, at the figure's edges.
+
+    `here` and `opposite` state whether the panel lies at the edge of the axis and at the opposite edge.
+    """
     other = label(ax, side, shown)
     if not here:
         ax.set(**{f"{side}label": ""})
