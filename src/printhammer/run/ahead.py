@@ -53,7 +53,7 @@ def _nothing() -> None:
 
 
 def prepare(laws: Laws) -> None:
-    """Compile the code that evaluates a finished run, by calls on an empty record."""
+    """Compile the code that evaluates a finished run, by calling it with an empty record."""
     kernel = specialise(laws)
     none, nodes, contacts, constants = np.empty(0), np.empty((0, 5)), np.empty((0, 7)), np.zeros(64)
     drive = (none, np.zeros(0, np.int64), np.empty((0, 7)), False, np.zeros(0, np.int64), np.zeros(1))

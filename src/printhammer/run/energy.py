@@ -30,7 +30,7 @@ _HEAT_ERROR: Final = 1e-13  # Relative error at which the heat integral has conv
 
 
 class CoilWork(Declared):
-    """Work of the coil over a run; its power is (Fm(x, I) - Fm(x, 0)) v."""
+    """Work of the coil over a run. The coil power is (Fm(x, I) - Fm(x, 0)) v, with the magnet force Fm."""
 
     net: float = scalar("J", "integral of the power", more="`coil_work` of the energy ledger")
     positive: float = scalar(

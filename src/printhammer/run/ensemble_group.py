@@ -57,11 +57,11 @@ _PIECE: Final = 4 * lane_layout.LANES
 class Group:
     """Ensemble members with the same laws, overlap rule, kinds of waveform pieces and kind of start.
 
-    The group of a member depends on that member only, so that its kernel does not depend on other members.
-    `members` lists the indices of the group's members in the ensemble; `hammers` and `hammer_of` are the
-    distinct hammers and the index for each member, and `fired` contains the drives of all members. Each
-    member of the ensemble has a row of `states` (time, displacement, velocity and further components at the
-    start) and an end time, s. No run takes more than `max_steps`.
+    A start is inside or outside the pack. The group of a member depends on that member only, so that its
+    kernel does not depend on other members. `members` lists the indices of the group's members in the
+    ensemble; `hammers` and `hammer_of` are the distinct hammers and the index for each member, and `fired`
+    contains the drives of all members. Each member of the ensemble has a row of `states` (time, displacement,
+    velocity and further components at the start) and an end time, s. No run takes more than `max_steps`.
     """
 
     def __init__(
@@ -257,7 +257,7 @@ class Job:
         )
 
     def finish(self, x: npt.NDArray[np.float32]) -> None:
-        """Copy the displacements of a group to the rows of its members in the ensemble's array."""
+        """Copy the displacements of the group to the rows of its members in the array `x` of the ensemble."""
         if self.kept.x is not x:
             x[self.group.members] = self.kept.x
 
@@ -457,9 +457,9 @@ class Fired:
 
 
 def closed_form(table: FloatArray) -> tuple[list[float], LaneKinds | None]:
-    """Return decay rates and frequencies, 1/s, and segment kinds of waveforms, for vector lanes.
+    """Return the decay rates and frequencies, 1/s, and the kinds of the segments in a segment table.
 
-    The kinds are None if the waveforms have more rates than lanes support.
+    The kinds are None if the waveforms have more rates than the vector lanes support.
     """
     pieces = table[table[:, 1] != END]
     kind = pieces[:, 1]

@@ -61,7 +61,7 @@ FORCES: Final = ("magnet", "spring", "pack", "backstop", "damping", "drag", "dri
 ``[[contact]]``, if the hammer has any), a drive that is a force, and the total."""
 
 PATHS: Final = ("supply", "chopped", "blocked", "backward")
-"""Paths of the coil current: through the supply, through the diode of a chopper, no path (no current), and
+"""Conduction paths of the coil: through the supply, through the diode of a chopper, no path (no current), and
 decay of a negative current."""
 
 MOST_DOTS: Final = 40
@@ -203,7 +203,7 @@ class Motion(Result, fields=False):
 
     @cached_property
     def switchings(self) -> tuple[FloatArray, tuple[str, ...]]:
-        """Times [s] at which the coil current changed its path, and the new paths; see `PATHS`."""
+        """Times [s] at which the coil current changed its conduction path, and the new paths; see `PATHS`."""
         if not self._problem.laws.circuit:
             return np.zeros(0), ()
         times, paths = self._record.nodes[:, 0], self._record.nodes[:, -1]
@@ -466,7 +466,7 @@ class Motion(Result, fields=False):
         write_csv(self.to_pandas(), path)
 
     def to_parquet(self, path: str | Path) -> None:
-        """Write the motion on the output grid as Parquet with provenance; needs the extra `tables`."""
+        """Write the motion, with provenance, as Parquet; requires the optional dependencies `tables`."""
         write_parquet(self.to_pandas(), path)
 
     def write(self, path: Path) -> None:

@@ -97,7 +97,10 @@ class _TooLong(Exception):
 def fresh_carry(
     start: float, state: tuple[float, float], pause_after: float = math.inf, beyond: Beyond = AT_REST
 ) -> FloatArray:
-    """Build the initial carry array of the kernel's `run`, which pauses after `pause_after` nodes."""
+    """Build the initial carry array of the kernel's `run`, which pauses after `pause_after` nodes.
+
+    `state` and `beyond` are the components of the initial state at the time `start` [s].
+    """
     array = np.zeros(carry.SIZE)
     array[carry.TIME] = start
     array[carry.POSITION_NOW], array[carry.VELOCITY] = state
@@ -119,7 +122,10 @@ def check_tolerance(tolerance: object) -> None:
 
 
 def laws_of(hammer: Hammer, drive: Drive | str) -> Laws:
-    """Return the laws of a hammer's parts and of its drive, which select the compiled kernel."""
+    """Return the laws of a hammer's parts and of its drive, which select the compiled kernel.
+
+    `drive` is the drive, or the quantity that it controls: "current", "force" or "voltage".
+    """
     quantity = drive if isinstance(drive, str) else drive.quantity
     return Laws(
         magnet=_module(hammer.magnet),

@@ -147,7 +147,7 @@ class Regime(Declared):
         drive : Drive, optional
             Continuous periodic force, instead of waveform, period and rate.
         overlap : str, optional
-            "add" or "replace".
+            "add": overlapping pulses add up; "replace": each firing cuts off the preceding pulse.
         phase : float, optional
             Phase of the section after a firing, as a fraction of the period in [0, 1).
 

@@ -29,8 +29,9 @@ class Beyond(NamedTuple):
     """State components in addition to (x, v); by default outside the pack, without current.
 
     In the pack: the branch, an index in `printhammer.run.ensemble.MODE_NAMES` or -1 (determined by
-    displacement and velocity), and the latest local maximum, m. Under a voltage: the currents in the coil and
-    in its shorted turn, A, and the voltage of the supply's capacitor, V, NaN for a charged capacitor.
+    displacement and velocity), and the latest local maximum of the displacement, m. Under a voltage: the
+    currents in the coil and in its shorted turn, A, and the voltage of the supply's capacitor, V, NaN for a
+    charged capacitor.
     """
 
     branch: float = -1.0
@@ -109,7 +110,9 @@ def initial_state(hammer: Hammer, state: Sequence[float] | None) -> tuple[float,
 
 
 def state_beyond(hammer: Hammer, state: Sequence[float] | None, quantity: str) -> Beyond:
-    """Return the components of a state besides displacement and velocity, for a driven quantity.
+    """Return the components of a state besides displacement and velocity.
+
+    `quantity` is the quantity that the drive controls: "current", "force" or "voltage".
 
     Raises
     ------

@@ -83,17 +83,20 @@ def coil_of(hammer: Hammer) -> Coil:
 
 
 def linkage(hammer: Hammer, x: float, current: float) -> float:
-    """Return the flux linkage [Wb] of the main path of a coil at a displacement [m] and a current [A]."""
+    """Return the flux linkage [Wb] of the main flux path of a coil at a displacement [m] and current [A]."""
     return main_linkage(x, current, coil_of(hammer))
 
 
 def inductance(hammer: Hammer, x: float, current: float) -> float:
-    """Return the derivative of the main-path flux linkage with respect to the current, H."""
+    """Return the differential inductance [H] of the main flux path of a coil, at x [m] and a current [A]."""
     return main_inductance(x, current, coil_of(hammer))
 
 
 def emf(hammer: Hammer, x: float, current: float) -> float:
-    """Return the back-EMF per velocity: the derivative of main-path flux linkage by displacement, Wb/m."""
+    """Return the derivative of the flux linkage of the main flux path with respect to displacement, Wb/m.
+
+    The derivative is the back-EMF divided by the velocity; 0 if the coil has no back-EMF.
+    """
     if hammer.magnet is None or not winding_of(hammer).back_emf:
         return 0.0
     law = _law(hammer, "magnet_emf")
@@ -101,7 +104,7 @@ def emf(hammer: Hammer, x: float, current: float) -> float:
 
 
 def current_of(hammer: Hammer, x: float, linkage: float, main: float) -> float:
-    """Return the coil current [A] from the flux linkages of the coil and of its main path [Wb]."""
+    """Return the coil current [A] from the flux linkages [Wb] of the coil and of its main flux path."""
     coil = winding_of(hammer)
     if coil.turn_resistance:
         return (linkage - main) / (coil.leakage or 0.0)
@@ -164,7 +167,7 @@ def take_supply(constants: FloatArray, hammer: Hammer, drive: Drive) -> None:
 
 
 def check_linkage(hammer: Hammer, current: float) -> None:
-    """Check that the flux linkage of a coil increases with the current at all displacements."""
+    """Check that the flux linkage increases with the coil current, up to `current` [A], at all positions."""
     coil = coil_of(hammer)
     ends = [place for place in (hammer.front, hammer.platen) if place is not None]
     x, slope = falling_place(hammer.origin, max([*ends, hammer.origin]), current, coil)

@@ -59,7 +59,7 @@ class Window(NamedTuple):
 
 
 class Single(NamedTuple):
-    """Outcome of a single pulse at the end of a window: completion, flight time, final state, reach."""
+    """Outcome of a single pulse at the end of a window, from which `is_enough` decides on the window."""
 
     ok: bool
     flight: float  # Flight time, s; NaN without a dot

@@ -188,6 +188,7 @@ _FEW_QUENCH: Final = 0.01  # Fraction of forces beyond either end of the colour 
 def plot_quench(quenches: QuenchMap) -> Figure:
     """Draw a quench map: width of the second pulse against the time between the firings.
 
+    Colours show the force of the second dot or, where this dot is lost, the second peak of the displacement.
     Crosses mark the two cases of Fig. 6 of the paper if they lie within the axes.
     """
     figure, ax = new_panel(4.6)

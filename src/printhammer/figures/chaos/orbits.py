@@ -46,8 +46,9 @@ _LINES: Final = ("-", "--", "-.", ":")
 def plot(orbits: Orbits, *, points: int = POINTS, longest: int | None = None) -> Figure:
     """Draw the states of orbits at the firings, over strobe points of the train from rest.
 
-    Stable orbits are filled marks, all other orbits open marks; the panel below shows the first four orbits
-    against time. Orbits with a period above `longest` firings are omitted.
+    `points` is the number of strobe points. Stable orbits are filled marks, all other orbits open marks; the
+    panel below shows the first four orbits against time. Orbits with a period above `longest` firings are
+    omitted.
     """
     shown = [orbit for orbit in orbits if longest is None or orbit.firings <= longest]
     traced = shown[:_TRACES]

@@ -125,11 +125,12 @@ def find_buzz_train(
     The search is a grid search over one number, the period or the delay, refined around the three best
     values. Trains at a constant rate come first, since they need no sensor: periods from half the flight time
     of a single pulse up to the time of the return to the backstop. If no such train both prints enough dots
-    and stays clear after its first dot, delayed trains follow: delays from 0, at the departure from the pack,
-    to the return, every 2 us or 400 delays, whichever is coarser. A delayed train is built firing by firing;
-    a dot counts as missing after three times the single pulse's time from firing to departure. Trains are
-    ranked by four criteria in order: enough dots, clear of the backstop, number of dots, force of the weakest
-    dot. The search is deterministic.
+    and stays clear of the backstop after its first dot, delayed trains follow: delays from 0, at the
+    departure from the pack, up to the return to the backstop, at intervals of 2 us, or longer intervals if
+    more than 400 delays would be needed. A delayed train is built firing by firing; a dot counts as missing
+    after three times the single pulse's time from firing to departure. Trains are ranked by four criteria in
+    order: enough dots, clear of the backstop, number of dots, force of the weakest dot. The search is
+    deterministic.
 
     Parameters
     ----------

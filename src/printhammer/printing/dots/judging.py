@@ -75,7 +75,7 @@ def judge(
     limits: Limits,
     ok: BoolArray | None = None,
 ) -> Judgement:
-    """Compare the dots of an ensemble, one firing per dot, with the limits.
+    """Compare the dots of an ensemble with the limits; every firing belongs to one requested dot.
 
     `wanted`, shape (members, firings), is the mask of dots to evaluate; the dots of a lead-in, for instance,
     are excluded. `slot_times` [s], of the same shape, may differ from the firing times, and are ignored where

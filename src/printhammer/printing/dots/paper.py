@@ -203,7 +203,7 @@ class PiecewiseMotion:
 def simulate_pieces(
     hammers: Sequence[Hammer], drive: Drive, duration: float, tolerance: float
 ) -> PiecewiseMotion:
-    """Simulate a drive on a hammer whose pack changes at each firing, from rest.
+    """Simulate, from rest, a drive on a hammer whose pack changes at each firing.
 
     Parameters
     ----------

@@ -52,8 +52,8 @@ def de_bruijn(order: int = SLOTS) -> BoolArray:
     """Return a binary de Bruijn cycle, which contains every word of `order` slots exactly once.
 
     The cycle is the lexicographically smallest such cycle: the concatenation of the Lyndon words whose length
-    divides the order (H. Fredricksen and J. Maiorana, Discrete Math. 23 (1978) 207). The order is 1 to 16,
-    the shape (2**order,); read-only.
+    divides the order (H. Fredricksen and J. Maiorana, Discrete Math. 23 (1978) 207). `order` is 1 to 16;
+    the array has the shape (2**order,) and is read-only.
     """
     if not 1 <= order <= 16:
         raise InputError(
@@ -144,7 +144,7 @@ class OpenLoop:
 def checked_drives(
     strategy: Strategy, hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float
 ) -> Sequence[Drive]:
-    """Call a strategy and check that each drive has one firing per requested dot.
+    """Call a strategy, check that each drive has one firing per requested dot, and return the drives.
 
     Raises
     ------

@@ -82,7 +82,7 @@ def attempt(
     A pattern lists the indices of its slots with a dot, at least one. Slots before `judged_from`, one index
     for all patterns or one for each, are a lead-in. With `extra`, every extra contact is recorded.
 
-    Each member has a status: a simulation that fails raises no exception, and its pattern does not pass.
+    Each ensemble member has a status. A simulation that fails raises no exception; its pattern does not pass.
     """
     own = [checked_drives(strategy, case.hammer, patterns, case.rate) for case in cases]
     drives = joined(own)

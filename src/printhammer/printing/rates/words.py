@@ -96,8 +96,9 @@ def multipliers(
 ) -> FloatArray:
     """Compute the multipliers of rows with a dot in every `step`-th slot, shape (hammers,).
 
-    Each row belongs to a hammer and a rate [Hz]; see `printhammer.derivatives.rows.row_multipliers`. The
-    multipliers are NaN for a closed loop, which corrects errors itself.
+    A multiplier is the factor by which a small deviation changes from dot to dot. Each row belongs to a
+    hammer and a rate [Hz]; see `printhammer.derivatives.rows.row_multipliers`. The multipliers are NaN for a
+    closed loop, which corrects errors itself.
     """
     if hasattr(strategy, "along"):
         return np.full(len(hammers), np.nan)
@@ -107,7 +108,7 @@ def multipliers(
 
 
 def _shortened(word: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the first `_ROW` dots of a longer row of equally spaced dots; other words are unchanged."""
+    """Shorten a word that is a row of equally spaced dots to its first `_ROW` dots; return the word."""
     return word[:_ROW] if len(word) > _ROW and len(set(np.diff(word).tolist())) == 1 else word
 
 

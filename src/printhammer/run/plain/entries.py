@@ -129,7 +129,7 @@ def entries() -> dict[str, Plain]:
 
 
 def templates() -> Iterator[Module]:
-    """Yield the templates of plain functions: with and without a coil circuit if a function calls laws.
+    """Yield the code templates of plain functions, also for a coil circuit if the function calls laws.
 
     Functions that pack the constants of parts are omitted: they have a template for each combination of laws.
     """
@@ -141,7 +141,7 @@ def templates() -> Iterator[Module]:
 
 
 def compiled(name: str, laws: Laws = _NO_LAWS) -> Callable[..., Any]:
-    """Return a plain function as machine code; compiled or loaded from disk, with `laws` if it calls laws."""
+    """Return the plain function `name` as machine code, compiled or loaded from disk, for the given laws."""
     from printhammer.kernel.compile.specialise import specialise
 
     return specialise(laws).plain(name, entries()[name])

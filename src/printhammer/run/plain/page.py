@@ -102,7 +102,7 @@ def fill_constants(
     constants : float64 array
         Array of zeros, to which the constants are written.
     ends : float64 array, shape (2,)
-        Range of displacements in which the laws of magnet and spring are valid, m.
+        Output: smallest and largest displacement for which the laws of magnet and spring are valid, m.
 
     Returns
     -------

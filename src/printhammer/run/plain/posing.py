@@ -105,7 +105,7 @@ class Coil(NamedTuple):
 
 
 def main_linkage(x: float, current: float, coil: Coil) -> float:
-    """Return the flux linkage [Wb] of the main path of a coil at a displacement [m] and a current [A]."""
+    """Return the flux linkage [Wb] of the main flux path of a coil at a displacement [m] and current [A]."""
     own = coil.inductance * current
     if not coil.coupled:
         return own
@@ -113,7 +113,7 @@ def main_linkage(x: float, current: float, coil: Coil) -> float:
 
 
 def main_inductance(x: float, current: float, coil: Coil) -> float:
-    """Return the derivative of the main-path flux linkage with respect to the current, H."""
+    """Return the differential inductance [H] of the main flux path of a coil, at x [m] and a current [A]."""
     if not coil.coupled:
         return coil.inductance
     return coil.inductance + float(coil.magnet_inductance(coil.magnet, x, current))
