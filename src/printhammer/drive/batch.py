@@ -103,7 +103,7 @@ class Ragged:
         return type(self)(self.values[self.places(rows)], starts_of(self.counts[rows]))
 
     def filled(self, columns: int | None = None) -> npt.NDArray[Any]:
-        """Return the rows as a table, padded with NaN to `columns` columns (by default: the longest row)."""
+        """Return the rows as a table, padded with NaN to the length of the longest row, or to `columns`."""
         counts, width = self.counts, self.longest if columns is None else columns
         shape = (len(self), width, *self.values.shape[1:])
         if (counts == width).all():

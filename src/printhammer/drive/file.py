@@ -87,7 +87,10 @@ def load_drive(path: str | Path, waveform: Waveform | None = None) -> Drive:
 def read_drive(
     text: str, waveform: Waveform | None = None, *, name: str = "drive", folder: Path | None = None
 ) -> Drive:
-    """Parse the text of a drive file; `name` appears in messages, `folder` contains sampled waveforms."""
+    """Parse the text of a drive file; `name` appears in messages, `folder` contains sampled waveforms.
+
+    `waveform` and the errors are as for `load_drive`.
+    """
     try:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:

@@ -15,7 +15,7 @@ kind  value                               used by
 ====  ==================================  ================================
 
 The first row starts at 0, starts ascend strictly, and the last row ``[end, 0, 0, 0, 0, 0]`` marks the end of
-the support (possibly infinite); the value is zero before 0, at the end and after it. Values are
+the support (possibly infinite); the value is zero before time 0, at the end and after it. Values are
 right-continuous at every start.
 """
 
@@ -57,7 +57,7 @@ def table(rows: Iterable[Sequence[float]], end: float) -> FloatArray:
     Segments that have zero duration due to rounding are removed.
 
     Rows ``(start, kind, p0, p1, p2, p3)`` are in ascending order of start; a first start above 0 gets a zero
-    segment before it. The end of the support, s, is ``inf`` for a drive that never ends.
+    segment before it. `end` is the end of the support, s; ``inf`` for a drive that never ends.
     """
     listed = [[float(entry) for entry in row] for row in rows]
     if listed and listed[0][0] > 0.0:
@@ -93,7 +93,7 @@ def evaluate(segments: FloatArray, t: npt.ArrayLike, fired: npt.ArrayLike = 0.0)
     """Evaluate a segment table at times t for pulses fired at the times ``fired``.
 
     Both arrays, in s, are broadcast together. Values are right-continuous; an edge lies at the rounded sum of
-    fired and start, as in the kernel. NaN yields NaN.
+    the firing time and the start of its segment, as in the kernel. NaN yields NaN.
     """
     time, fire = np.broadcast_arrays(np.asarray(t, dtype=np.float64), np.asarray(fired, dtype=np.float64))
     starts = segments[:, 0]

@@ -47,9 +47,9 @@ def put(table: Any, row: int, start: float, kind: float, p0: float, p1: float, p
 
 
 def close(table: Any, rows: int, end: float) -> int:
-    """Remove segments that have zero duration due to rounding, and append the end time, s.
+    """Remove segments that have zero duration due to rounding, and append the end row, at time `end` [s].
 
-    Return the number of rows.
+    `rows` is the number of segments in the table. Return the new number of rows, end row included.
     """
     kept = 0
     for row in range(rows):
@@ -61,7 +61,7 @@ def close(table: Any, rows: int, end: float) -> int:
 
 
 def half_sine(fields: Any, table: Any) -> int:
-    """Write the segments of a half-sine pulse with the fields amplitude, width; return the row count."""
+    """Write the segments of a half-sine pulse with the fields amplitude and width; return the row count."""
     rows = put(table, 0, 0.0, SINE, 0.0, fields[0], math.pi / fields[1], 0.0)
     return close(table, rows, fields[1])
 
@@ -78,7 +78,7 @@ def rate_of(time_constant: float) -> float:
 
 
 def rectangle(fields: Any, table: Any) -> int:
-    """Write the segments of a rectangular pulse with the fields amplitude, width, rise, decay.
+    """Write the segments of a rectangular pulse with the fields amplitude, width, rise and decay.
 
     Return the number of rows. `rise` and `decay` are time constants, s.
     """
@@ -97,7 +97,7 @@ def rectangle(fields: Any, table: Any) -> int:
 
 
 def trapezoid(fields: Any, table: Any) -> int:
-    """Write the segments of a trapezoidal pulse with the fields amplitude, rise, width, fall.
+    """Write the segments of a trapezoidal pulse with the fields amplitude, rise, width and fall.
 
     Return the number of rows. `rise` and `fall` are durations, s.
     """
@@ -224,7 +224,7 @@ def segment_value(kind: float, p0: float, p1: float, p2: float, p3: float, s: fl
 def fill_values(table: Any, times: Any, values: Any) -> None:
     """Evaluate a segment table, shape (rows, 6), at ascending times since the firing, s; write the values.
 
-    Values are right-continuous; the value is 0 before 0, at the end of the table and after it.
+    Values are right-continuous; the value is 0 before time 0, at the end of the table and after it.
     """
     row = 0
     last = len(table) - 1

@@ -97,7 +97,7 @@ class Hammer:
         Parameters
         ----------
         text : str
-            TOML.
+            Text of the file, in TOML.
         name : str, optional
             Name for error messages, usually the file name.
         folder : path, optional

@@ -131,7 +131,7 @@ class StaticForce:
         return sorted({place for place in places if self.low <= place <= self.high})
 
     def reach(self, far: float = FARTHER[0]) -> tuple[float, float]:
-        """Return the search interval for equilibria [m] within `far` of the origin."""
+        """Return the search interval for equilibria [m], at most `far` [m] from the origin."""
         return reach_of(far, self.statics)
 
 

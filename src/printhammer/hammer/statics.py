@@ -52,7 +52,7 @@ class Statics(NamedTuple):
     backstop_elastic: Any
     """Elastic force of the backstop, N."""
     spring_level: Any
-    """Position of a kink of the spring law, m."""
+    """Position of the kink of the spring law with a given index, m."""
     magnet: Any
     """Packed constants of the magnet."""
     spring: Any
@@ -74,9 +74,9 @@ class Statics(NamedTuple):
     has_magnet: bool
     """Whether the hammer has a magnet."""
     low: float
-    """Smallest displacement for which the law of the magnet is valid, m."""
+    """Smallest displacement for which the laws of magnet and spring are valid, m."""
     high: float
-    """Largest displacement for which the law of the magnet is valid, m."""
+    """Largest displacement for which the laws of magnet and spring are valid, m."""
     platen: float
     """Position of the platen, m; NaN without a platen."""
     thickness: float
@@ -126,12 +126,12 @@ def origin_of(s: Statics) -> float:
 
 
 def limits_of(s: Statics) -> tuple[float, float]:
-    """Return the range of displacements [m] that the magnet law and rigid stops permit."""
+    """Return the range of displacements [m] that the laws of magnet and spring and rigid stops permit."""
     return max(s.low, s.position) if s.rigid else s.low, min(s.high, s.front) if s.rigid_front else s.high
 
 
 def reach_of(far: float, s: Statics) -> tuple[float, float]:
-    """Return the search interval for equilibria [m] within `far` of the origin."""
+    """Return the search interval for equilibria [m], at most `far` [m] from the origin."""
     low, high = limits_of(s)
     origin = origin_of(s)
     if not math.isnan(s.platen):
@@ -186,7 +186,8 @@ def is_stable(x: float, before: float, after: float, s: Statics) -> bool:
 def put_cluster(anchor: float, sign: float, limit: float, grid: Any, count: int) -> int:
     """Append an anchor and points on one side of it to the first `count` points of a grid.
 
-    The distances of the points from the anchor, times `sign`, form a geometric sequence up to `limit` [m].
+    The points lie above the anchor if `sign` is 1, below if `sign` is -1; their distances from the anchor
+    form a geometric sequence up to `limit` [m].
 
     Returns
     -------

@@ -125,7 +125,10 @@ class Trace(Declared, eq=False):
         return float(np.median(np.diff(self.times)))
 
     def driven(self, shifts: FloatArray) -> Waveform:
-        """Return the recorded voltage; `shifts` [s] shift each edge from the middle between its two rows."""
+        """Return the recorded voltage as a waveform.
+
+        `shifts` contains the time from the middle between the two rows of each edge to the edge, s.
+        """
         if not self.edges.size:
             return self.waveform
         t, volts = self.times, self.table.values["voltage"]
@@ -144,7 +147,7 @@ def read_trace(
 
     `locked` is the displacement at which the armature was locked, m; if None, the displacement stated in a
     comment of the record, else the armature was free. `has_offset` states that the probe has an offset; the
-    record may then begin with a nonzero current.
+    record may then begin with a nonzero current. `columns` is as in `printhammer.identify.coil.fit_coil`.
     """
     table = read_table(path, {"time": "s", "current": "A"}, optional={"voltage": "V"}, columns=columns)
     table.check_times()
@@ -219,7 +222,7 @@ SIGNS: Final = {
 """Advice for each undeclared probe error that a record reveals, by name of the error."""
 
 _WIDEST: Final = 0.2
-"""Upper bound of a fitted time constant, as a fraction of the length of the longest record; arbitrary."""
+"""Upper bound of a fitted time constant, as a fraction of the duration of the longest record; arbitrary."""
 
 
 class ProbeError(Declared):

@@ -46,7 +46,7 @@ def lowpass_motion(times: FloatArray, x: FloatArray, v: FloatArray, tau: float) 
 
     `x` and `v` contain the displacements [m] and velocities [m/s] of several motions, or their derivatives,
     at ascending times [s]; shape (times, motions), like the result. Between the times the displacement is the
-    cubic Hermite interpolant.
+    cubic Hermite interpolant. `tau` is the time constant of the filter, s.
     """
     if tau == 0.0 or len(times) < 2:
         return x.copy()
@@ -66,7 +66,7 @@ def lowpass_motion(times: FloatArray, x: FloatArray, v: FloatArray, tau: float) 
 def lowpass_lines(times: FloatArray, values: FloatArray, tau: float) -> FloatArray:
     """Low-pass filter a piecewise linear signal, given by values at ascending times [s], shape (n,).
 
-    At the first time the output equals the input.
+    At the first time the output equals the input. `tau` is the time constant of the filter, s.
     """
     if tau == 0.0 or len(times) < 2:
         return values.copy()
@@ -95,7 +95,7 @@ def lowpass_waveform(segments: FloatArray, t: npt.ArrayLike, tau: float) -> Floa
     """Low-pass filter a waveform [A or N], fired at time 0; return the output at ascending times [s].
 
     The waveform is a segment table (`printhammer.drive.segments`) with finite support; the time constant
-    is positive.
+    `tau` [s] is positive.
     """
     times = np.asarray(t, dtype=np.float64)
     result = np.zeros(len(times))

@@ -54,7 +54,7 @@ _SHOWN_IN: Final = {"m": "um", "kg": "g", "s": "us"}
 
 
 class FittedConstant(Declared):
-    """Fitted constant, with its standard error and interval."""
+    """Fitted constant, with its standard error and 95 % interval."""
 
     key: str = part(
         'dotted key of the hammer file, such as "magnet.F0"; another name where `in_file` is false'

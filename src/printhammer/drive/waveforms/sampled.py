@@ -120,7 +120,7 @@ def read_csv(path: Path) -> Samples:
 
 
 def _held(times: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Add a sample of each logic level just before the next sample, so that the level holds up to there."""
+    """Add a sample of each logic level just before the next sample, so that the level holds until then."""
     before = times[1:] - min(_EDGE, 0.5 * float(np.diff(times).min()))
     order = np.argsort(times := np.concatenate([times, before]))
     return times[order], np.concatenate([values, values[:-1]])[order]

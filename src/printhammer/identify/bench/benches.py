@@ -157,7 +157,7 @@ def pack(
 ) -> Bench:
     """Compute load cycles of the pack up to given peak indentations, m, each cycle on fresh paper.
 
-    Each branch of a cycle, loading or unloading, has `points` readings.
+    The loading branch of a cycle has `points` readings, the unloading branch one reading fewer.
     """
     if hammer.pack is None:
         raise InputError(

@@ -145,7 +145,7 @@ _NO_MOTION: Final = "the simulated hammer does not move, so that the records can
 
 
 class Solution(Declared, eq=False):
-    """Result of the Gauss-Newton iteration: parameters, covariance, states, residual scales and weights."""
+    """Result of the Gauss-Newton iteration: parameters, covariance, joint states and residual scales."""
 
     values: FloatArray = part("parameters, SI, shape (p,)")
     covariance: FloatArray = part("covariance of the parameters, SI, shape (p, p)")

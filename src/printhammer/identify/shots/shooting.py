@@ -54,7 +54,7 @@ class Parameters:
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Simulated segments of one shot at given parameter values, with derivatives."""
+    """Simulated segments of one shot at given parameter values, with derivatives of the motion."""
 
     motion: FloatArray
     """Displacement [m] and velocity [m/s] at the grid times; shape (g, 2)."""

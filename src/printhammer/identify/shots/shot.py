@@ -84,6 +84,8 @@ def read_shot(
     bandwidth : float, optional
         Bandwidth of the sensor, Hz; by default the value in a comment ``# bandwidth: 200 kHz``, else
         unlimited.
+    columns : str, optional
+        Contents of the table's columns, as in `printhammer.identify.shots.motion.fit_motion`.
 
     Raises
     ------

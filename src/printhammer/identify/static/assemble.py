@@ -79,7 +79,10 @@ def judge(
 
 
 def term_p_value(solution: Solution, term: FloatArray) -> float:
-    """Compute the p-value of one additional term in the linearised fit; NaN if the term is collinear."""
+    """Compute the p-value of one additional term in the linearised fit.
+
+    The result is NaN if the term is collinear with the derivatives with respect to the parameters.
+    """
     from scipy.special import stdtr
 
     root = np.sqrt(solution.variance[solution.used])
