@@ -2,8 +2,8 @@
 
 After a step is accepted, its quintic Hermite interpolant shows whether it contains an event (see
 :mod:`printhammer.kernel.methods.hermite`). If so, the step is repeated from its start with the length that
-the quintic suggests, and a Taylor step closes the small remainder: the displacement at the event is exact,
-and the time has the accuracy of the integrator.
+the quintic suggests, and a Taylor expansion covers the small rest of the way to the event: the displacement
+at the event is exact, and the time has the accuracy of the integrator.
 """
 
 from __future__ import annotations
@@ -117,7 +117,10 @@ def error_ratio(error_x: float, error_v: float, error_e: float, mode: int, contr
 
 @compiled
 def step_factor(ratio: float) -> float:
-    """Return the factor of the next step size for an error `ratio`; NaN gives the smallest factor."""
+    """Return the size of the next step divided by the size of the latest step, from 0.2 to 5.
+
+    `ratio` is the error of the latest step as a multiple of the tolerance; NaN gives 0.2.
+    """
     if not ratio < 1e6:
         return 0.2
     # Compute the eighth root by three square roots; a call of pow would cost as much as half a step.
@@ -135,7 +138,10 @@ def land_on_level(
     law: ForceLaw,
     control: Control,
 ) -> State:
-    """Return the state where sign * x rises through sign * `level` in a step `h`, up to fraction `upper`."""
+    """Return the state at which sign * x rises through sign * `level` in a step of `h` [s].
+
+    The search begins at `fraction` and ends at `upper`, both as fractions of the step.
+    """
     t, x, v, a = start
     low, high = 0.0, upper
     negligible = 1e-15 * control[0]
@@ -162,7 +168,10 @@ def land_on_level(
 def land_on_reversal(
     start: State, h: float, fraction: float, sign: float, law: ForceLaw, control: Control
 ) -> tuple[float, float, float, float, float]:
-    """Return the state at which sign * v falls to zero in a step `h`, and the fraction of the step."""
+    """Return the state at which sign * v falls to zero in a step of `h` [s], and the fraction of the step.
+
+    The search begins at the fraction `fraction`.
+    """
     t, x, v, a = start
     low, high = 0.0, 1.0
     negligible = 1e-8 * control[1]
@@ -214,7 +223,7 @@ def longest_still_step(start: State, law: ForceLaw, control: Control) -> float:
 
 @compiled
 def pushes(x: float, v: float, mode: int, hammer: Hammer) -> float:
-    """Evaluate the sign function of the contact in `mode`: positive where its force law pushes."""
+    """Evaluate the sign function of the contact in `mode`: positive where the law of the contact pushes."""
     if mode == M.BACKSTOP_RELEASED:
         return backstop_switch(hammer[BACKSTOP_PART:MAGNET], math.sqrt(max(hammer[POSITION] - x, 0.0)), v)
     return pack_switch(hammer[PACK:BACKSTOP_PART], x, v)
@@ -240,7 +249,7 @@ def land_on_push(start: State, end: State, cut: bool, law: ForceLaw, control: Co
     """Return the state in which a contact starts or ceases to push in a step from `start` to `end`.
 
     The method is regula falsi with the Illinois rule, and a bisection at every fourth estimate. With `cut`,
-    the contact belongs to the spring law, otherwise to the pack or the backstop.
+    the event is a kink of the dissipative force of the spring; see `push_gap`.
     """
     t, x, v, a = start
     h = end[0] - t
@@ -272,8 +281,9 @@ def land_on_push(start: State, end: State, cut: bool, law: ForceLaw, control: Co
 def level_switch(
     start: State, end: State, h: float, level: float, sign: float, law: ForceLaw, control: Control
 ) -> tuple[int, float, float]:
-    """Detect a rise of sign * x through sign * `level` in a step; return code, step fraction, upper bound.
+    """Detect a rise of sign * x through sign * `level` in a step from `start` to `end`.
 
+    Returns a code, the estimated fraction of the step at the crossing, and an upper bound of this fraction.
     The code is REACHED_FRONT for a crossing of any level, NO_SWITCH, or UNRESOLVED if the step is too long.
     """
     x0, v0, a0 = sign * start[1], sign * start[2], sign * start[3]
@@ -303,6 +313,8 @@ def first_switch(
     start: State, end: State, h: float, law: ForceLaw, peak: float, control: Control
 ) -> tuple[int, float, float, float, float]:
     """Find the first event inside a step by tests on its quintic Hermite interpolant.
+
+    `peak` is the latest local maximum in the pack [m].
 
     Returns
     -------
@@ -366,7 +378,7 @@ def first_switch(
 
 @compiled
 def is_near_level(x0: float, x1: float, hammer: Hammer) -> bool:
-    """Whether `x0` or `x1` [m], the ends of a step, lies within the distance abs(x1 - x0) of a kink."""
+    """Whether a step from `x0` to `x1` [m] has a kink of the spring law within its length of either end."""
     if LEVELS:
         for k in range(MOST_LEVELS):
             level = spring_level(hammer[SPRING:PACK], float(k))
@@ -383,11 +395,13 @@ def advance(
 ) -> tuple[int, State, float, Electric]:
     """Integrate over one accepted step off the backstop, up to the first switching event or `t_next` [s].
 
+    `peak` is the latest local maximum in the pack [m].
+
     Returns
     -------
     tuple
-        Code of the event (EDGE at `t_next`, NO_SWITCH if none, FAILED if no step is accurate), the state at
-        the end of the step, the proposed length of the next step [s], and the electric state at the end.
+        Code of the event (EDGE at `t_next`, NO_SWITCH if none, FAILED if no step size meets the tolerance),
+        state at the end of the step, proposed length of the next step [s], and electric state at the end.
     """
     mode = law.mode
     t, x, v, a = start

@@ -78,7 +78,7 @@ WEIGHTS = (
 def powers(
     t: float, x: float, v: float, w: float, mode: int, memory: float, hammer: Hammer, drive: Drive
 ) -> tuple[float, float, float, float, float]:
-    """Return the powers supplied by coil and drive force and dissipated by pack, backstop and damping [W]."""
+    """Return five powers [W]: of coil, drive force, and losses in pack, backstop and damping."""
     value = value_at(t, x, hammer, drive)
     coil = 0.0
     force = 0.0
@@ -99,7 +99,7 @@ def powers(
 
 @compiled
 def electric_powers(t: float, x: float, hammer: Hammer, drive: Drive) -> tuple[float, float, float, float]:
-    """Return the powers delivered by the supply and dissipated in coil, driver and shorted turn [W].
+    """Return four powers [W]: of the supply, and of the losses in coil, driver and shorted turn.
 
     Losses in the supply's internal resistance and in the diodes are counted as driver losses.
     """
@@ -138,7 +138,7 @@ def energy_behind(x: float, hammer: Hammer) -> float:
 
 @compiled
 def kink_side(node: Any, after: Any, hammer: Hammer) -> float:
-    """Return 1 if a step off the backstop begins on a kink of the spring law, -1 if it ends there, else 0.
+    """Return 1 if a step off the backstop begins on a kink of the spring law, -1 if it ends on one, else 0.
 
     Beyond the kink, the dissipative force of a contact may be a fractional power of the distance, hence of
     the time. As a function of the square root of the time since, or until, the kink, the power is smooth.

@@ -16,7 +16,7 @@ charged from V through Rc and shared by n coils, has the voltage q: dq/dt = (V -
 The electric state is the tuple ``(lambda, lambda_1, q)``; it is empty in a kernel without a circuit. The
 drive argument of the force functions is ``live`` without a circuit, and ``(live, electric)`` with one. The
 last two elements of ``live`` hold the state of the driver: the end of the off-time [s] of a fixed off-time
-chopper, and the current path.
+chopper, and the conduction path of the coil current.
 
 At most one piece of a driver is active at a time. Its pieces are ``[start, SWITCHED_PIECE, voltage, series
 resistance, upper, lower]`` with the current thresholds of the chopper [A], where `upper` is infinite without
@@ -69,11 +69,11 @@ Electric = Any
 circuit."""
 
 SOURCE, CHOPPED, BLOCKED, BACKWARD = 0.0, 1.0, 2.0, 3.0
-"""Paths of the coil current: through the source, through the freewheeling diode of a chopper, blocked (no
-current), and decay of a negative current."""
+"""Conduction paths of the coil current: through the source, through the freewheeling diode of a chopper,
+blocked (no current), and decay of a negative current."""
 
 PATH = 1
-"""Index in `live`, counted from its end, of the path of the coil current."""
+"""Index in `live`, counted from its end, of the conduction path of the coil current."""
 UNTIL = 2
 """Index in `live`, counted from its end, of the end of the chopper's off-time."""
 
@@ -92,13 +92,13 @@ def driven(live: Any, electric: Electric) -> Drive:
 
 @inlined
 def path_of(live: Any) -> float:
-    """Return the present path of the coil current, stored in `live`."""
+    """Return the present conduction path of the coil current, stored in `live`."""
     return float(live[live.size - PATH])
 
 
 @inlined
 def take_path(live: Any, path: float, until: float) -> None:
-    """Store the path of the coil current in `live`, with the time `until` [s] at which an off-time ends."""
+    """Store the conduction path of the coil current in `live`, with the end `until` [s] of an off-time."""
     live[live.size - PATH] = path
     live[live.size - UNTIL] = until
 
@@ -119,7 +119,10 @@ def current_at(x: float, linkage: float, hammer: Hammer) -> float:
 
 @inlined
 def linkage_at(x: float, current: float, hammer: Hammer) -> float:
-    """Return the main flux linkage, without leakage [Wb], at displacement [m] and magnetising current [A]."""
+    """Return the main flux linkage [Wb], without leakage, at displacement `x` [m].
+
+    `current` is the magnetising current [A].
+    """
     own = hammer[INDUCTANCE] * current
     if hammer[COUPLED] != 0.0:
         return float(magnet_linkage(hammer[MAGNET:], x, current) + own)
@@ -128,7 +131,7 @@ def linkage_at(x: float, current: float, hammer: Hammer) -> float:
 
 @inlined
 def coil_current(x: float, electric: Electric, hammer: Hammer, live: Any) -> float:
-    """Return the coil current [A]; zero while the path of the current is blocked."""
+    """Return the coil current [A]; zero while its conduction path is blocked."""
     if path_of(live) == BLOCKED:
         return 0.0
     if hammer[TURN_RESISTANCE] > 0.0:
@@ -146,7 +149,10 @@ def magnetising_current(x: float, electric: Electric, hammer: Hammer, live: Any)
 
 @inlined
 def source_of(t: float, electric: Electric, hammer: Hammer, live: Any) -> tuple[float, float]:
-    """Return the source voltage [V] and the resistance in series with the coil [ohm] on the present path."""
+    """Return the source voltage [V] and the resistance in series with the coil [ohm].
+
+    Both belong to the present conduction path of the coil current.
+    """
     kind = kind_of(live)
     if kind == SWITCHED_PIECE:
         if path_of(live) == CHOPPED:
@@ -252,7 +258,7 @@ def without_current(x: float, electric: Electric, hammer: Hammer) -> tuple[float
 
 @inlined
 def path_may_change(live: Any) -> bool:
-    """Whether the path of the coil current can change between two edges of the drive."""
+    """Whether the conduction path of the coil current can change between two edges of the drive."""
     kind = kind_of(live)
     if kind == SWITCHED_PIECE:
         return path_of(live) != SOURCE or not math.isinf(live[6])
@@ -261,7 +267,7 @@ def path_may_change(live: Any) -> bool:
 
 @compiled
 def path_gap(x: float, v: float, electric: Electric, hammer: Hammer, live: Any) -> float:
-    """Return the event function for a change of current path: of order one, positive until the change."""
+    """Return the event function for a change of conduction path: of order one, positive until the change."""
     kind, path = kind_of(live), path_of(live)
     scale = hammer[CURRENT_SCALE]
     if kind == SWITCHED_PIECE:
@@ -285,7 +291,7 @@ def path_gap(x: float, v: float, electric: Electric, hammer: Hammer, live: Any) 
 
 @compiled
 def next_path(t: float, x: float, electric: Electric, hammer: Hammer, live: Any) -> Electric:
-    """Select the next path of the coil current when `path_gap` reaches zero; return the electric state."""
+    """Select the next conduction path when `path_gap` reaches zero; return the electric state then."""
     path = path_of(live)
     if kind_of(live) == DECAY_PIECE:
         if path == BLOCKED:
@@ -307,7 +313,10 @@ def next_path(t: float, x: float, electric: Electric, hammer: Hammer, live: Any)
 
 @compiled
 def enter_piece(t: float, x: float, electric: Electric, hammer: Hammer, live: Any) -> Electric:
-    """Select the coil's current path when a piece begins or an off-time ends; return the electric state."""
+    """Select the conduction path when a waveform piece begins or an off-time ends.
+
+    Returns the electric state, in which the coil current is zero if the path is blocked.
+    """
     current = coil_current(x, electric, hammer, live)
     kind = kind_of(live)
     if kind == SWITCHED_PIECE and current >= live[6]:
@@ -324,7 +333,7 @@ def enter_piece(t: float, x: float, electric: Electric, hammer: Hammer, live: An
 
 @compiled
 def is_quiet(t: float, x: float, time_scale: float, electric: Electric, hammer: Hammer, live: Any) -> bool:
-    """Whether the electric state of an armature at rest stays constant until the next edge of the drive."""
+    """Whether the electric state is constant until the next edge of the drive, with the armature at rest."""
     kind = kind_of(live)
     if kind != -1.0 and kind < SWITCHED_PIECE:
         return False

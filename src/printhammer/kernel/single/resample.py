@@ -241,7 +241,7 @@ def depth_and_force(t: float, node: Any, surface: int, hammer: Hammer, live: Any
 
 @compiled
 def sample_time(place: int, nodes: Any) -> float:
-    """Return the time [s] of sample number `place`, counted from the first node, `SAMPLES` per step."""
+    """Return the time [s] of the sample `place`, if each step has `SAMPLES` samples, from its node on."""
     k, j = place // SAMPLES, place % SAMPLES
     t: float = nodes[k, 0]
     return t + (nodes[k + 1, 0] - t) * j / SAMPLES if j else t
@@ -251,7 +251,10 @@ def sample_time(place: int, nodes: Any) -> float:
 def value_of(
     which: int, t: float, first: int, last: int, surface: int, nodes: Any, train: Train, hammer: Hammer
 ) -> float:
-    """Return the depth (`which` 0) or force (`which` 1) at time `t` [s], in the step `first` or `last`."""
+    """Return the depth [m] (`which` 0) or the force [N] (`which` 1) of a contact at time `t` [s].
+
+    The time lies in the step that begins at the node with the index `last` or, if earlier, `first`.
+    """
     k = last if t >= nodes[last, 0] else first
     edges_at(nodes[k, 0], train)
     return depth_and_force(t, nodes[k], surface, hammer, train.live)[which]
@@ -272,7 +275,8 @@ def refined(
     """Return time [s] and value of the largest depth (`which` 0) or force (`which` 1) near a sample.
 
     Brent's method (*Algorithms for Minimization Without Derivatives*, 1973, chapter 5) is applied between the
-    two neighbours of the largest sample, which has the number `place` and the value `value`.
+    two neighbours of the largest sample, which has the number `place` and the value `value`. `begin` and
+    `end` are the indices of the first and the last node of the contact.
     """
     left, right = max(place - 1, begin * SAMPLES), min(place + 1, end * SAMPLES)
     low, high, x, fx = sample_time(left, nodes), sample_time(right, nodes), sample_time(place, nodes), value
@@ -363,7 +367,10 @@ def peaks(
     hammer: Hammer,
     out: Any,
 ) -> None:
-    """Write time of largest depth, largest depth and peak force of m contacts to `out`, shape (m, 3)."""
+    """Write time of largest depth [s], largest depth [m] and peak force [N] of m contacts to `out`, (m, 3).
+
+    `contacts` and `nodes` are the record of the run; `train` and `hammer` are as for `resample`.
+    """
     train = Train(*train)
     for row in range(contacts.shape[0]):
         out[row, 0], out[row, 1], out[row, 2] = peaks_of(contacts[row], nodes, train, hammer)

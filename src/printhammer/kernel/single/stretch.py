@@ -82,7 +82,7 @@ def open_dot(
 
 @compiled
 def deepen_dot(dots: Any, row: int, x: float, hammer: Hammer) -> None:
-    """Update depth and force in a row of dot data if a reversal at `x` [m] is the deepest so far."""
+    """Update depth and force in a row of dot data if a reversal at `x` [m] is the deepest of the contact."""
     if not dots[row, D.DEPTH] >= x - hammer[FRONT]:
         dots[row, D.DEPTH] = x - hammer[FRONT]
         dots[row, D.FORCE] = -pack_force(x, 0.0, LOADING, 0.0, hammer)
@@ -110,7 +110,8 @@ def note_dots(
 ) -> int:
     """Write the pack contacts of one segment of a run to the rows of dot data of a member.
 
-    Returns the number of extra contacts of the member including this segment; `extra` is the number before.
+    Returns the number of extra contacts of the member up to the end of this segment; `extra` is the number
+    before the segment.
     """
     for number in range(contacts.shape[0]):
         contact = contacts[number]
@@ -189,7 +190,10 @@ def note_states(
 
 @compiled
 def blank_states(strobes: Any, strobe: int, strobe_end: int, x: Any, sample: int, sample_end: int) -> None:
-    """Fill the remaining strobes and samples with NaN after an early end of the run."""
+    """Fill the remaining strobes and samples with NaN after an early end of the run.
+
+    These are the strobes from index `strobe` to before `strobe_end`, and likewise the samples.
+    """
     for i in range(strobe, strobe_end):
         for j in range(strobes.shape[1]):
             strobes[i, j] = np.nan
