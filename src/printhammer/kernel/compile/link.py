@@ -42,7 +42,7 @@ _OURS: Final = (ENTRY, LAW, CHOICE, "_ZN")
 
 
 def law_symbol(name: str, for_lanes: bool) -> str:
-    """Return the symbol of a law function: of its version for lanes or for arrays of constants."""
+    """Return the symbol of a law function, in its version for lanes or for arrays of constants."""
     return f"{LAW}lane.{name}" if for_lanes else LAW + name
 
 

@@ -132,10 +132,10 @@ def leave(
     drive: Drive,
     control: Control,
 ) -> tuple[float, float, float, float, float]:
-    """Locate the release from the backstop, at zero compression, in a backstop step of length `h` in s.
+    """Locate the release from the backstop, at zero compression, in a step of the regularised variable s.
 
-    The search begins at `fraction` and ends at `upper`, both as fractions of the step. Returns time, w = 0,
-    velocity, dv/ds = 0, and fraction of the step at the release.
+    The length of the step is `h`. The search begins at `fraction` and ends at `upper`, both as fractions of
+    the step. Returns time, w = 0, velocity, dv/ds = 0, and fraction of the step at the release.
     """
     t, w, v, kv = start
     low, high = 0.0, upper
@@ -161,9 +161,10 @@ def leave(
 def reach_time(
     start: ContactState, h: float, upper: float, t_upper: float, target: float, hammer: Hammer, drive: Drive
 ) -> ContactState:
-    """Return the state at the time `target` [s] in a backstop step of length `h` in s.
+    """Return the state at the time `target` [s] in a backstop step.
 
-    The search ends at the fraction `upper` of the step, where the time is `t_upper` [s].
+    The length of the step in the regularised variable s is `h`. The search ends at the fraction `upper` of
+    the step, where the time is `t_upper` [s].
     """
     t, w, v, kv = start
     low, high = 0.0, upper
@@ -191,9 +192,10 @@ def reach_time(
 
 @called
 def end_push(start: ContactState, h: float, upper: float, hammer: Hammer, drive: Drive) -> ContactState:
-    """Return the state in which the backstop ceases to push in a backstop step of length `h` in s.
+    """Return the state in which the backstop ceases to push during a backstop step.
 
-    The method is bisection; the search ends at the fraction `upper` of the step.
+    The length of the step in the regularised variable s is `h`. The method is bisection; the search ends at
+    the fraction `upper` of the step.
     """
     t, w, v, kv = start
     low, high = 0.0, upper
@@ -219,10 +221,11 @@ def contact_switch(
     drive: Drive,
     control: Control,
 ) -> tuple[int, ContactState]:
-    """Return the first event in a backstop step of length `h` in s, and the state at the event.
+    """Return the first event in a backstop step, and the state at the event.
 
-    `leaves` states whether w falls to zero within the step, so that the armature leaves the backstop. An
-    event later than `t_next` [s] is replaced by EDGE at `t_next`.
+    The length of the step in the regularised variable s is `h`. `leaves` states whether w falls to zero
+    within the step, so that the armature leaves the backstop. An event later than `t_next` [s] is replaced by
+    EDGE at `t_next`.
     """
     _t, w, v, kv = start
     switch, upper = M.NO_SWITCH, 1.0

@@ -227,9 +227,10 @@ def contact_gap_and_change(
 def land_on_gap_in_contact(
     start: Any, end: Any, electric: Electric, h: float, guess: float, hammer: Hammer, drive: Drive
 ) -> tuple[float, float, float, float, Electric]:
-    """Locate a change of the coil's conduction path in a backstop step of length `h` in s.
+    """Locate a change of the coil's conduction path in a backstop step.
 
-    The method, `guess` and `electric` are those of `land_on_gap`.
+    The length of the step in the regularised variable s is `h`. The method, `guess` and `electric` are those
+    of `land_on_gap`.
 
     Returns
     -------

@@ -320,7 +320,9 @@ def whole_contact_step(
 def contact_step(
     t0: float, w0: float, v0: float, kv0: float, h: float, hammer: Hammer, drive: Drive, scales: Any
 ) -> tuple[float, float, float, float, float]:
-    """Compute a DOP853 step of length `h` in s during backstop contact; `kv0` is dv/ds at the start.
+    """Compute a DOP853 step of the regularised variable s in backstop contact.
+
+    The length of the step is `h`; `kv0` is dv/ds at the start of the step.
 
     Returns
     -------

@@ -146,7 +146,7 @@ def most_at_rest(mode: int, held: float) -> float:
 
 @inlined
 def pack_force(x: float, v: float, mode: int, memory: float, hammer: Hammer) -> float:
-    """Return the pack force [N], equation (5) of the paper, on the branch that `mode` states, else 0."""
+    """Return the pack force [N] in `mode`, equation (5) of the paper; 0 in a mode outside the pack."""
     if mode == LOADING or (FRICTION and mode == HELD_LOADING):
         return pack_loading(hammer[PACK:BACKSTOP_PART], x, v)
     if mode in (UNLOADING, RELOADING) or (FRICTION and mode == HELD_UNLOADING):

@@ -49,7 +49,7 @@ derivative of the map by rows, four columns; all in half-widths of the window.""
 
 
 def write_guess(states: Any, scales: Any, period: int, count: int, orbit: Any, trial: Any) -> int:
-    """Write an initial guess of an orbit of `count` firings; return 0 if the states are not near an orbit.
+    """Write an initial guess of an orbit of `count` firings; return 1, or 0 if no such orbit is near.
 
     If the states alternate about the orbit, their mean is closer to the orbit than any single state.
 

@@ -241,7 +241,7 @@ def depth_and_force(t: float, node: Any, surface: int, hammer: Hammer, live: Any
 
 @compiled
 def sample_time(place: int, nodes: Any) -> float:
-    """Return the time [s] of the sample `place`, if each step has `SAMPLES` samples, from its node on."""
+    """Return the time [s] of sample number `place`; `SAMPLES` samples divide each step evenly."""
     k, j = place // SAMPLES, place % SAMPLES
     t: float = nodes[k, 0]
     return t + (nodes[k + 1, 0] - t) * j / SAMPLES if j else t

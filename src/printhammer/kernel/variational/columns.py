@@ -124,10 +124,10 @@ def column_rates(
 
 @compiled
 def longest_step(mode: int, memory: float, peak: float, work: Any, setting: Setting) -> float:
-    """Return the largest step from the state in row START of `work` that resolves growth and oscillation.
+    """Return the largest step from the state in row START of `work` that resolves a small perturbation.
 
-    The growth and oscillation are those of a small perturbation. The steps of the run may be longer, since
-    they resolve only the motion itself, which is slow near rest.
+    Near rest, a perturbation may grow or oscillate while the motion is slow; the steps of the run, which
+    resolve only the motion, may then be longer.
     """
     if HAS_CIRCUIT and mode >= RESTING:
         rate = circuit_pace(work[V.START, 0], work[V.START], setting)

@@ -167,9 +167,9 @@ def note_mark(node: Any, initial: Any, setting: Setting, carried: Carried) -> No
 
 @compiled
 def scale_or_note(factor: float, renormalise: bool, columns: Any, setting: Setting, grown: Any) -> None:
-    """Multiply the columns by exp(`factor`); with `renormalise`, orthonormalise them instead.
+    """Multiply the columns by exp(`factor`) or, with `renormalise`, orthonormalise the columns.
 
-    With `renormalise`, `factor` is added to the logarithms of growth `grown`.
+    With `renormalise`, `factor` is added to the logarithms of growth, `grown`.
     """
     if renormalise:
         for k in range(columns.shape[1]):
