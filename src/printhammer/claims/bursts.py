@@ -62,8 +62,8 @@ def onsets(context: Context) -> dict[str, float]:
     Flight times or forces vary if their spread over the dots of a burst exceeds the limit in the claim's
     settings.
 
-    The keys are "flight_time", "force" and "lost"; the key of an event that does not occur up to the first
-    lost dot is absent.
+    The keys of the result are "flight_time", "force" and "lost"; the key of an event that does not occur up
+    to the first lost dot is absent.
     """
     settings = claims()["order_of_onset"].settings
     rates, pulses = rates_of(settings), settings["pulses"]
@@ -389,7 +389,7 @@ def erratic_share(
 
 @measures("chaotic_region", *WHOLE)
 def chaotic_region(context: Context, claim: Claim) -> Measured:
-    """Measure the fraction of pairs of neighbouring firing rates below hang-up that differ in a late dot."""
+    """Measure the fraction of neighbouring firing rates, below hang-up, whose bursts differ in a late dot."""
     rates = rates_of(claim.settings)
     pulses = claim.settings["pulses"]
     dots = context.dots([PulseTrain(context.waveform, rate=rate, pulses=pulses) for rate in rates])

@@ -40,7 +40,7 @@ def scaled(points: FloatArray) -> FloatArray:
 
 
 def panels(context: Context, *, strange: bool = True) -> dict[str, FloatArray]:
-    """Compute the strobe points of each panel of Fig. 11, by panel name; `strange`: chaotic only."""
+    """Compute the strobe points of the panels of Fig. 11, by panel name; by default chaotic panels only."""
     count = claims()["poincare_window"].settings["points"]
     return {
         panel_name(period): strobe_points(context, period, count)

@@ -132,7 +132,7 @@ def poincare(context: Context, claim: Claim) -> Measured:
 
 @dataclass(frozen=True)
 class Stretch:
-    """Interval of successive strobe times [s], in descending order, with one classification."""
+    """Interval of successive strobe times [s] of a scan whose trains have the same classification."""
 
     name: str
     longest: float
@@ -141,7 +141,7 @@ class Stretch:
 
 
 def stretches(periods: Sequence[float], names: Sequence[str]) -> list[Stretch]:
-    """Group a scan of strobe times [s], in descending order, into intervals with one classification."""
+    """Group a scan of strobe times [s], in descending order, into intervals with the same classification."""
     every = []
     for name, group in itertools.groupby(zip(periods, names, strict=True), key=lambda item: item[1]):
         times = [period for period, _ in group]

@@ -218,7 +218,7 @@ class AxisTables:
             save_dataset(self.to_dataset(), path)
 
     def summary(self) -> Summary:
-        """Tabulate the pulse from rest and the worst deviation of a dot, one row per axis value."""
+        """Tabulate width and advance from rest and the largest deviation of a dot, one row per axis value."""
         columns = [
             Cells(self.axis, self.values, AXES[self.axis].unit, ".6g"),
             Cells("width from rest", [float(table.width[0, 0]) for table in self.tables], "s"),

@@ -100,7 +100,7 @@ class Feedback(Result, rows=_DOTS):
 
     @property
     def title(self) -> str:
-        """One-line title with the name of the driven hammer."""
+        """One-line title with the name of the nominal hammer."""
         return f"feedback on {self.hammer.name}"
 
     def summary(self) -> Summary:
@@ -147,7 +147,7 @@ class Feedback(Result, rows=_DOTS):
         }
 
     def plot_run(self, **options: Any) -> Figure:
-        """Plot the recorded run with the samples that the controller used; return a matplotlib figure."""
+        """Plot the recorded run with the samples that the controller used; `options` are as for `plot`."""
         return self.plot(picture="run", **options)
 
 

@@ -3,8 +3,8 @@
 At the touch the armature has a speed, and the coil is either on (a *pushed* touch) or off (a *free* touch:
 the armature was released before impact). An action then holds the coil at the push current until `release`,
 at the return current until `fire`, and at the push current again: either beyond the next touch, or for a
-width after which the armature flies freely. The printed force and the time and speed of the next touch do not
-depend on the slot rate, so one map serves all rates.
+given pulse width, after which the armature flies freely. The printed force and the time and speed of the next
+touch do not depend on the slot rate, so one map serves all rates.
 
 The tables are interpolated linearly, vectorised over touches.
 """
@@ -71,8 +71,8 @@ class ForceMap:
     def release_for(self, force: float) -> FloatArray:
         """Return the release times [s] that give the peak force `force`, relative to the single pulse.
 
-        The result has one row per touch and one column per return current. It is 0 if the touch exceeds the
-        force without a push, and NaN if no push gives the force.
+        The result has one row per touch and one column per return current. A release time is 0 if the touch
+        exceeds the force without a push, and NaN if no push gives the force.
         """
         releases = np.full(self.force.shape[:2], np.nan)
         for place in np.ndindex(releases.shape):

@@ -89,7 +89,7 @@ class Driver(Declared):
         read_positive(self.edge, "s", "edge of the driver")
 
     def switched(self, at: Sequence[float], levels: Sequence[float], initial: float = 0.0) -> Switched:
-        """Return the current waveform that changes to `levels` [A] at the times `at` [s]."""
+        """Return the waveform of a current that changes from `initial` to `levels` [A] at times `at` [s]."""
         return Switched(at=tuple(at), levels=tuple(levels), edge=self.edge, initial=initial)
 
     def push(self, width: float) -> Switched:
@@ -150,7 +150,7 @@ _FARTHEST: Final = 5.0
 
 @dataclass
 class Pulse:
-    """A firing of the closed loop, with the current switchings decided so far.
+    """A firing of the closed loop, with the switchings of the coil current that are decided so far.
 
     The commanded coil current changes to `levels` [A] at the times `at` [s].
     """

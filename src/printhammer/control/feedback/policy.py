@@ -218,8 +218,8 @@ class Policy:
     ) -> tuple[IntArray, FloatArray, Choice]:
         """Select the action of least cost for each of M touches.
 
-        Returns, in this order: the index of the action and its cost for each touch; and the outcomes of all
-        actions.
+        Returns, in this order: the index of the selected action for each touch; the cost of this action for
+        each touch; and the outcomes of all actions.
 
         The touches have a `kind`, a lateness `late` [s] and a `speed` [m/s]. The next dot is due after `wait`
         [s], and `after` dots follow between the next dot and a rest. The pack is `front` farther away than

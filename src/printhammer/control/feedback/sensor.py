@@ -100,7 +100,7 @@ class PositionSensor(Declared):
 
 
 def normal(seed: int, runs: Words, numbers: IntArray) -> FloatArray:
-    """Return standard normal numbers that are a pure function of seed, run and index.
+    """Return normally distributed pseudo-random numbers, each a pure function of seed, run and sample index.
 
     The bits come from the generator splitmix64 (G. L. Steele, D. Lea, C. H. Flood, OOPSLA 2014), whose state
     combines the three arguments; the inverse normal distribution maps them to normal numbers.

@@ -114,7 +114,7 @@ _WEAKER: Final = 0.03  # Change of the current scale for the finite difference; 
 
 @dataclass(frozen=True)
 class Launch:
-    """Launch from rest: width of the push, time and speed of the touch, and their sensitivities."""
+    """Launch from rest: width of the push, time and speed of the touch, and sensitivities to the current."""
 
     width: float  # Width of the push, s
     flight: float  # Time from firing to touch, s

@@ -105,7 +105,7 @@ class Belief:
         return cls(chosen, weights[kept] / weights[kept].sum())
 
     def moments(self) -> tuple[FloatArray, FloatArray]:
-        """Compute means and standard deviations over all modes, each of shape (constants,)."""
+        """Compute the mean and the standard deviation of each constant over all modes."""
         means = np.array([mode.mean for mode in self.modes])
         spread = np.array([np.diag(mode.covariance) for mode in self.modes])
         mean = self.weights @ means

@@ -103,7 +103,7 @@ class Adjustable:
 
     @property
     def open_loop(self) -> FloatArray:
-        """Settings of the open loop, shape (4, entries): the same pulse at every slot."""
+        """Table settings of the open loop: the same pulse at every slot, without advance or brake pulse."""
         settings = np.zeros_like(self.base)
         settings[WIDTH] = self.task.width
         return settings
@@ -115,13 +115,13 @@ class Adjustable:
         return [plain] if self.own is None else [plain, self.own]
 
     def limited(self, before: FloatArray, change: FloatArray) -> FloatArray:
-        """Return the corrections `before` + `change`, with the resulting settings clipped to all bounds."""
+        """Return the corrections `before` + `change`, reduced where a setting would exceed its bounds."""
         after = before + np.clip(change, -_LARGEST, _LARGEST)
         rows, columns = self.inputs
         return np.asarray((self._clip(self._raw(after)) - self.base)[rows, columns] / STEP)
 
     def started_from(self, base: FloatArray) -> Adjustable:
-        """Return a copy whose base settings are `base`, shape (4, entries), clipped to all bounds."""
+        """Return a copy whose base settings are the table settings `base`, clipped to all bounds."""
         # Unlike entries of the first table, entries of this table may not stay beyond a bound.
         strict, own = base.copy(), base.copy()
         strict[ADVANCE] = -np.inf
@@ -129,7 +129,7 @@ class Adjustable:
         return replace(self, base=replace(self, base=strict)._clip(own))
 
     def settings(self, corrections: FloatArray) -> FloatArray:
-        """Compute the settings, shape (4, entries), with corrections, shape (inputs,)."""
+        """Return the table settings that result from adding `corrections` to the base settings."""
         shared = shared_numbers(self.task.gaps, self.task.reach)
         return np.asarray(self._raw(corrections)[:, shared])
 
@@ -163,7 +163,7 @@ class Adjustable:
 RUNS: Final = (1, 1, 2, 4, 8, 24)  # Number of runs of each stage; arbitrary
 GATE: Final = 3.0  # Deviations are clipped at this multiple of the limits; arbitrary
 _DAMPING: Final = 1e-3
-"""Regularisation of G+: mean square deviation, normalised by the limits, per `STEP`; arbitrary."""
+"""Regularisation of G+: mean square normalised deviation that costs as much as one `STEP`; arbitrary."""
 _STEEP: Final = 2.0  # Weight of the quartic term of the objective relative to the quadratic term; arbitrary
 _SIZES: Final = (1.0, 0.5, 0.2)  # Step fractions of the line search; arbitrary
 _NEWTON: Final = 10  # Iteration limit of the law on simulated hammers after a stage; arbitrary
@@ -268,7 +268,7 @@ class LearningLaw:
 
     @property
     def alone(self) -> float:
-        """Certainty of the choice of open loop before readings in all loops: NaN, or 1 for a single loop."""
+        """Certainty of the choice of open loop without readings in both: NaN, or 1 if there is only one."""
         return 1.0 if len(self.entries.loops) == 1 else float("nan")
 
     def update(self, belief: Belief, corrections: FloatArray, unexplained: FloatArray) -> Printing[Update]:
@@ -401,7 +401,7 @@ class LearningLaw:
         return np.clip(np.nan_to_num(np.concatenate(off, axis=1), nan=GATE), -GATE, GATE)
 
     def _mean_deviations(self, unit: _Unit, corrections: Sequence[FloatArray]) -> Printing[FloatArray]:
-        """Compute the mean of `_off` over the posterior modes, plus the model error, a row per correction."""
+        """Compute the deviations of `_off`, averaged over the posterior modes, plus the model error."""
         hammers = [hammer for _ in corrections for hammer in unit.hammers]
         rows = [row for row in corrections for _ in unit.hammers]
         off = yield from self._off(hammers, rows)
@@ -409,7 +409,7 @@ class LearningLaw:
         return np.asarray(np.einsum("m,kmd->kd", unit.weights, by_hammer) + unit.more)
 
     def _slopes(self, hammer: Hammer, corrections: FloatArray) -> Printing[FloatArray]:
-        """Compute the sensitivity G of the deviations to the corrections, a column each, by differences."""
+        """Compute the sensitivity G of the deviations (rows) to the corrections (columns) by differences."""
         rows = [corrections, *(corrections + np.eye(len(corrections)))]
         off = yield from self._off([hammer] * len(rows), rows)
         return np.asarray((off[1:] - off[0]).T)
@@ -438,7 +438,7 @@ class LearningLaw:
         return Verdict(gains, loops[chosen], most, float(good.mean()), every, self.alone)
 
     def _leads(self, share: FloatArray, others: FloatArray) -> bool:
-        """Whether a drive with the fractions `share` of good dots is better than all others, in both senses.
+        """Whether a drive is better than all others; `share` and `others`: fractions of good dots by sample.
 
         The mean gain is at least `_GAIN`, and at most a fraction `doubt` of the samples print fewer dots.
         """

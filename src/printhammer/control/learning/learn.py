@@ -38,7 +38,7 @@ from printhammer.support.threads import together
 
 
 class Progress(NamedTuple):
-    """State of the units after a number of dots: evaluated dots, last test line, and decisions."""
+    """State of all units after `dots` printed dots: evaluated dots, last test line, and decisions."""
 
     dots: int
     cycle: Judgement  # Evaluation of the dots of `PRINTED`
@@ -132,7 +132,7 @@ def calibrate(
 def table_of(learner: Learner, base: CompensationTable, driver: str, hammer: Hammer) -> CompensationTable:
     """Convert the drive selected by a learner (a table or an open loop) to a table for a hammer.
 
-    `base` is the starting table, tuned for the hammer with the driver `driver` of its coil.
+    `base` is the starting table, tuned for the hammer with the coil driver `driver`.
     """
     entries = {key: row[np.newaxis] for key, row in zip(COLUMNS, learner.printed, strict=True)}
     unknown = np.full_like(base.deviation, np.nan)

@@ -79,7 +79,7 @@ class Learner:
 
     @property
     def settings(self) -> FloatArray:
-        """Settings of the next test line, shape (4, entries)."""
+        """Table settings of the next test line; see `Adjustable`."""
         entries = self.law.entries
         return entries.settings(self.corrections) if self.stage else entries.open_loop
 
@@ -90,7 +90,7 @@ class Learner:
 
     @property
     def printed(self) -> FloatArray:
-        """Settings of the drive in use, table or open loop, shape (4, entries)."""
+        """Table settings of the drive in use, a learned table or an open loop; see `Adjustable`."""
         return self.settings if self.learned else self.verdict.loop.settings
 
     @property

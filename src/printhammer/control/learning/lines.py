@@ -165,7 +165,7 @@ def choose(
     Parameters
     ----------
     times
-        Candidate rungs, and the impact times of their dots, normalised by the limit, shape (members, dots).
+        Candidate rungs, and the impact times of their dots over the arrival limit, shape (members, dots).
     line
         Surrogates of the impact times of a line in open loop.
     force
@@ -173,7 +173,7 @@ def choose(
     rows
         Constants of simulated hammers (members), in prior standard deviations, shape (members, constants).
     noise, offset
-        Standard deviations of a single time reading and of the sensor's offset, normalised by the limit.
+        Standard deviations of a single time reading and of the sensor's offset, over the arrival limit.
     """
     points, variance = rows[:_POINTS], noise**2 / _RUNS
     wanted = np.pad(force.gradient(points), ((0, 0), (0, 1)))

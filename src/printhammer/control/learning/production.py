@@ -71,7 +71,7 @@ class Production:
 
     @property
     def noise(self) -> FloatArray:
-        """Standard deviation of a time reading and, if measured, of a force reading, over the limits."""
+        """Standard deviations of a time and, if measured, a force reading, normalised by the limits."""
         limits = self.task.limits
         return np.array([self.sensor.noise / limits.arrival, (self.sensor.force or 0.0) / limits.force])[
             : self.measured

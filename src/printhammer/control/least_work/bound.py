@@ -33,7 +33,7 @@ from printhammer.support.roots import bisect
 
 _POINTS: Final = 4001  # Quadrature points over the displacement; arbitrary
 _CURRENTS: Final = 17  # Number of currents that are searched for the largest force; arbitrary
-_SPEEDS: Final = 32  # Impact speeds at the backstop; arbitrary
+_SPEEDS: Final = 32  # Number of impact speeds at the backstop; arbitrary
 _STROBES: Final = 4001  # Samples of each undriven rebound; arbitrary
 
 

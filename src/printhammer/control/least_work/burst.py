@@ -86,7 +86,7 @@ class NoBurstError(PrinthammerError):
 
 
 class SupplyCheck(Declared):
-    """Dots of a burst with all currents scaled by 1 + c, for n values of c: arrays of shape (n,)."""
+    """Dots of a burst with all currents scaled by 1 + c: arrays with one element per value of c."""
 
     changes: FloatArray = part("relative change of every current: 0.03 for 3 % more")
     adequate: IntArray = part(

@@ -126,7 +126,7 @@ def best_of(
 
 
 def sobol(dimensions: int, count: int) -> FloatArray:
-    """Return the first points of an unscrambled Sobol sequence, shape (count, dimensions), in [0, 1)."""
+    """Return the first `count` points of an unscrambled Sobol sequence in [0, 1), one point per row."""
     from scipy.stats import qmc
 
     return np.asarray(qmc.Sobol(dimensions, scramble=False).random(count))
@@ -144,7 +144,7 @@ _REACH, _SHRINKS = 0.25, 0.7
 def printing_profile(
     shares: FloatArray, largest: float, duration: float, arrival: float, nodes: int
 ) -> FloatArray:
-    """Return currents [A], shape (n, nodes), that brake, hold and throw the armature.
+    """Return the currents [A] of n profiles that brake, hold and throw the armature, shape (n, nodes).
 
     `shares`, shape (n, `PRINTING_SHARES`), in [0, 1], set three current levels and two switching times.
     `largest` is the current limit, A; the slot lasts `duration`, and its dot is due at `arrival`, both in s.
@@ -157,10 +157,11 @@ def printing_profile(
 
 
 def landing_profile(shares: FloatArray, largest: float, duration: float, nodes: int) -> FloatArray:
-    """Return currents [A], shape (n, nodes - 1), that brake the armature and lower it onto the backstop.
+    """Return the currents [A] of n profiles that brake the armature and lower it onto the backstop.
 
     The arguments are as for `printing_profile`, but `shares` has the shape (n, `LANDING_SHARES`) and sets two
-    current levels and two switching times. The last node, where the current is zero, is omitted.
+    current levels and two switching times. The result has the shape (n, nodes - 1): the last node, where the
+    current is zero, is omitted.
     """
     caught = 0.7 * duration * shares[:, 2]
     landed = caught + shares[:, 3] * (duration - caught)

@@ -96,7 +96,7 @@ class _NodeDrive(Drive):
 
 @dataclass(frozen=True)
 class Outcomes:
-    """Outcomes of many trial currents in a slot: arrays of shape (M,)."""
+    """Outcomes of many trial currents in a slot: arrays with one element per current."""
 
     # Coil work, J, accurate to about 1e-4 relative
     positive: FloatArray
@@ -112,7 +112,7 @@ class Outcomes:
 
 
 def node_times(duration: float, nodes: int) -> FloatArray:
-    """Return the times of the current nodes of a slot, s, relative to its start; the first is 0."""
+    """Return the times of the nodes of a slot's current, s after the start of the slot; the first is 0."""
     return np.linspace(0.0, duration, nodes + 1)
 
 
@@ -163,7 +163,7 @@ class Task:
         )
 
     def end(self, begin: SlotState, currents: FloatArray, duration: float) -> SlotState:
-        """Return the state at the end of a slot with given nodal currents [A], as in a row of `run`."""
+        """Return the state at the end of a slot; `currents` are nodal currents [A], as a row in `run`."""
         path = np.concatenate([[begin.current], currents])[np.newaxis]
         ensemble = self._ensemble(begin, path, duration, self.tolerance)
         return end_of(ensemble, duration, float(currents[-1]))

@@ -57,17 +57,17 @@ class Draft:
 
     @property
     def timing(self) -> FloatArray:
-        """Advance and width of all entries, s, shape (2, rates, entries); a view."""
+        """Advance and width of all entries, s, shape (2, rates, entries); a view of `values`."""
         return self.values[:2]
 
     @property
     def brakes(self) -> FloatArray:
-        """Delay and width of the brake pulses, s, shape (2, rates, entries); a view."""
+        """Delay and width of the brake pulses, s, shape (2, rates, entries); a view of `values`."""
         return self.values[2:4]
 
     @property
     def deviation(self) -> FloatArray:
-        """Deviation of each entry, as a fraction of the limits, shape (rates, entries); a view."""
+        """Deviation of each entry as a fraction of the limits, shape (rates, entries); a view of `values`."""
         return np.asarray(self.values[4])
 
     @property
@@ -76,7 +76,7 @@ class Draft:
         return np.asarray(self.deviation.max(axis=1))
 
     def rows(self, which: IntArray) -> Draft:
-        """Return a copy with the rates selected by `which`."""
+        """Return a copy that contains only the rates with the indices `which`."""
         return Draft(self.task, self.rates[which], self.values[:, which])
 
     def table(self) -> CompensationTable:

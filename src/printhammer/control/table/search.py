@@ -112,7 +112,7 @@ def _is_barred(task: Task, ways: Ways) -> BoolArray:
 
 
 def spaced(periods: FloatArray, spacing: float) -> list[float]:
-    """Return a subset of the periods that are at least `spacing` apart, including the first and the last."""
+    """Select periods that are at least `spacing` [s] apart, including the first and the last period."""
     nodes: list[float] = []
     for period in periods.tolist():
         if not nodes or period >= nodes[-1] + spacing or period == float(periods[-1]):

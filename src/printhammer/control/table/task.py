@@ -164,8 +164,8 @@ class Task:
     ) -> tuple[FloatArray, BoolArray]:
         """Simulate drives; return deviations from the single-pulse dot, and a mask of extra contacts.
 
-        The drives have a firing for each of `slots` (drives, dots), the slot times [s], NaN-padded; a
-        simulation continues for `tail` after `ends` (drives,), s.
+        Row k of `slots` contains the slot times [s] of the dots of drive k, padded with NaN. The simulation
+        of drive k continues for `tail` after the time `ends[k]` [s].
 
         Returns
         -------

@@ -345,7 +345,7 @@ def _failed_brakes(draft: Draft) -> tuple[tuple[float, float, float], ...]:
 def _tune_rows(
     task: Task, rates: FloatArray, *, open_ended: bool = False, around: FloatArray | None = None
 ) -> Draft:
-    """Tune rows for the given rates; an entry without a solution has an infinite deviation.
+    """Tune a table row for each of the given rates; an entry without a solution has an infinite deviation.
 
     An `open_ended` draft ends below the first rate without a solution. `around` are offsets [s] from each
     period to additional periods at which candidates are searched.
@@ -381,13 +381,13 @@ def _tune_rows(
 
 
 def _periods(rates: FloatArray, reach: int, single: Single) -> FloatArray:
-    """Return all times between two dots in which the hammer does not come to rest, s, ascending."""
+    """Return all times of 1 to `reach` slots in which the hammer does not come to rest, s, ascending."""
     every = np.arange(1, reach + 1) / rates[:, np.newaxis]
     return np.unique(every[every <= single.settled])
 
 
 def _usable(draft: Draft) -> int:
-    """Return the number of consecutive rates, from the lowest upward, that are well within the limits."""
+    """Return the number of consecutive rates, from the lowest, with all deviations well within the limits."""
     bad = np.flatnonzero(~(draft.worst <= _USABLE))
     if bad.size and bad[0] == 0:
         raise InputError(

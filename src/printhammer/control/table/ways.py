@@ -156,7 +156,7 @@ class Ways(NamedTuple):
 
     @property
     def settings(self) -> FloatArray:
-        """Advance, width, and delay and width of the brake pulse, s, shape (4, ways)."""
+        """Rows of advance and width of the dot's pulse, and delay and width of the brake pulse, s."""
         return np.stack([self.period - self.fired, self.width, self.delay, self.brake])
 
     def take(self, which: Any) -> Ways:
@@ -175,13 +175,13 @@ def joined(parts: Iterable[Ways]) -> Ways:
 
 
 def ways_of(cells: Sequence[tuple[float, float, float, float, float]]) -> Ways:
-    """Create candidates from tuples of period, delay, brake, firing time and width, with infinite cost."""
+    """Create candidates of infinite cost from (period, brake delay, brake width, firing time, width), s."""
     period, delay, brake, fired, width = np.array(cells, dtype=np.float64).reshape(-1, 5).T
     return Ways(period, delay, brake, fired, width, np.full(period.size, np.inf))
 
 
 def fits(task: Task, ways: Ways) -> BoolArray:
-    """Return a mask of the candidates whose firing times are between the earliest and the latest time."""
+    """Return a mask of the candidates with admissible firing times; see `Task.earliest`, `Task.latest`."""
     first, last = task.earliest(ways.delay, ways.brake), ways.period + task.latest(ways.width)
     return np.asarray((ways.fired >= first - _ROUNDING) & (ways.fired <= last + _ROUNDING))
 
@@ -268,7 +268,7 @@ def growths(task: Task, ways: Ways) -> FloatArray:
 
 
 def seconds(task: Task, ways: Ways) -> FloatArray:
-    """Simulate each candidate's second dot; return normalised force and arrival errors, shape (ways, 2)."""
+    """Simulate each candidate's second dot; return its normalised deviations of force and arrival."""
     return _deviations(task, task.hammers[0], ways, rows_of(task, ways, 2))[:, 1]
 
 
