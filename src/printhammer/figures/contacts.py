@@ -106,7 +106,7 @@ def _trace(ax: Axes, motion: Motion, name: str, row: int, end: float, time: Scal
 
 
 def _mark(ax: Axes, timing: Timing, row: int, time: Scale) -> None:
-    """Write operate and release times, and the bounce times, beside the trace of a contact."""
+    """Write operate and release times, and the bounce times, beside the contact's trace at height `row`."""
     phases = (
         (timing.switched_on, timing.operate_time, timing.operate_bounce),
         (timing.switched_off, timing.release_time, timing.release_bounce),

@@ -42,7 +42,7 @@ _TOGETHER: Final = 1_000_000  # Pixels computed at once, which bounds the memory
 
 @dataclass(frozen=True)
 class Sheet:
-    """Rectangle of paper to draw: left and right edge, measured to the right; top and bottom, downward; m."""
+    """Rectangle of paper to draw: coordinates of its edges [m], measured to the right and downward."""
 
     left: float
     right: float

@@ -393,7 +393,7 @@ class Fired:
     drives : sequence of Drive
         Drives of all members.
     forms, form_of : list of Form; int array, shape (members,)
-        Distinct forms, and the index for each member.
+        Distinct forms, and for each member the index of the form of its drive.
     firings : Ragged
         Firing times of the members, s.
     begins : int array, shape (all firings,)

@@ -129,7 +129,7 @@ def announce_compiling(callback: Callable[[str], None], *, helped: bool = True) 
 
 
 def watch_compiling(callback: Callable[[bool], None]) -> None:
-    """Register a callback for the beginning (true) and the end (false) of every compilation."""
+    """Register a callback, called with True when a compilation begins, and with False when it ends."""
     from printhammer.kernel.compile import cache
 
     cache.watchers.add(callback)

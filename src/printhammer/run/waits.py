@@ -39,9 +39,9 @@ def windows_of(
 ) -> tuple[FloatArray, FloatArray]:
     """Compute the window of each run by ensembles; return windows and flight times [s] as in `Window`.
 
-    One hammer and one waveform for each run, shape (runs,); equal objects are simulated once. Devices whose
-    armature does not rest clear of a pack are simulated one by one: most of the work is then the search for
-    the rest position.
+    `hammers` and `waveforms` have one entry per run, and the returned arrays the shape (runs,); equal objects
+    are simulated once. Devices whose armature does not rest clear of a pack are simulated one by one: most of
+    the work is then the search for the rest position.
     """
     places: dict[tuple[int, int], int] = {}
     pairs: list[tuple[Hammer, Waveform]] = []

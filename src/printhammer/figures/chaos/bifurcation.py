@@ -194,7 +194,10 @@ def _orbit(ax: Axes, diagram: Bifurcation, orbit: Any, show: str, across: Scale,
 def _insert_crossings(
     values: FloatArray, states: FloatArray, size: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Insert points where the interpolated modulus `size` of the multiplier is 1; return all three arrays."""
+    """Insert points into a branch where the interpolated modulus of the multiplier is 1.
+
+    Return the arrays of parameter values, states, and moduli (`size`), with the points inserted.
+    """
     at = np.flatnonzero((size[1:] < 1.0) != (size[:-1] < 1.0))
     share = (1.0 - size[at]) / (size[at + 1] - size[at])
     middle = values[at] + share * (values[at + 1] - values[at])

@@ -198,7 +198,10 @@ def key(ax: Axes, chart: xr.Dataset) -> None:
 
 
 def colour_bar(ax: Axes, chart: xr.Dataset, scales: Scales) -> None:
-    """Draw the colour bar, with backstop, pack and platen marked; displacements not reached are white."""
+    """Draw the colour bar, with backstop, pack and platen marked.
+
+    The bar is white outside the range of displacements in the maps.
+    """
     from matplotlib import colormaps
 
     way = scales.way

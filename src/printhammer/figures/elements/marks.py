@@ -290,7 +290,7 @@ def arrows(
 def firings(ax: Axes, times: Iterable[float], shown: Scale, color: str = BLUE, foot: float = 0.022) -> None:
     """Mark firing times [s] by small triangles near the lower edge of the axes.
 
-    `shown` is the scale of the time axis, and `foot` the height of the triangles, as a fraction of the axes.
+    `shown` is the scale of the time axis, and `foot` the height of their centres, as a fraction of the axes.
     """
     at = [float(shown.shown(t)) for t in times]
     how = {"transform": ax.get_xaxis_transform(), "clip_on": False, "zorder": 5.0, "gid": "firings"}

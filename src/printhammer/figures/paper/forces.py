@@ -336,7 +336,10 @@ def _colours(count: int) -> list[str]:
 def _label_curves(
     ax: Axes, x: FloatArray, lines: FloatArray, curves: dict[str, FloatArray], further: list[FloatArray]
 ) -> None:
-    """Label each of `curves` far from the other curves, the curves `further`, and the position lines."""
+    """Label each of `curves` far from the other curves, the curves `further`, and the position lines.
+
+    `x` are the abscissas of all curves, and `lines` those of the vertical position lines, in data units.
+    """
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
     across = (x - left) / (right - left)
     up = {name: (values - bottom) / (top - bottom) for name, values in curves.items()}

@@ -296,7 +296,7 @@ class Page(Result, rows="dot"):
 
     @property
     def places(self) -> tuple[FloatArray, FloatArray]:
-        """Position of each dot, m: from the centre of slot 0 to the right, from the topmost wire down."""
+        """Position of each dot, m: to the right of the centre of slot 0, downward from the topmost wire."""
         across, down = self.intended
         return np.asarray(across + self.placement_error), down
 
@@ -319,7 +319,7 @@ class Page(Result, rows="dot"):
 
     @property
     def fault_counts(self) -> dict[str, int]:
-        """Number of dots by the name of their first fault."""
+        """Number of dots with each kind of first fault, by the name of the fault."""
         return {name: int((self.fault == number).sum()) for number, name in enumerate(FAULTS)}
 
     def worst_place(self, slots: int) -> tuple[int, int]:

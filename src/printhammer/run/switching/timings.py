@@ -58,8 +58,8 @@ class Timing(Declared):
 def off_after(waveform: Waveform) -> float:
     """Return the time from a firing to the switch-off of its drive, s; infinity for an endless drive.
 
-    A driver is switched off at the end of its width, a trapezoid where its fall begins, a pulse without a
-    width at its end.
+    Switch-off is at the end of the width of a driver, at the start of the fall of a trapezoid, and at the end
+    of a pulse without a width.
     """
     if isinstance(waveform, Trapezoid):
         return waveform.rise + waveform.width
