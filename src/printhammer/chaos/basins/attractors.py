@@ -161,7 +161,7 @@ class Attractors:
         return places
 
     def _periodic(self, orbits: FloatArray) -> IntArray:
-        """Return the indices in `found` of orbits of q firings, shape (n, q, 2); append new orbits to it."""
+        """Return the indices in `found` of orbits of q firings, shape (n, q, 2); append new orbits first."""
         q = orbits.shape[1]
         places = self._known(orbits)
         while (left := np.flatnonzero(places < 0)).size:

@@ -125,8 +125,8 @@ def basin_entropy(labels: npt.ArrayLike, *, box: SupportsIndex = BOX) -> BasinEn
 def uncertainty_exponent(labels: npt.ArrayLike) -> float:
     """Estimate the uncertainty exponent of the basin boundaries from a plane of attractor labels.
 
-    Two cells at a distance e lead to different attractors in a fraction of all pairs that grows as e^a; a is
-    the uncertainty exponent. It is fitted as the slope of the logarithm of this fraction against log e, for
+    The fraction of pairs of cells at a distance e that lead to different attractors grows as e^a; a is the
+    uncertainty exponent. It is fitted as the slope of the logarithm of this fraction against log e, for
     distances of 1, 2, 4, ... cells in either direction, up to an eighth of the shorter side. The dimension of
     the boundary is 2 - a, so that a is 1 for a smooth boundary and less for a fractal boundary (S. W.
     McDonald, C. Grebogi, E. Ott and J. A. Yorke, Physica D 17 (1985) 125). Cells without a known attractor

@@ -188,7 +188,7 @@ class TwoPulseDrive(Drive):
     def firings(apart: float, gap: float) -> FloatArray:
         """Compute the four firing times [s]: two before the run, and the two firings that print the dots.
 
-        `apart` is the distance of the two pulses in the waveform, `gap` the time between the last two
+        `apart` is the time between the two pulses in the waveform, `gap` the time between the last two
         firings; both in seconds.
         """
         return np.array([gap, apart, 2.0 * apart, 2.0 * apart + gap])

@@ -102,7 +102,7 @@ class Route(Declared):
 
 
 def cells(values: FloatArray) -> FloatArray:
-    """Compute the width of the interval that each parameter value represents: halfway to its neighbours."""
+    """Compute the width of the interval that each value represents, halfway to either neighbouring value."""
     if len(values) < 2:
         return np.zeros(len(values))
     edges = np.concatenate([values[:1], 0.5 * (values[1:] + values[:-1]), values[-1:]])
@@ -404,7 +404,7 @@ class Bifurcation(Result, rows="direction column"):
 
 
 def hysteresis(diagram: Bifurcation) -> BoolArray:
-    """Return the mask of the parameter values at which rising and falling parameter lead to two attractors.
+    """Return the mask of the values at which a rising and a falling parameter lead to different attractors.
 
     Two periodic attractors differ if their periods differ or their orbits are farther apart than
     `printhammer.chaos.bifurcation.builder.SAME`. An aperiodic attractor differs from every periodic
