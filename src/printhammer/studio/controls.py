@@ -43,7 +43,7 @@ _INCHES: Final = {"um": "mil", "mm": "in", "m": "in"}
 _SLOW: Final = 2e-3
 """Pulse width above which the page shows times in ms, s; arbitrary."""
 
-_WIDE: Final = 3e-3
+_WIDE: Final = 1e-3
 """Stroke above which the page shows lengths in mm, m; arbitrary."""
 
 _SHARE: Final = 0.2

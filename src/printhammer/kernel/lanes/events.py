@@ -212,7 +212,7 @@ def note_strobes(
         kept = pool[R.PEAK * R.BLOCK + i]
     edges_at(t0, train)
     while strobe < times.size and (times[strobe] < until or (last and times[strobe] == until)):
-        x, v, _w = state_in_step(times[strobe], t0, x0, v0, mode, kept, hammer, train.live)
+        x, v, _w, _electric = state_in_step(times[strobe], t0, x0, v0, mode, kept, hammer, train.live)
         strobes[strobe, 0] = x
         strobes[strobe, 1] = v
         strobes[strobe, 2] = mode

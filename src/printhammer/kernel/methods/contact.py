@@ -13,7 +13,7 @@ from printhammer.kernel.model.layout import BACKSTOP_PART, INVERSE_MASS, MAGNET,
 
 if TYPE_CHECKING:
     from printhammer.kernel.methods.crossing import closes, contact_gap_and_change, land_on_gap_in_contact
-    from printhammer.kernel.methods.dop853 import contact_state, whole_contact_step
+    from printhammer.kernel.methods.dop853 import contact_end, contact_state, whole_contact_step
     from printhammer.kernel.model.circuit import (
         Electric,
         electric_rates,
@@ -90,7 +90,7 @@ def s_at(t: float, t0: float, w0: float, v0: float, kv0: float, hammer: Hammer, 
         s += change
         if abs(change) <= 1e-15 * s:
             break
-        t1, w1, v1, kv1, _electric = contact_state(t0, w0, v0, kv0, s, hammer, drive)
+        t1, w1, v1, kv1, _electric = contact_end(t0, w0, v0, kv0, s, hammer, drive)
     return s
 
 

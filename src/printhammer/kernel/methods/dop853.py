@@ -349,3 +349,17 @@ def contact_state(
     """
     t, w, v, kv, _error, electric = whole_contact_step(t0, w0, v0, kv0, h, hammer, drive, M.ANY_SCALES)
     return t, w, v, kv, electric
+
+
+@inlined
+def contact_end(
+    t0: float, w0: float, v0: float, kv0: float, h: float, hammer: Hammer, drive: Drive
+) -> tuple[float, float, float, float, Electric]:
+    """Return the result of `contact_state`; without a circuit, the function is inlined.
+
+    For functions that evaluate every point of a record.
+    """
+    if HAS_CIRCUIT:
+        return contact_state(t0, w0, v0, kv0, h, hammer, drive)
+    t, w, v, kv, _error, electric = whole_contact_step(t0, w0, v0, kv0, h, hammer, drive, M.ANY_SCALES)
+    return t, w, v, kv, electric

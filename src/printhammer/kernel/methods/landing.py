@@ -84,11 +84,15 @@ def whole_step(
 
 
 @called
-def shared_step(
+def state_after(
     t: float, x: float, v: float, a: float, h: float, law: ForceLaw
-) -> tuple[float, float, float, float, float, Electric, float]:
-    """Compute `whole_step` in machine code shared by all callers, which keeps the kernel short."""
-    return whole_step(t, x, v, a, h, law)
+) -> tuple[float, float, float]:
+    """Return position [m], velocity [m/s] and acceleration [m/s^2] after a step of `h` [s] off the backstop.
+
+    The machine code is shared by all callers, which keeps the kernel short, and omits the error estimates.
+    """
+    x1, v1, a1, _error_x, _error_v = plain_step(t, x, v, a, h, law)
+    return x1, v1, a1
 
 
 @compiled
@@ -147,7 +151,7 @@ def land_on_level(
     negligible = 1e-15 * control[0]
     for _ in range(80):
         step = fraction * h
-        x1, v1, a1, _ex, _ev, _electric, _ee = shared_step(t, x, v, a, step, law)
+        x1, v1, a1 = state_after(t, x, v, a, step, law)
         gap = level - x1
         if sign * gap < 0.0:
             high = fraction
@@ -177,7 +181,7 @@ def land_on_reversal(
     negligible = 1e-8 * control[1]
     for _ in range(80):
         step = fraction * h
-        x1, v1, a1, _ex, _ev, _electric, _ee = shared_step(t, x, v, a, step, law)
+        x1, v1, a1 = state_after(t, x, v, a, step, law)
         if sign * v1 > 0.0:
             low = fraction
         else:
@@ -263,7 +267,7 @@ def land_on_push(start: State, end: State, cut: bool, law: ForceLaw, control: Co
             at = 0.5 * (low + high)
             if not (low < at < high):
                 break
-        x2, v2, a2, _ex, _ev, _electric, _ee = shared_step(t, x, v, a, at * h, law)
+        x2, v2, a2 = state_after(t, x, v, a, at * h, law)
         gap = push_gap(cut, start, x2, v2, law)
         if gap < 0.0:
             high, high_gap, x1, v1, a1 = at, gap, x2, v2, a2
@@ -439,7 +443,7 @@ def advance(
         if LEVELS and h > shortest and end[0] > t and is_near_level(x, end[1], law.hammer):
             # Near a kink, a law may be a fractional power of the distance: the error of the step is then as
             # large as its estimate, and must meet the smaller tolerance.
-            _x, _v, _a, error_x, error_v, _electric, error_e = shared_step(t, x, v, a, end[0] - t, law)
+            _x, _v, _a, error_x, error_v, _electric, error_e = whole_step(t, x, v, a, end[0] - t, law)
             worst = max(abs(error_x) / control[0], abs(error_v) / control[1], error_e)
             if worst > control[3]:
                 h *= 0.5

@@ -35,9 +35,10 @@ from printhammer.kernel.model.layout import (
 
 if TYPE_CHECKING:
     from printhammer.kernel.methods.contact import contact_rate, s_at
-    from printhammer.kernel.methods.dop853 import contact_state
+    from printhammer.kernel.methods.dop853 import contact_end
     from printhammer.kernel.model.circuit import (
         coil_current,
+        driven,
         kind_of,
         magnetising_current,
         path_of,
@@ -56,7 +57,7 @@ if TYPE_CHECKING:
         spring_level,
     )
     from printhammer.kernel.model.pulses import Drive, edges_at, pass_edges
-    from printhammer.kernel.single.resample import drive_at, drive_in_step, memory_of, state_in_step
+    from printhammer.kernel.single.resample import drive_at, memory_of, state_in_step
 
 POINTS = (
     0.9602898564975363,
@@ -224,7 +225,7 @@ def quadratures(
             place = 0.5 * (low + high) + 0.5 * (high - low) * point
             share = 0.5 * (high - low) * weight
             if regular:
-                t, w, v, _kv, _electric = contact_state(t0, kept, v0, kv0, place, hammer, start)
+                t, w, v, _kv, electric = contact_end(t0, kept, v0, kv0, place, hammer, start)
                 x = hammer[POSITION] - w * w
                 share *= 2.0 * w
             else:
@@ -232,8 +233,8 @@ def quadratures(
                 if VISCOUS and side != 0.0:
                     t = kink + side * place * place
                     share *= 2.0 * side * place
-                x, v, w = state_in_step(t, t0, x0, v0, mode, kept, hammer, start)
-            drive = drive_in_step(t, nodes[i], hammer, start)
+                x, v, w, electric = state_in_step(t, t0, x0, v0, mode, kept, hammer, start)
+            drive = driven(train.live, electric)
             coil, force, pack, backstop, damping = powers(t, x, v, w, mode, memory, hammer, drive)
             out[row, 0] += share * coil
             out[row, 1] += share * force
@@ -246,6 +247,6 @@ def quadratures(
                     out[row, 5 + k] += share * terms[k]
         if mode == M.BACKSTOP_RELEASED:
             # The energy still stored in a released backstop is dissipated while the backstop recovers.
-            first_x, _v, _w = state_in_step(low, t0, x0, v0, mode, kept, hammer, start)
-            last_x, _v, _w = state_in_step(high, t0, x0, v0, mode, kept, hammer, start)
+            first_x, _v, _w, _electric = state_in_step(low, t0, x0, v0, mode, kept, hammer, start)
+            last_x, _v, _w, _electric = state_in_step(high, t0, x0, v0, mode, kept, hammer, start)
             out[row, 3] = energy_behind(first_x, hammer) - energy_behind(last_x, hammer)

@@ -91,6 +91,14 @@ def driven(live: Any, electric: Electric) -> Drive:
 
 
 @inlined
+def electric_in(drive: Drive) -> Electric:
+    """Return the electric state in the drive argument of the force functions; `()` without a circuit."""
+    if HAS_CIRCUIT:
+        return drive[1]
+    return ()
+
+
+@inlined
 def path_of(live: Any) -> float:
     """Return the present conduction path of the coil current, stored in `live`."""
     return float(live[live.size - PATH])

@@ -25,12 +25,14 @@ from printhammer.kernel.model.layout import (
 )
 
 if TYPE_CHECKING:
-    from printhammer.kernel.methods.contact import contact_rate, electric_in_contact, s_at
-    from printhammer.kernel.methods.dop853 import contact_state, whole_time_step
-    from printhammer.kernel.methods.landing import shared_step
+    from printhammer.kernel.methods.contact import contact_rate, s_at
+    from printhammer.kernel.methods.dop853 import contact_end, whole_time_step
+    from printhammer.kernel.methods.landing import plain_step
     from printhammer.kernel.model.circuit import (
         Electric,
         coil_current,
+        driven,
+        electric_in,
         electric_rates,
         moved,
         open_rate,
@@ -101,23 +103,40 @@ def branch_of(mode: int) -> int:
 @compiled
 def state_in_step(
     t: float, t0: float, x0: float, v0: float, mode: int, kept: float, hammer: Hammer, drive: Drive
-) -> tuple[float, float, float]:
-    """Return x [m], v [m/s] and w = sqrt(b - x) [m^0.5] at time `t` [s] in the step after a node."""
-    if mode >= M.RESTING or t <= t0:
-        return x0, v0, kept if mode in (M.BACKSTOP, M.HELD) else 0.0
-    if mode == M.BACKSTOP:
+) -> tuple[float, float, float, Electric]:
+    """Return x [m], v [m/s], w = sqrt(b - x) [m^0.5] and electric state at `t` [s] in the step after a node.
+
+    The node is at time `t0` [s] and has displacement `x0` [m], velocity `v0` [m/s], mode and memory `kept`.
+    """
+    rests = mode >= M.RESTING
+    first = electric_in(drive)
+    if t <= t0 or (rests and not HAS_CIRCUIT):
+        return x0, v0, kept if mode in (M.BACKSTOP, M.HELD) else 0.0, first
+    if mode == M.BACKSTOP and not (kept == 0.0 and v0 == 0.0):
         kv0 = contact_rate(kept, v0, t0, hammer, drive)
-        if kept == 0.0 and v0 == 0.0:
-            a0 = acceleration(t0, x0, v0, mode, 0.0, hammer, drive)
-            return x0 + 0.5 * a0 * (t - t0) ** 2, a0 * (t - t0), math.sqrt(max(-0.5 * a0, 0.0)) * (t - t0)
         s = s_at(t, t0, kept, v0, kv0, hammer, drive)
-        _t1, w1, v1, _kv1, _electric = contact_state(t0, kept, v0, kv0, s, hammer, drive)
-        return hammer[POSITION] - w1 * w1, v1, w1
+        t1, w1, v1, _kv1, electric = contact_end(t0, kept, v0, kv0, s, hammer, drive)
+        x1 = hammer[POSITION] - w1 * w1
+        if HAS_CIRCUIT:
+            electric = moved(electric, t - t1, electric_rates(t1, x1, v1, electric, hammer, drive[0]))
+        return x1, v1, w1, electric
     memory = memory_of(mode, kept, hammer)
-    a0 = acceleration(t0, x0, v0, mode, memory, hammer, drive)
+    a0 = acceleration(t0, x0, v0, branch_of(mode), memory, hammer, drive)
+    if mode in (M.BACKSTOP, M.HELD):
+        # The armature touches the backstop without compression, or is held there: to second order in time.
+        electric = first
+        if HAS_CIRCUIT:
+            electric = moved(first, t - t0, electric_rates(t0, x0, 0.0, first, hammer, drive[0]))
+        if rests:
+            return x0, v0, kept, electric
+        pause = t - t0
+        return x0 + 0.5 * a0 * pause**2, a0 * pause, math.sqrt(max(-0.5 * a0, 0.0)) * pause, electric
     law = ForceLaw(mode, memory, hammer, drive)
-    x1, v1, _a1, _ex, _ev, _electric, _ee = shared_step(t0, x0, v0, a0, t - t0, law)
-    return x1, v1, 0.0
+    if HAS_CIRCUIT:
+        x1, v1, _a1, _error_x, _error_v, electric, _error = whole_time_step(t0, x0, v0, a0, t - t0, law)
+        return x0 if rests else x1, v0 if rests else v1, 0.0, electric
+    x1, v1, _a1, _error_x, _error_v = plain_step(t0, x0, v0, a0, t - t0, law)
+    return x1, v1, 0.0, first
 
 
 @compiled
@@ -127,31 +146,6 @@ def drive_at(node: Any, live: Any) -> Drive:
         take_path(live, node[ELECTRIC + 3], math.inf)
         return live, (node[ELECTRIC], node[ELECTRIC + 1], node[ELECTRIC + 2])
     return live
-
-
-@compiled
-def electric_in_step(t: float, node: Any, hammer: Hammer, drive: Drive) -> Electric:
-    """Return the electric state at time `t` [s] in the step that begins at `node`."""
-    t0, x0, v0, mode, kept = node[0], node[1], node[2], int(node[3]), node[4]
-    live, electric = drive
-    if t <= t0:
-        return electric
-    if mode == M.HELD or (mode == M.BACKSTOP and kept == 0.0 and v0 == 0.0):
-        return moved(electric, t - t0, electric_rates(t0, x0, 0.0, electric, hammer, live))
-    if mode == M.BACKSTOP:
-        kv0 = contact_rate(kept, v0, t0, hammer, drive)
-        return electric_in_contact((t0, kept, v0, kv0), t, hammer, drive)[1]
-    memory = memory_of(mode, kept, hammer)
-    a0 = acceleration(t0, x0, v0, branch_of(mode), memory, hammer, drive)
-    return whole_time_step(t0, x0, v0, a0, t - t0, ForceLaw(mode, memory, hammer, drive))[5]
-
-
-@compiled
-def drive_in_step(t: float, node: Any, hammer: Hammer, drive: Drive) -> Drive:
-    """Return the drive argument of the force functions at time `t` [s] in the step that begins at `node`."""
-    if HAS_CIRCUIT:
-        return drive[0], electric_in_step(t, node, hammer, drive)
-    return drive
 
 
 @entry
@@ -191,8 +185,8 @@ def resample(
         mode = int(nodes[i, 3])
         kept = nodes[i, 4]
         start = drive_at(nodes[i], train.live)
-        x, v, w = state_in_step(t, nodes[i, 0], nodes[i, 1], nodes[i, 2], mode, kept, hammer, start)
-        drive = drive_in_step(t, nodes[i], hammer, start)
+        x, v, w, electric = state_in_step(t, nodes[i, 0], nodes[i, 1], nodes[i, 2], mode, kept, hammer, start)
+        drive = driven(train.live, electric)
         value = value_at(t, x, hammer, drive)
         out[row, 0] = x
         out[row, 1] = v
@@ -211,7 +205,7 @@ def resample(
                 out[row, 8] = -acceleration(t, x, 0.0, mode, memory, hammer, drive) / hammer[INVERSE_MASS]
         out[row, 9] = mode
         if HAS_CIRCUIT:
-            live, electric = drive
+            live = train.live
             current = coil_current(x, electric, hammer, live)
             out[row, 10] = current
             if path_of(live) == BLOCKED:
@@ -229,7 +223,7 @@ def depth_and_force(t: float, node: Any, surface: int, hammer: Hammer, live: Any
     """Return indentation [m] and contact force [N] at time `t` [s] in the step that begins at `node`."""
     mode = int(node[3])
     drive = drive_at(node, live)
-    x, v, w = state_in_step(t, node[0], node[1], node[2], mode, node[4], hammer, drive)
+    x, v, w, _electric = state_in_step(t, node[0], node[1], node[2], mode, node[4], hammer, drive)
     if surface == M.BACKSTOP_SURFACE:
         force = 0.0
         if mode in (M.BACKSTOP, M.HELD):

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from printhammer.kernel.single.resample import (
         branch_of,
         drive_at,
-        drive_in_step,
         peaks_of,
         state_in_step,
     )
@@ -168,7 +167,7 @@ def note_states(
             first, last, _edge = pass_edges(nodes[i, 0], train, first, last)
         mode, kept = int(nodes[i, 3]), nodes[i, 4]
         drive = drive_at(nodes[i], train.live)
-        displacement, velocity, _w = state_in_step(
+        displacement, velocity, _w, electric = state_in_step(
             due, nodes[i, 0], nodes[i, 1], nodes[i, 2], mode, kept, hammer, drive
         )
         if is_sample:
@@ -181,7 +180,7 @@ def note_states(
             strobes[strobe, 2] = branch
             strobes[strobe, 3] = kept if branch in (UNLOADING, RELOADING) else 0.0
             if HAS_CIRCUIT:
-                live, electric = drive_in_step(due, nodes[i], hammer, drive)
+                live = train.live
                 strobes[strobe, STROBE_WIDTH] = coil_current(displacement, electric, hammer, live)
                 strobes[strobe, STROBE_WIDTH + 1] = turn_current(displacement, electric, hammer, live)
                 strobes[strobe, STROBE_WIDTH + 2] = electric[2]

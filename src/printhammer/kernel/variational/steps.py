@@ -20,7 +20,7 @@ from printhammer.kernel.variational.layout import BACKSTOP_LOSS, ELECTRICS, MEMO
 
 if TYPE_CHECKING:
     from printhammer.kernel.methods.contact import contact_rate, length_of
-    from printhammer.kernel.methods.dop853 import contact_state
+    from printhammer.kernel.methods.dop853 import contact_end
     from printhammer.kernel.model.circuit import driven, path_of
     from printhammer.kernel.model.forces import Hammer, acceleration, is_on_stop, value_at
     from printhammer.kernel.model.laws import (
@@ -102,7 +102,7 @@ def length_in_contact(
         at_the_end = leaves and number > 0 and v1 > 0.0
         change = w1 / v1 if at_the_end else length_of(t - t1, w1, v1, kv1)
         s += change
-        t1, w1, v1, kv1, _electric = contact_state(t0, w0, v0, kv0, s, hammer, drive)
+        t1, w1, v1, kv1, _electric = contact_end(t0, w0, v0, kv0, s, hammer, drive)
     return s
 
 
