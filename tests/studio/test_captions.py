@@ -188,6 +188,20 @@ def test_two_controls_that_move_a_constant_leave_it_in_its_range(modules: Path) 
         assert 1.0 <= found.get("pack.thickness", 2.0) <= 3.0
 
 
+SECTION = """
+const { sectionEnds } = await import("./planes.js");
+console.log(JSON.stringify(%s.map((values) => sectionEnds(values, [0, 10]))));
+"""
+
+
+def test_a_strobe_section_is_scaled_to_its_settled_points(modules: Path) -> None:
+    settling = [9.0] * 100
+    attractor = [4.0 + 0.01 * k for k in range(100)]
+    ends = evaluated(modules, SECTION % [settling + 2 * attractor, settling + 200 * [4.0], [4.0, 7.0]])
+    # A point alone is drawn in the middle of 5 % of the extent of the run.
+    np.testing.assert_allclose(ends, [[4.0, 4.99], [3.75, 4.25], [4.0, 7.0]])
+
+
 LINK = """
 const { fromText, toText, START } = await import("./state.js");
 const [state, start] = %s;

@@ -33,8 +33,8 @@ export function buildControls(holder, studio) {
   studio.parts.pinned.replaceChildren();
   add(studio.parts.pinned, { ...rate, id: "pinned rate" });
   const most = studio.limits.MOST_PULSES;
-  add(front, {
-    id: "pulses", name: "pulses", hint: "Number of firings.", unit: "1", low: 1, high: most, whole: true,
+  const count = add(front, {
+    id: "pulses", name: "pulses", hint: "Number of firings, or of periods of a sinusoidal force.", unit: "1", low: 1, high: most, whole: true,
     get: (state) => state.pulses, set: (value) => ({ pulses: value }), reset: () => ({ pulses: start.pulses }),
   });
   for (const control of described.combined) add(front, { ...control, id: control.key, name: control.key, hint: control.meaning, ...moving(control, studio) });
@@ -83,6 +83,9 @@ export function buildControls(holder, studio) {
   searched(holder, search, fold);
   return () => {
     const { state } = studio.store;
+    const what = (state.waveform ?? described.waveform)?.shape === "sine" ? "periods" : "pulses";
+    count.element.querySelector("label").textContent = what;
+    count.element.querySelector(".number").ariaLabel = `${what}, number`;
     // Of a driver the latest firing always replaces those before it.
     overlap.element.querySelector("select").disabled = isDriver(studio, state.waveform ?? described.waveform);
     for (const row of rows) row.follow(state);

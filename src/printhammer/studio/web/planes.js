@@ -6,6 +6,7 @@ import { digits, unitOf } from "./units.js";
 import { packOf } from "./words.js";
 
 const SETTLING = 100; // firings in which a train settles, drawn apart
+const LEAST = 0.05; // of the extent of a run, arbitrary: the plane of a section is not smaller
 
 const NEAR = 40; // pixels from the pointer to a curve that is meant
 
@@ -117,6 +118,14 @@ export function loopsView(body, studio) {
   }, () => where);
 }
 
+/** Return the ends of an axis of a strobe section: those of the settled points, if there are any. */
+export function sectionEnds(values, [from, to]) {
+  const [low, high] = extent(values.length > 2 * SETTLING ? values.slice(SETTLING) : values);
+  // The few points of a periodic train differ by rounding, which would fill the whole plane.
+  const more = Math.max(0, 0.5 * (LEAST * (to - from) - (high - low)));
+  return [low - more, high + more];
+}
+
 /** The states at the firings of an endless train, with the verdict. */
 export function strobeView(body, studio) {
   return planeView(body, studio, "Strobe section of an endless train at this rate", ["strobe"], (pen, width, height) => {
@@ -127,13 +136,9 @@ export function strobeView(body, studio) {
     const { x, v } = frame.data;
     const known = [...x.keys()].filter((k) => Number.isFinite(x[k]));
     const [xs, vs] = [known.map((k) => x[k]), known.map((k) => v[k])];
-    // A periodic train has a few points only, whose differences would fill the whole plane.
-    const around = ([low, high], least) => (high - low < least ? [0.5 * (low + high - least), 0.5 * (low + high + least)] : [low, high]);
     const spread = studio.frames.motion ? [extent(studio.frames.motion.data.x), extent(studio.frames.motion.data.v)] : [[0, 1e-4], [0, 1]];
     const settled = Math.min(SETTLING, xs.length);
-    // Where there are points after settling, the plane is theirs.
-    const seen = (list) => (xs.length > 2 * SETTLING ? list.slice(settled) : list);
-    const [xe, ve] = [around(extent(seen(xs)), 0.3 * (spread[0][1] - spread[0][0])), around(extent(seen(vs)), 0.3 * (spread[1][1] - spread[1][0]))];
+    const [xe, ve] = [sectionEnds(xs, spread[0]), sectionEnds(vs, spread[1])];
     pen.font = FONT;
     const step = studio.frames.motion?.sine ? "period" : "firing";
     const told = strobeText(frame, step);

@@ -45,7 +45,7 @@ function motion(kernel, posed, record, hammer, fired, limits) {
   const column = (k) => Float32Array.from(inside, (_, row) => table[row * posed.columns + k]);
   const data = { t, ...Object.fromEntries(rows), "strobe t": inside, "strobe x": column(0), "strobe v": column(1) };
   return {
-    kind: "motion", status: record.status, message: messageOf(hammer.described.name, record) || unsettledOf(kernel, posed, record, limits), places: posed.places, contacts: posed.touching, quantity: hammer.quantity, peak: largest.values[0],
+    kind: "motion", status: record.status, message: messageOf(hammer.described.name, record) || unsettledOf(kernel, posed, record, limits, hammer.described.mover), places: posed.places, contacts: posed.touching, quantity: hammer.quantity, peak: largest.values[0],
     fired, steps: record.steps, pulse: posed.pulse, ...(hammer.circuit ? { supply: posed.peak } : {}), ...(posed.sine ? { sine: posed.sine } : {}), data,
   };
 }

@@ -201,8 +201,8 @@ function runWindowOf(kernel, posed, about, limits) {
   });
 }
 
-/** Describe an armature that is not at rest at the end of a run in one sentence; empty if at rest. */
-export function unsettledOf(kernel, posed, { code, contacts, nodes }, limits) {
+/** Describe a mover, such as the armature, that is not at rest at the end of a run in one sentence; empty if at rest. */
+export function unsettledOf(kernel, posed, { code, contacts, nodes }, limits, mover) {
   const { rest, width, wait, flight, scales } = posed;
   const { values } = nodes;
   if (code || posed.sine || (values.length > width && isWithin(values.at(3 - 2 * width), limits.WINDOW.held))) return "";
@@ -212,7 +212,7 @@ export function unsettledOf(kernel, posed, { code, contacts, nodes }, limits) {
     const span = Number.isNaN(flight) ? wait : limits.WINDOW.flights * flight;
     const [settled] = kernel.call("is_window", code, cut(contacts, 0), nodes, places, span, kernel.array("f", 1));
     const [far, fast] = [x - rest, v].map((number) => Number(number.toPrecision(4)));
-    return settled ? "" : `the armature is not at rest at the end of the run: ${far} m from its rest position, at ${fast} m/s`;
+    return settled ? "" : `the ${mover} is not at rest at the end of the run: ${far} m from its rest position, at ${fast} m/s`;
   });
 }
 
