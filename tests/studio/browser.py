@@ -9,7 +9,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,6 @@ FLAGS = (
 )
 HELPERS = (Path(__file__).parent / "helpers.js").read_text("utf-8")
 """Script that the tests run inside a page."""
-START = 60.0
 WAIT = 60.0
 
 
@@ -149,12 +148,10 @@ class Page(Wire):
             " return {x: b.x, y: b.y, width: b.width, height: b.height}; })()"
         )
 
-    def mouse(self, kind: str, x: float, y: float, held: bool = True) -> None:
+    def mouse(self, kind: str, x: float, y: float, held: bool = True, **more: Any) -> None:
         """Move, press ("mousePressed") or release ("mouseReleased") the left button."""
-        button = "left" if held else "none"
-        self.call(
-            "Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, buttons=int(held), clickCount=1
-        )
+        told = {"button": "left" if held else "none", "buttons": int(held), "clickCount": 1, **more}
+        self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, **told)
 
     def drag(self, *places: tuple[float, float]) -> None:
         """Press at the first position, move through the others, release at the last."""
@@ -181,40 +178,33 @@ class Page(Wire):
 
 
 @contextmanager
+def started(command: list[str], pattern: str) -> Iterator[str]:
+    """Start a browser, yield the address that it writes after `pattern`, and terminate the browser."""
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+    assert process.stderr is not None
+    try:
+        found = filter(None, (re.search(rf"{pattern} (ws://\S+)", line) for line in process.stderr))
+        yield next(found)[1]
+    finally:
+        process.terminate()
+        process.wait(20)
+        process.stderr.close()
+
+
+@contextmanager
 def browser() -> Iterator[Any]:
     """Start a Chromium and yield a function that opens a new tab."""
     program = chromium()
     assert program is not None
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        command = (program, *FLAGS, f"--user-data-dir={folder}", "about:blank")
-        process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
-        sockets: list[Any] = []
-        try:
-            address = _address(process)
-            host = address.split("/")[2]
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder, ExitStack() as stack:
+        command = [program, *FLAGS, f"--user-data-dir={folder}", "about:blank"]
+        host = stack.enter_context(started(command, "DevTools listening on")).split("/")[2]
 
-            def tab() -> Page:
-                from urllib.request import Request, urlopen
+        def tab() -> Page:
+            from urllib.request import Request, urlopen
 
-                with urlopen(Request(f"http://{host}/json/new?about:blank", method="PUT")) as answer:
-                    found = json.load(answer)
-                opened = connect(found["webSocketDebuggerUrl"], max_size=None)
-                sockets.append(opened)
-                return Page(opened.__enter__())
+            with urlopen(Request(f"http://{host}/json/new?about:blank", method="PUT")) as answer:
+                found = json.load(answer)
+            return Page(stack.enter_context(connect(found["webSocketDebuggerUrl"], max_size=None)))
 
-            yield tab
-        finally:
-            for socket in sockets:
-                socket.__exit__(None, None, None)
-            process.terminate()
-            process.wait(20)
-            assert process.stderr is not None
-            process.stderr.close()
-
-
-def _address(process: "subprocess.Popen[str]") -> str:
-    assert process.stderr is not None
-    for line in process.stderr:
-        if found := re.search(r"DevTools listening on (ws://\S+)", line):
-            return found[1]
-    raise AssertionError("Chromium did not start")
+        yield tab

@@ -1,21 +1,16 @@
 """Headless Firefox, driven by WebDriver BiDi; helpers only."""
 
-import base64
 import json
-import re
 import shutil
-import subprocess
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
-from tests.studio.browser import Wire
+from tests.studio.browser import Wire, started
 from websockets.sync.client import ClientConnection, connect
 
 NAMES = ("firefox-esr", "firefox")
-WAIT = 60.0
 EVENTS = ["log.entryAdded", "network.beforeRequestSent"]
 
 
@@ -77,11 +72,6 @@ class Tab(Wire):
         keys = {"type": "key", "id": "keys", "actions": actions}
         self.call("input.performActions", context=self.context, actions=[keys])
 
-    def picture(self, path: Path) -> None:
-        """Save a screenshot as PNG."""
-        taken = self.call("browsingContext.captureScreenshot", context=self.context)
-        path.write_bytes(base64.b64decode(taken["data"]))
-
 
 @contextmanager
 def opened() -> Iterator[Tab]:
@@ -89,21 +79,9 @@ def opened() -> Iterator[Tab]:
     program = firefox()
     assert program is not None
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        command = (program, "--headless", "--no-remote", "--profile", folder, "--remote-debugging-port=0")
-        process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
-        try:
-            with connect(f"{_address(process)}/session", max_size=None) as socket:
-                yield Tab(socket)
-        finally:
-            process.terminate()
-            process.wait(20)
-            assert process.stderr is not None
-            process.stderr.close()
-
-
-def _address(process: "subprocess.Popen[str]") -> str:
-    assert process.stderr is not None
-    for line in process.stderr:
-        if found := re.search(r"WebDriver BiDi listening on (ws://\S+)", line):
-            return found[1]
-    raise AssertionError("Firefox did not start")
+        command = [program, "--headless", "--no-remote", "--profile", folder, "--remote-debugging-port=0"]
+        with (
+            started(command, "WebDriver BiDi listening on") as address,
+            connect(f"{address}/session", max_size=None) as socket,
+        ):
+            yield Tab(socket)

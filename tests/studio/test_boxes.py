@@ -91,6 +91,7 @@ def test_a_pattern_that_is_none_is_said(page: Page) -> None:
     typed(page, "#control-pattern", "10x1", enter=False)
     assert page.run(f"{STATE}.pattern") == ""
     assert "10x1" in problem(page, "#control-pattern")
+    assert page.run("document.querySelector('#control-pattern').getAttribute('aria-invalid')") == "true"
     typed(page, "#control-pattern", "1" * 70, enter=False)
     assert page.run(f"{STATE}.pattern") == ""
     assert "at most 64" in problem(page, "#control-pattern")
@@ -115,18 +116,9 @@ def test_boxes_take_units_and_arithmetic(page: Page) -> None:
 
 def test_the_units_of_boxes_are_those_of_the_program() -> None:
     """A unit that both the unit table and a box accept has the same size in both."""
-    known = {
-        "m": "m mm um in mil",
-        "s": "s ms us",
-        "N": "N lbf",
-        "kg": "kg g oz lb",
-        "Pa": "Pa GPa ksi psi",
-        "Hz": "Hz kHz",
-        "J": "J mJ",
-        "A": "A mA",
-        "N/m": "N/m N/mm lbf/in",
-    }
-    pairs = [(unit, si) for si, units in known.items() for unit in units.split()]
+    rows = "m m mm um in mil|s s ms us|N N lbf|kg kg g oz lb|Pa Pa GPa ksi psi|Hz Hz kHz|J J mJ|A A mA"
+    known = [row.split() for row in f"{rows}|N/m N/m N/mm lbf/in".split("|")]
+    pairs = [(unit, si) for si, *units in known for unit in units]
     script = merged("quantity.js") + (
         f"console.log(JSON.stringify({json.dumps(pairs)}.map(([unit, si]) =>"
         " readQuantity(`2 ${unit}`, si, { name: si, factor: 1 }).value)))"
@@ -163,7 +155,7 @@ def test_sliders_are_wide_fine_with_shift_and_wheel_and_reset_by_a_double_click(
 
     for count in (1, 2):
         for kind in ("mousePressed", "mouseReleased"):
-            page.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=count)
+            page.mouse(kind, x, y, clickCount=count)
     page.wait(f"{STATE}.rate === 1200")
     assert page.complaints == []
 
@@ -172,22 +164,8 @@ def test_sliders_are_wide_fine_with_shift_and_wheel_and_reset_by_a_double_click(
 def test_a_drag_with_shift_is_ten_times_as_fine(page: Page) -> None:
     place = page.box("[data-key=rate]")
     x, y = place["x"] + 30, place["y"] + place["height"] / 2
-
-    def mouse(kind: str, x: float) -> None:
-        page.call(
-            "Input.dispatchMouseEvent",
-            type=kind,
-            x=x,
-            y=y,
-            button="left",
-            buttons=1,
-            clickCount=1,
-            modifiers=SHIFT,
-        )
-
-    mouse("mousePressed", x)
-    mouse("mouseMoved", x + 40)
-    mouse("mouseReleased", x + 40)
+    for kind, at in (("mousePressed", x), ("mouseMoved", x + 40), ("mouseReleased", x + 40)):
+        page.mouse(kind, at, y, modifiers=SHIFT)
     whole = page.run("Math.log(5000 / 50)")
     moved = page.run(f"Math.log({STATE}.rate / 1200)")
     assert moved == pytest.approx(0.1 * 40 / place["width"] * whole, rel=0.05)
@@ -272,6 +250,10 @@ def test_the_drag_of_a_damped_hammer_is_among_the_forces(page: Page) -> None:
     page.wait("'F drag' in window.studio.studio.frames.motion.data")
     assert "drag" in page.run(names)
     assert "drag" in page.run("Object.keys(window.studio.studio.views.forces.table()).join(' ')")
+    # A sinusoidal force has periods and no pulses.
+    label = "document.querySelector('[for=control-pulses]').textContent"
+    assert page.run(label) == "periods"
     page.run("window.studio.studio.choose('hendriks-1983').then(() => 1)")
     page.wait("!('F drag' in window.studio.studio.frames.motion.data)")
     assert "drag" not in page.run(names)
+    assert page.run(label) == "pulses"

@@ -10,6 +10,8 @@ pytestmark = pytest.mark.slow
 STUDIO = "window.studio.studio"
 SETTLED = f"{STUDIO}?.frames.map?.detail === 'full' && !{STUDIO}.busy && !document.querySelector('.outdated')"
 QUIET = f"!{STUDIO}.busy && !{STUDIO}.stale && !document.querySelector('.outdated')"
+SEEN = f"{QUIET} && {STUDIO}.frames.dots.serial === Math.max(...{STUDIO}.sentAt.keys())"
+"""The dots are those of the state that was sent last; questions have numbers of their own."""
 SHOWN = "[...document.querySelectorAll('.panel')].filter((each) => each.checkVisibility())"
 
 
@@ -74,28 +76,65 @@ def test_constants_of_forces_and_contacts_have_sliders(page: Page) -> None:
     page.wait(QUIET)
 
 
-def test_figure_6_shows_both_curves_and_every_story_its_view(page: Page) -> None:
-    heroes = []
-    for k in range(6):
+HEROES = {
+    "One dot": "forces",
+    "660 or 700 µs": "map",
+    "Buzz printing": "phase",
+    "The second dot lost": "map",
+    "A strange train": "strobe",
+    "Hung up": "map",
+}
+"""The large view of each story."""
+
+
+def test_stories_show_what_they_tell_and_figure_6_shows_both_curves(page: Page) -> None:
+    """Each story is one click away, and its text and remarks are correct."""
+    struck: dict[str, list[bool]] = {}
+    force: dict[str, list[float]] = {}
+    lost = f"{STUDIO}.views.map.lost()"
+    for k, (name, hero) in enumerate(HEROES.items()):
         page.run(f"document.querySelectorAll('.story')[{k}].click()")
-        page.wait(QUIET)
-        heroes.append(page.run("document.querySelector('.with-hero > .panel:not([hidden])').classList[1]"))
+        page.wait(SEEN)
+        assert name in page.run("document.querySelector('.notice').textContent")
+        large = page.run("document.querySelector('.with-hero > .panel:not([hidden])').classList[1]")
+        assert large == f"view-{hero}"
         remarks = page.run(f"{STUDIO}.remarks()")
         assert all(0 <= time < 1e-2 for time, _ in remarks)
         assert len(remarks) >= (k != 4)
-        if k != 1:
-            assert page.run(f"{STUDIO}.ghosts.length") == 0
-            continue
-        for other, said in (("700 µs", "lost"), ("660 µs", "prints again")):
-            page.wait(f"{STUDIO}.ghosts.length === 1 && {STUDIO}.ghosts[0].name === {other!r}")
-            page.wait(f"{STUDIO}.remarks().some(([, text]) => text.includes({said!r}))")
-            page.run("document.querySelector('.notice .switch[aria-pressed=false]').click()")
-            page.wait(QUIET)
-    assert heroes == ["view-forces", "view-map", "view-phase", "view-map", "view-strobe", "view-map"]
+        assert page.run(f"{STUDIO}.ghosts.length") == (k == 1)
+        struck[name] = page.run(f"{STUDIO}.frames.dots.dots.map((dot) => dot.struck)")
+        force[name] = page.run(f"{STUDIO}.frames.dots.dots.map((dot) => dot.peak_force ?? 0)")
+        if name == "660 or 700 µs":
+            for other, said, second in (("700 µs", "lost", False), ("660 µs", "prints again", True)):
+                page.wait(f"{STUDIO}.ghosts.length === 1 && {STUDIO}.ghosts[0].name === {other!r}")
+                page.wait(f"{STUDIO}.remarks().some(([, text]) => text.includes({said!r}))")
+                first, again = page.run(f"{STUDIO}.frames.dots.dots.map((dot) => dot.peak_force ?? 0)")
+                assert (again > first) == second
+                page.run("document.querySelector('.notice .switch[aria-pressed=false]').click()")
+                page.wait(SEEN)
+        if name == "The second dot lost":
+            page.wait(f"{STUDIO}.frames.map.detail === 'full' && {lost}.first")
+            assert page.run(f"{lost}.list.length") > 100
+        if name == "A strange train":
+            page.wait(f"{STUDIO}.frames.strobe?.verdict?.verdict === 'strange'")
+            page.wait("document.querySelector('.view-strobe .caption').textContent.includes('never repeats')")
+    low = page.run(
+        f"(({{ data, places, fired }}) => Math.min(...[...data.x].filter((_x, k) => data.t[k] > 6e-4"
+        f" && data.t[k] < fired.at(-1))) - places.backstop)({STUDIO}.frames.motion)"
+    )
+    assert low > 0.0
+    assert struck["One dot"] == [True]
+    assert struck["660 or 700 µs"] == [True, False]
+    assert all(struck["Buzz printing"])
+    assert all(0.3 < each / force["One dot"][0] < 0.5 for each in force["Buzz printing"][4:])
+    assert struck["The second dot lost"][:3] == [True, False, True]
     page.run(f"{STUDIO}.store.set({{ rate: 1000 }}); 1")
     assert page.run(f"{STUDIO}.remarks()") == []
     page.run("document.querySelector('.notice .shut').click()")
     assert page.run(f"{STUDIO}.window === null && {STUDIO}.remarks === null")
+    assert not page.run("document.querySelector('.notice').checkVisibility()")
+    page.run("document.querySelector('.undo').click()")
+    assert page.run(f"{STUDIO}.store.state.rate") == 2200
 
 
 def test_the_word_is_printed_anew_under_the_finger(page: Page) -> None:
@@ -127,8 +166,10 @@ def test_views_suit_the_device(page: Page) -> None:
     forces = page.run(f"Object.keys({STUDIO}.views.forces.table())")
     assert forces == ["time [s]", "total [N]", "drive [N]", "spring [N]"]
     captions = page.run(f"{SHOWN}.map((each) => each.querySelector('.caption').textContent).join()")
+    status = page.run("document.querySelector('.status').textContent")
+    assert "the ball is not at rest" in status
     for word in ("armature", "dot", "backstop", "paper"):
-        assert word not in captions
+        assert word not in captions + status
 
 
 def test_a_trace_has_offsets_a_name_a_residual_and_an_undo(page: Page) -> None:
