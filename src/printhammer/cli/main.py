@@ -9,6 +9,7 @@ name of a verb imports the module of this verb alone.
 
 from __future__ import annotations
 
+import gc
 import os
 import re
 import sys
@@ -25,6 +26,9 @@ from printhammer import __version__
 from printhammer.cli.runner import INTERRUPTED, Verb
 from printhammer.cli.terminal import allow_any_text, complain
 from printhammer.errors import PrinthammerError
+
+_THRESHOLDS: Final = (50_000, 20, 50)
+"""Thresholds of the garbage collector in a process of the command line; arbitrary."""
 
 MODULES: Final = {
     "run": "run",
@@ -162,6 +166,10 @@ def build_program(
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run a command line, by default the arguments of the process, and exit."""
+    if arguments is None:
+        # Modules live as long as the process; collecting garbage among them takes 7 % of the time of a run.
+        gc.freeze()
+        gc.set_threshold(*_THRESHOLDS)
     words = list(sys.argv[1:] if arguments is None else arguments)
     # Help, and the answer to an unknown word, need all verbs.
     known = [name for name in (" ".join(words[:count]) for count in (1, 2)) if name in MODULES]
