@@ -27,6 +27,7 @@ from printhammer.parts.magnet.inverse_root import InverseRootMagnet
 from printhammer.parts.magnet.table import TableMagnet
 from printhammer.parts.pack.dashpot import DashpotPack
 from printhammer.parts.pack.power import PowerPack
+from printhammer.parts.pack.rigid import RigidFront
 from printhammer.parts.spring.linear import LinearSpring, PreloadSpring
 
 
@@ -170,6 +171,20 @@ def test_a_spring_may_press_the_armature_on_the_paper() -> None:
     pack = DashpotPack(stiffness=1e5, damping=0.0, front=1e-4)
     rest = rest_state(Bench(spring=PreloadSpring(preload=3.0, stiffness=0.0), pack=pack))
     assert rest == pytest.approx(1e-4 + 3e-5, rel=1e-14)
+
+
+def test_an_armature_may_latch_at_either_of_two_rigid_stops() -> None:
+    """An unstable spring presses the armature against both stops, on either side of its equilibrium."""
+    front = RigidFront(front=381e-6, restitution=0.3)
+    back = RigidBackstop(position=51e-6, restitution=0.3)
+    hammer = Bench(spring=PreloadSpring(preload=-1.0, stiffness=-1e4), backstop=back, pack=front)
+    first, middle, last = equilibria(hammer)
+    assert first == Equilibrium(51e-6, True, None, "backstop")
+    assert (middle.stable, middle.surface) == (False, None)
+    assert middle.x == pytest.approx(151e-6, rel=1e-13)
+    assert last == Equilibrium(381e-6, True, None, "pack")
+    assert equilibria(hammer, within=(100e-6, 380e-6)) == [middle]
+    assert equilibria(replace(hammer, spring=PreloadSpring(preload=-4.0, stiffness=-1e4))) == [first]
 
 
 def test_a_spring_of_negative_stiffness_has_an_unstable_equilibrium() -> None:

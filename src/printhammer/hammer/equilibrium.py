@@ -59,8 +59,8 @@ class Equilibrium:
     """Whether the force returns the armature to the equilibrium after a small displacement in either
     direction."""
     frequency: float | None
-    """Natural frequency of small undamped oscillations, Hz; None if unstable, on a rigid backstop, or in a
-    pack with memory, which has no unique stiffness."""
+    """Natural frequency of small undamped oscillations, Hz; None if unstable, on a rigid stop, or in a pack
+    with memory, which has no unique stiffness."""
     surface: str | None
     """Surface in contact with the armature, "backstop" or "pack"; None for a free armature."""
 
@@ -119,9 +119,9 @@ def equilibria(
     """Find all equilibria of the armature at a constant current, in ascending order.
 
     The search covers the displacements at which the laws of magnet and spring are valid, from a rigid
-    backstop on, and up to the platen or, without a platen, to the back of the pack. It is also limited to 1 m
-    on either side of the origin, extended to 10, 100 and 1000 m as long as no stable equilibrium is found.
-    Intervals in which the net force is zero throughout are not reported.
+    backstop on, and up to a rigid stop on the paper side, to the platen or to the back of the pack. It is
+    also limited to 1 m on either side of the origin, extended to 10, 100 and 1000 m as long as no stable
+    equilibrium is found. Intervals in which the net force is zero throughout are not reported.
 
     Parameters
     ----------
@@ -150,6 +150,10 @@ def equilibria(
         inside = within is None or within[0] <= position <= within[1]
         if inside and force.free(position, current) < 0.0:
             resting.insert(0, Equilibrium(position, True, None, "backstop"))
+    if force.statics.rigid_front:
+        inside = within is None or within[0] <= force.front <= within[1]
+        if inside and force.free(force.front, current) > 0.0:
+            resting.append(Equilibrium(force.front, True, None, "pack"))
     return resting
 
 
