@@ -25,7 +25,8 @@ def plot_timings(motion: Motion, *, until: float | None = None) -> Figure:
     """Draw the switching of all contacts: displacement, coil current, and the state of each contact.
 
     The state of a contact is drawn as an oscilloscope shows it, high where the contact is closed. The text
-    beside a trace states operate or release time and bounce time; dashed lines mark switch-on and switch-off.
+    beside a trace states operate, release or reset time, and bounce time; dashed lines mark switch-on and
+    switch-off.
 
     Parameters
     ----------
@@ -106,10 +107,11 @@ def _trace(ax: Axes, motion: Motion, name: str, row: int, end: float, time: Scal
 
 
 def _mark(ax: Axes, timing: Timing, row: int, time: Scale) -> None:
-    """Write operate and release times, and the bounce times, beside the contact's trace at height `row`."""
+    """Write operate, release, reset and bounce times beside the contact's trace at height `row`."""
     phases = (
         (timing.switched_on, timing.operate_time, timing.operate_bounce),
         (timing.switched_off, timing.release_time, timing.release_bounce),
+        (timing.switched_on, timing.reset_time, timing.reset_bounce),
     )
     for event, delay, bounce in phases:
         if event is None or delay is None or bounce is None:

@@ -368,8 +368,9 @@ class Rows(tuple[_T, ...]):
         table = pd.DataFrame([asdict(row) for row in self], columns=list(self._heads))
         return table.rename(columns=self._heads)
 
-    def save(self, path: Path) -> None:
+    def save(self, path: str | Path) -> None:
         """Write the table as Parquet for the ending .parquet, else as CSV; errors as for `write_file`."""
+        path = Path(path)
         (write_parquet if path.suffix.lower() == ".parquet" else write_csv)(self.to_dataframe(), path)
 
     def _cells(self) -> list[list[str]]:

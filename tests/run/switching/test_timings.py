@@ -130,6 +130,43 @@ def test_a_break_contact_is_pressed_where_the_armature_strikes_its_backstop() ->
     assert all(each.peak_force == pytest.approx(3e3 * 0.03e-3, rel=1e-12) for each in pressed)
 
 
+def test_a_latched_contact_is_reset_by_a_reversed_pulse() -> None:
+    """Friction latches the mass at its front stop; force, friction and contact spring then push it back."""
+    kinetic, place, far, stiffness = 0.2, GAP, 0.5e-3, 1e3
+    hammer = slider(0.0).replace(
+        {
+            "pack": {"law": "rigid", "front": far, "restitution": 0.3},
+            "contact.no.stiffness": stiffness,
+            "contact.nc": {"law": "linear", "side": "back", "position": 0.05e-3, "stiffness": 500.0},
+            "backstop.restitution": 0.7,
+            "force.guide": {"law": "friction", "kinetic": kinetic, "static": 0.3},
+        }
+    )
+    back = Trapezoid(amplitude=-FORCE, quantity="force", rise=0.0, width=5e-3, fall=0.0)
+    drive = ph.PulseSequence([pulse(5e-3), back, pulse(5e-3)], at=[0.0, 20e-3, 40e-3])
+    motion = ph.simulate(hammer, drive, duration=60e-3, state=(0.0, 0.0), tolerance=1e-13)
+    assert motion.state_at(19e-3)[:2] == (far, 0.0)
+    assert motion.state_at(39e-3)[:2] == (0.0, 0.0)
+    make, rest = motion.timings[:3], motion.timings[3:]
+    for each in (make, rest):
+        assert [timing.operate_time is None for timing in each] == [False, True, False]
+        assert [timing.reset_time is None for timing in each] == [True, False, True]
+        assert [timing.release_time for timing in each] == [None] * 3
+    centre = (FORCE - kinetic) / stiffness
+    expected = math.acos(centre / (centre + far - place)) / math.sqrt(stiffness / MASS)
+    assert make[1].reset_time == pytest.approx(expected, abs=1e-11)
+    assert make[1].reset_bounce == 0.0
+    closed, _opened = sampled(motion, "nc", "back", 0.05e-3)
+    closed = [time for time in closed if time > 20e-3]
+    assert len(closed) > 1
+    assert rest[1].reset_time == pytest.approx(closed[0] - 20e-3, abs=3e-7)
+    assert rest[1].reset_bounce == pytest.approx(closed[-1] - closed[0], abs=5e-7)
+    said = facts_of(motion)["contact no"]
+    assert "reversed pulse" in said
+    assert "never" not in said
+    assert motion.plot(picture="timings")
+
+
 def test_a_run_that_ends_before_the_release_says_so() -> None:
     hammer, drive = slider(), ph.PulseTrain(pulse(1e-3))
     short = ph.simulate(hammer, drive, duration=1e-3)
@@ -182,7 +219,7 @@ def test_the_picture_shows_the_state_of_each_contact(tmp_path: Path) -> None:
         total = np.sum(np.diff(trace.get_xdata())[high[:-1] & high[1:]])
         own = [each for each in motion.closings if each.contact == contact]
         assert total == pytest.approx(1e3 * sum((each.t_out or motion.end) - each.t_in for each in own))
-    motion.timings.save(tmp_path / "timings.csv")
+    motion.timings.save(f"{tmp_path}/timings.csv")
     assert "operate_time [s]" in (tmp_path / "timings.csv").read_text()
     assert motion.timings.kind is Timing
 

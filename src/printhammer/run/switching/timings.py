@@ -5,6 +5,8 @@ side of the armature is a make contact: it closes when the relay operates, and o
 A contact on the back side is a break contact: it opens when the relay operates, and closes when the relay
 releases. A contact bounces if it switches more than once; the bounce time is the time from the first to the
 last of these switchings. Operate and release times end at the first switching: they exclude the bounce time.
+A bistable (latching) relay keeps its state after switch-off, and is reset by a pulse of reversed sign; its
+reset time begins at the switch-on of this pulse.
 
 All times follow from `Motion.closings`. Weakness: contacts have no mass, so that only the rebound of the
 armature makes them bounce, not the vibration of the contact spring.
@@ -49,6 +51,12 @@ class Timing(Declared):
         "s", "time from switch-off to the first switching back", more=f"excludes the bounce; {_NOT_SEEN}"
     )
     release_bounce: float | None = scalar("s", "bounce time after switch-off", more=_NOT_SEEN)
+    reset_time: float | None = scalar(
+        "s",
+        "time from the switch-on of a reversed pulse to the first switching back",
+        more="None unless the pulse returns a latched contact to its state at rest",
+    )
+    reset_bounce: float | None = scalar("s", "bounce time of a reset", more="None without a reset time")
     largest_force: float = scalar("N", "largest contact force")
     final_force: float = scalar(
         "N", "contact force at switch-off (make contact) or at the end of the firing (break contact)"
@@ -64,6 +72,15 @@ def off_after(waveform: Waveform) -> float:
     if isinstance(waveform, Trapezoid):
         return waveform.rise + waveform.width
     return float(getattr(waveform, "width", waveform.support))
+
+
+def is_reversed(waveform: Waveform, first: Waveform) -> bool:
+    """Whether two waveforms have opposite signs, each in the middle of its on-time."""
+    middles = [0.5 * off_after(each) for each in (waveform, first)]
+    if not all(map(math.isfinite, middles)):
+        return False
+    values = [float(each.value(middle)) for each, middle in zip((waveform, first), middles, strict=True)]
+    return values[0] * values[1] < 0.0
 
 
 def timings_of(problem: Problem, record: Record, closings: Sequence[Closing]) -> list[Timing]:
@@ -84,11 +101,12 @@ def timings_of(problem: Problem, record: Record, closings: Sequence[Closing]) ->
     return timings
 
 
-_Span = tuple[float, float, float]  # Times of switch-on, switch-off (may be infinite) and end of a firing, s
+_Span = tuple[float, float, float, bool]
+"""Times of switch-on, switch-off (may be infinite) and end of a firing, s, and whether it is reversed."""
 
 
 def _firings(drive: Drive, record: Record) -> Iterator[tuple[int, _Span]]:
-    """Yield, for each firing of a run, its index and its times of switch-on, switch-off and end [s]."""
+    """Yield index and span of each firing of a run; a reversed firing has the opposite sign of the first."""
     first, last = float(record.nodes[0, 0]), float(record.nodes[-1, 0])
     times = [float(time) for time in drive.times]
     fired = getattr(drive, "waveforms", None) or (drive.waveform,) * len(times)
@@ -96,7 +114,8 @@ def _firings(drive: Drive, record: Record) -> Iterator[tuple[int, _Span]]:
         following = min(times[number + 1 : number + 2], default=math.inf)
         off = on + off_after(waveform)
         if first <= on < last:
-            yield number, (on, off if off < following else math.inf, min(following, last))
+            ends = off if off < following else math.inf
+            yield number, (on, ends, min(following, last), is_reversed(waveform, fired[0]))
 
 
 def _timing(
@@ -110,10 +129,10 @@ def _timing(
 ) -> Timing:
     """Compute the switching times and forces of one contact after one firing.
 
-    `number` is the index of the firing, and `span` its times of switch-on, switch-off and end, s; `closings`
-    are those of the contact.
+    `number` is the index of the firing, and `span` describes the firing, as `_Span` states; `closings` are
+    those of the contact.
     """
-    on, off, end = span
+    on, off, end, is_reset = span
     makes = contact.side == "front"
     closed = [each.t_in for each in closings if not each.initial]
     opened = [each.t_out for each in closings if each.t_out is not None]
@@ -122,6 +141,9 @@ def _timing(
     # A short pulse may be over before the contact switches.
     released = [time for time in back if max(off, min(forth, default=math.inf)) <= time < end]
     operated = [time for time in forth if time < min(released, default=math.inf)]
+    reset: list[float] = []
+    if is_reset and makes == _is_closed(closings, on) and makes != _is_closed(closings, end):
+        reset, operated, released = [time for time in back if on <= time < end], [], []
     x, v = problem.resample(record, np.array([min(off, end) if makes else end]))[0, :2]
     during = [each for each in closings if each.t_in < end and (each.t_out is None or each.t_out > on)]
     return Timing(
@@ -134,8 +156,17 @@ def _timing(
         operate_bounce=operated[-1] - operated[0] if operated else None,
         release_time=released[0] - off if released else None,
         release_bounce=released[-1] - released[0] if released else None,
+        reset_time=reset[0] - on if reset else None,
+        reset_bounce=reset[-1] - reset[0] if reset else None,
         largest_force=max((each.peak_force for each in during), default=0.0),
         final_force=float(contact.force(max(contact.sign * (x - contact.position), 0.0), contact.sign * v)),
+    )
+
+
+def _is_closed(closings: Sequence[Closing], time: float) -> bool:
+    """Whether a contact is closed just before the time `time` [s]."""
+    return any(
+        (each.initial or each.t_in < time) and (each.t_out is None or each.t_out >= time) for each in closings
     )
 
 
@@ -155,10 +186,14 @@ def timing_facts(timings: Sequence[Timing], closings: Sequence[Closing], end: fl
     for name in dict.fromkeys(each.contact for each in timings):
         own = [each for each in timings if each.contact == name]
         forth, back = ("closes", "opens") if own[0].kind == "make" else ("opens", "closes")
-        told = [
-            _phrase(forth, "switch-on", [(each.operate_time, each.operate_bounce) for each in own]),
-            _phrase(back, "switch-off", [(each.release_time, each.release_bounce) for each in own]),
-        ]
+        told = [_phrase(forth, "switch-on", [(each.operate_time, each.operate_bounce) for each in own])]
+        is_latched = any(each.reset_time is not None for each in own)
+        if not is_latched or any(each.release_time is not None for each in own):
+            release = [(each.release_time, each.release_bounce) for each in own]
+            told.append(_phrase(back, "switch-off", release))
+        if is_latched:
+            reset = [(each.reset_time, each.reset_bounce) for each in own]
+            told.append(_phrase(back, "the switch-on of a reversed pulse", reset))
         largest = quantity(max(each.largest_force for each in own), "N")
         lost = _lost([each for each in closings if each.contact == name])
         rows.append((f"contact {name}", ", ".join([*told, f"up to {largest}{lost}"])))
