@@ -271,3 +271,10 @@ def test_switching_times_are_compared_with_the_limits(tmp_path: Path) -> None:
     missed = missed_limits(sheet, hammer_of(sheet)[0])
     assert len(missed) == 2
     assert all("operate time" in each for each in missed)
+    # A pulse too short to lift the armature: one sentence for each contact, not for each of its limits.
+    brief = CONTACTS.replace("40 ms", "0.1 ms")
+    sheet = sheet_of(f"{PLAIN}{brief}{wide}", tmp_path)
+    assert [each.split(",")[0] for each in missed_limits(sheet, hammer_of(sheet)[0])] == [
+        "the make contact does not switch",
+        "the break contact does not switch",
+    ]

@@ -88,6 +88,9 @@ def missed_limits(sheet: DataSheet, hammer: Hammer) -> list[str]:
             "release_time": timing.release_time,
             "bounce_time": closing,
         }
+        if all(measured[name] is None for name in limits):
+            missed.append(f"the {timing.contact} contact does not switch, so that its times are unknown")
+            continue
         for name in limits:
             what, limit, value = name.replace("_", " "), sheet.si(name), measured[name]
             if value is None:
