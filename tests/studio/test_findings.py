@@ -205,6 +205,15 @@ def test_contacts_of_a_relay_open_and_close_at_their_positions(opened: Page) -> 
     assert len(seen) == 4
 
 
+def test_the_motion_of_a_relay_shows_its_contacts_by_name(opened: Page) -> None:
+    opened.run("window.studio.studio.store.set({ hammer: 'relay-5v', rate: 20, pulses: 3, constants: {} })")
+    opened.wait("!window.studio.studio.busy && window.studio.studio.loaded === 'relay-5v'")
+    opened.wait("!window.studio.studio.stale")
+    opened.run(HELPERS)
+    texts = opened.run("helpers.painted('motion', 500, 300).texts")
+    assert {"make", "break", "pole", "backstop"} <= set(texts)
+
+
 def sketched(page: Page, time: float) -> list[str]:
     """Return the texts of the drawing of the actuator at a given time, s."""
     page.run(f"{HELPERS}; window.studio.studio.cursor = {time}")

@@ -85,7 +85,7 @@ function within(frame, scale, value) {
   return value >= 1.01 * low - 1e-9 && value <= 1.01 * high;
 }
 
-/** The surfaces that are struck as lines, and the firings as marks on the axis. */
+/** The surfaces that are struck and the contacts as lines, and the firings as marks on the axis. */
 function places(pen, plane, box, frame) {
   const c = colours();
   const { backstop, front, platen } = frame.places;
@@ -98,23 +98,33 @@ function places(pen, plane, box, frame) {
   pen.strokeStyle = c.muted;
   pen.lineWidth = 0.8;
   for (const place of [backstop, front, platen]) if (place !== null) line(pen, box.x, plane.Y(place), box.x + box.w, plane.Y(place));
+  pen.setLineDash([2, 3]);
+  for (const { position } of frame.contacts) if (isInside(plane, box, position)) line(pen, box.x, plane.Y(position), box.x + box.w, plane.Y(position));
+  pen.setLineDash([]);
   pen.strokeStyle = c.drive;
   pen.lineWidth = 1;
   for (const fired of frame.fired) line(pen, plane.X(fired), box.y + box.h, plane.X(fired), box.y + box.h - 6);
   pen.restore();
 }
 
-/** The names of the surfaces that are struck, and the time between the first two firings, over the curves. */
+/** Whether a displacement lies within the vertical axis: the armature may never reach a contact. */
+function isInside(plane, box, place) { return plane.Y(place) >= box.y && plane.Y(place) <= box.y + box.h; }
+
+/** The names of the surfaces that are struck and of contacts, and the time between the first two firings, over the curves. */
 function placeNames(pen, plane, box, frame, stop, pack) {
   const c = colours();
   const { backstop, front, platen } = frame.places;
   pen.save();
   pen.font = FONT;
-  for (const [name, place] of [[stop, backstop], [pack, front], ["platen", platen]]) {
-    if (place === null) continue;
+  const surfaces = [[stop, backstop], [pack, front], ["platen", platen]].filter(([, place]) => place !== null);
+  // A contact may lie close to a surface, so that its name stands beside those of the surfaces.
+  const aside = Math.max(0, ...surfaces.map(([name]) => pen.measureText(name).width + 8));
+  const contacts = frame.contacts.filter(({ position }) => isInside(plane, box, position));
+  const named = [...surfaces.map((each) => [...each, 0]), ...contacts.map(({ name, position }) => [name, position, aside])];
+  for (const [name, place, inward] of named) {
     const low = plane.Y(place) > box.y + 16;
     const wide = pen.measureText(name).width;
-    grounded(pen, name, box.x + box.w - 3 - 0.5 * wide, plane.Y(place) + (low ? -8 : 8), c.muted, c);
+    grounded(pen, name, box.x + box.w - 3 - inward - 0.5 * wide, plane.Y(place) + (low ? -8 : 8), c.muted, c);
   }
   spacing(pen, plane, box, frame.fired, c);
   pen.restore();
