@@ -62,6 +62,21 @@ def test_a_tour_marks_what_it_tells(page: Page) -> None:
     assert page.complaints == []
 
 
+def test_a_tour_of_a_ball_tells_of_no_armature(page: Page) -> None:
+    page.run("window.studio.studio.choose('bouncing-ball').then(() => 1)")
+    page.wait("window.studio.studio.loaded === 'bouncing-ball' && !window.studio.studio.busy")
+    page.run("document.querySelector('.tour').click()")
+    told = []
+    for _ in range(8):
+        told.append(page.run("document.querySelector('.coach').textContent"))
+        page.run("document.querySelector('.coach .next').click()")
+    assert not page.run("document.querySelector('.coach').checkVisibility()")
+    assert "The ball" in told[0]
+    for word in ("armature", "coil", "dot", "backstop", "printed"):
+        assert not any(word in text for text in told), word
+    assert page.complaints == []
+
+
 def test_pictures_tell_their_result_to_those_who_do_not_see_them(page: Page) -> None:
     page.run(f"window.studio.studio.store.set({{ views: {list(VIEWS)} }}); 1")
     page.wait("[...document.querySelectorAll('.caption')].every((each) => each.textContent)")

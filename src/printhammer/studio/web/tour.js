@@ -1,7 +1,8 @@
 // A tour of two minutes: what the parts of the page are, one after the other, each marked while it is told.
+import { said } from "./captions.js";
 import { element as make } from "./dom.js";
 import { OPENING, VIEWS } from "./state.js";
-import { viewsOf } from "./words.js";
+import { moverOf, prints, viewsOf } from "./words.js";
 
 const STEPS = [
   [".view-sketch", "The actuator, to scale along its stroke. The coil lifts the armature off its magnet on the left; it flies to the pack of ribbon and paper on the platen. Press ▶ or Space to let it move, three hundred times as slowly as it is."],
@@ -14,7 +15,21 @@ const STEPS = [
   [".more", "In the menu a run is pinned: it stays behind the next ones in grey. Undo goes back over everything, and the address of the page always holds what you see."],
   [".strip", "Six stories from the paper begin here, each with what to notice. That is all: the key ? lists the keys."],
 ];
+/** What steps tell of a device that does not print on paper. */
+const OTHERWISE = {
+  ".view-sketch": (mover) => `The ${mover}, to scale along the direction of motion. Press ▶ or Space to let it move.`,
+  ".view-motion": () => "The same against time: blue the displacement, orange the drive. The thin line is the time that is shown in all views; move it with the pointer. Drag over a part to enlarge it, Escape shows all.",
+  ".view-line": () => "What comes of it: a dot for each firing, below the moment of its touch, as large as its force.",
+  ".view-map": () => "All rates at once: time to the right, rate upward, the colour is the displacement. Drag across it: the rate follows.",
+  ".view-forces": () => "Why it is so: the forces against time.",
+};
 const EACH = 14; // s, of two minutes
+
+/** Return what a step tells of a device that does not print on paper, if that differs. */
+function toldOf(where, described) {
+  const isPrinter = prints(described) && !described.struck;
+  return isPrinter || !OTHERWISE[where] ? null : said(OTHERWISE[where](moverOf(described)), described);
+}
 
 /** Return how the tour begins, and its element. */
 export function tourOf(studio, stories) {
@@ -65,7 +80,7 @@ export function tourOf(studio, stories) {
     begin: () => {
       stories.shut();
       const known = viewsOf(studio.described);
-      steps = STEPS.filter(([where]) => !viewAt(where) || known.includes(viewAt(where)));
+      steps = STEPS.filter(([where]) => !viewAt(where) || known.includes(viewAt(where))).map(([where, what]) => [where, toldOf(where, studio.described) ?? what]);
       if (studio.store.state.views.join() !== OPENING.join()) studio.store.set({ views: OPENING });
       if (studio.parts.grid.classList.contains("one")) studio.enlarge(VIEWS.find((name) => studio.parts.grid.querySelector(`.view-${name}.large`)));
       holder.hidden = false;
