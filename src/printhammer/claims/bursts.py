@@ -248,7 +248,7 @@ def later_impacts(motion: Motion) -> list[tuple[float, bool]]:
 
 @measures("flight_time_spread", *WHOLE)
 def flight_time_spread(context: Context, claim: Claim) -> Measured:
-    """Measure the spread of flight times in a burst, at the strobe time of each strange panel of Fig. 11."""
+    """Measure the spread of flight times in a burst, at the strobe time of each strange train of Fig. 11."""
     settings, pulses = claim.settings, claim.settings["pulses"]
     _, _, slow = spreads(context.train(settings["rate_Hz"], pulses))
     by_panel: dict[str, Any] = {}

@@ -43,7 +43,7 @@ class Claim(Declared):
     source: str = part("section, page or figure of the paper that makes the statement")
     says: str = part("statement of the paper, in our words")
     reading: str = part("measured values, and the condition for the claim to hold")
-    note: str = part("additional note for the reader, or an empty text")
+    note: str = part("additional note for the reader, or an empty string")
     settings: Mapping[str, Any] = part("numbers that set up the experiment, SI")
     band: Mapping[str, Any] = part(
         "allowed values of each measured value: a number or text, true or false; a list (smallest, largest)"

@@ -40,7 +40,7 @@ def scaled(points: FloatArray) -> FloatArray:
 
 
 def panels(context: Context, *, strange: bool = True) -> dict[str, FloatArray]:
-    """Compute the strobe points of the panels of Fig. 11, by panel name; by default chaotic panels only."""
+    """Compute the strobe points of the panels of Fig. 11, by panel name; by default strange trains only."""
     count = claims()["poincare_window"].settings["points"]
     return {
         panel_name(period): strobe_points(context, period, count)
@@ -75,7 +75,7 @@ def poincare_window(context: Context, claim: Claim) -> Measured:
 
 @measures("behind_the_backstop", *WHOLE)
 def behind_the_backstop(context: Context, _claim: Claim) -> Measured:
-    """Measure how far behind the backstop the deepest strobe point of the strange panels lies, m."""
+    """Measure how far behind the backstop the deepest strobe point of all strange trains lies, m."""
     depths = {name: context.position - float(points[:, 0].min()) for name, points in panels(context).items()}
     deepest = max(depths, key=lambda name: depths[name])
     value = {"depth_m": depths[deepest], "depths_m": depths}
@@ -122,7 +122,7 @@ def cloud_grows(context: Context, _claim: Claim) -> Measured:
 
 @measures("successive_points_apart", *WHOLE)
 def successive_points_apart(context: Context, claim: Claim) -> Measured:
-    """Measure the median distance of successive strobe points, relative to that of all pairs of points."""
+    """Measure the median distance of successive strobe points, relative to the median of all pairs."""
     ratios: dict[str, float | None] = {}
     for name, states in panels(context).items():
         points = scaled(states)

@@ -182,7 +182,7 @@ class Job:
             self.screen.print(part, soft_wrap=isinstance(part, str))
 
     def worded(self, said: Shown) -> Shown:
-        """Replace the noun "dot" in texts or a summary by the hammer's noun, such as "closing"."""
+        """Replace the noun "dot" in texts or a summary with the hammer's noun, such as "closing"."""
         from printhammer.results.summary import worded
 
         named: Shown = said if self.hammer is None else worded(said, self.hammer.strike)

@@ -23,7 +23,7 @@ _PLAIN: Final = {"µ": "u", "–": "-", "…": "...", "·": " ", "×": "x", "°"
 
 
 def _plain(error: UnicodeError) -> tuple[str, int]:
-    """Error handler of an encoder: replace characters by plain text, or else by their code points."""
+    """Error handler of an encoder: replace characters with plain text, or else with their code points."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     signs = error.object[error.start : error.end]
@@ -40,7 +40,7 @@ def allow_any_text() -> None:
 
 
 def console() -> Console:
-    """Return the console of the standard output; without a terminal, wide enough for tables."""
+    """Return the console for standard output; without a terminal, wide enough for tables."""
     return Console(highlight=False, emoji=False, width=None if sys.stdout.isatty() else _WIDTH)
 
 

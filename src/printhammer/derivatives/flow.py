@@ -3,8 +3,8 @@
 The integration is a second pass over the record of a run, so that ordinary runs bear no extra cost.
 
 The tangent flow of constants consists of the derivatives of a motion with respect to constants of hammer and
-drive. Its columns are integrated by `printhammer.kernel.variational`, as are those of the tangent flow of the
-state (`printhammer.derivatives.states`). The derivation is in docs/tangent.md.
+drive. Its columns are integrated by `printhammer.kernel.variational`, as are the columns of the tangent flow
+of the state (`printhammer.derivatives.states`). The derivation is in docs/tangent.md.
 """
 
 from __future__ import annotations
@@ -227,10 +227,10 @@ def _released(hammer: Hammer, push: float, before: float) -> float:
 def without_current(problem: Problem, wanted: Sequence[Parameter], columns: FloatArray) -> FloatArray:
     """Return the derivatives of a currentless initial state with respect to n constants, shape (6, n).
 
-    Rows 0 to 2 are `columns`, the derivatives of the mechanical state. Rows 3 to 5 are those of the flux
-    linkages of coil and shorted turn [Wb] and of the reservoir voltage [V]. The flux linkage at zero current
-    depends on the initial displacement. If a voltage is switched on at time 0, a shift of its firing changes
-    the initial flux linkage.
+    Rows 0 to 2 are `columns`, the derivatives of the mechanical state. Rows 3 to 5 are the derivatives of the
+    flux linkages of coil and shorted turn [Wb] and of the reservoir voltage [V]. The flux linkage at zero
+    current depends on the initial displacement. If a voltage is switched on at time 0, a shift of its firing
+    changes the initial flux linkage.
     """
     magnet: Any = import_module(problem.laws.magnet or problem.laws.absent)
     linkage = getattr(magnet, "magnet_linkage", None) if problem.constants[COUPLED] else None

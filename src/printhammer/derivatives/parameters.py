@@ -1,7 +1,7 @@
 """Differentiable constants of a motion, and their effect on the kernel's arrays.
 
 A constant is named as in a hammer file, such as "pack.stiffness"; constants of the pulse, such as
-"waveform.width", are those of the drive. Further constants are "period" and "rate" of a train at a constant
+"waveform.width", refer to the drive. Further constants are "period" and "rate" of a train at a constant
 rate or a sinusoidal force, and the time of a single firing, such as "firing.3", counted from 0. A sampled
 waveform has a single constant, "waveform.amplitude", its largest value.
 

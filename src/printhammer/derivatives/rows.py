@@ -3,8 +3,9 @@
 A drive that fires the same pulses for every dot of a row has a strobe map, from the state at one firing to
 the state at the next; for a row that repeats after n dots, the map leads from one firing to the n-th firing
 after it. A row of equal dots is a fixed point of this map. The eigenvalues of the derivative at the fixed
-point are its Floquet multipliers, the factors by which a small error grows from dot to dot: with a multiplier
-outside the unit circle a long row leaves the fixed point, however good its first dots are.
+point are its Floquet multipliers, the factors by which a small deviation grows from dot to dot: with a
+multiplier outside the unit circle, a long row leaves the fixed point even if its first dots meet their
+target.
 
 The fixed points of many rows are computed at once by Newton's method, with derivatives from central
 differences of neighbouring runs in one ensemble.

@@ -19,7 +19,7 @@ END: Final = 3.0
 SWITCHED: Final = 4.0
 DECAY: Final = 5.0
 RESERVOIR: Final = 6.0
-"""Code of a segment fed by a reservoir; codes from `POLYNOMIAL` on are those of
+"""Code of a segment fed by a reservoir; codes from `POLYNOMIAL` on are defined in
 `printhammer.drive.segments`."""
 
 ROWS: Final = 4

@@ -142,12 +142,12 @@ class Hammer:
 
     @property
     def title(self) -> str:
-        """One-line description of the hammer, or an empty text."""
+        """One-line description of the hammer, or an empty string."""
         return self._contents.title
 
     @property
     def note(self) -> str:
-        """Important remarks on the constants of the hammer, or an empty text."""
+        """Important remarks on the constants of the hammer, or an empty string."""
         return self._contents.note
 
     @property
@@ -157,7 +157,7 @@ class Hammer:
 
     @property
     def struck(self) -> str:
-        """Noun for the struck object, such as "pole" of a relay, or an empty text."""
+        """Noun for the struck object, such as "pole" of a relay, or an empty string."""
         return self._contents.struck
 
     @property

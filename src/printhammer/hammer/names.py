@@ -49,23 +49,23 @@ PLACES: Final = ("platen", "pack.front", "backstop.position")
 """Constants that are positions on the axis of the armature, such as "backstop.position"."""
 
 _ZERO: Final = {"m": 100e-6, "s": 500e-6, "kg": 1e-3, "N": 10.0}
-"""Upper end of the control range of a zero constant, by SI unit; arbitrary, typical of print hammers."""
+"""Upper end of the slider range of a zero constant, by SI unit; arbitrary, typical of print hammers."""
 
 
 @dataclass(frozen=True)
 class Range:
-    """Range of a constant on a control, such as a slider."""
+    """Range of a constant on a slider."""
 
     low: float
     """Lower end of the range, SI."""
     high: float
     """Upper end of the range, SI."""
     logarithmic: bool
-    """Whether the scale of the control is logarithmic, so that equal steps are equal factors."""
+    """Whether the scale of the slider is logarithmic, so that equal steps are equal factors."""
 
 
 def range_of(hammer: Hammer, name: str, factor: float = 10.0) -> Range:
-    """Return the control range of a constant, around its value in a hammer.
+    """Return the slider range of a constant, around its value in a hammer.
 
     Positions vary by half the distance from backstop to platen in either direction; other constants range
     from 1 / `factor` to `factor` times their value, but a coefficient of restitution only up to 1. A constant

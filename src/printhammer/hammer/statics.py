@@ -1,7 +1,7 @@
 """Static force on the armature as plain functions, which can be compiled as entry points.
 
-`Statics` holds the law functions of the parts with their constants: in Python the functions are those of the
-part modules, in compiled code those of the kernel.
+`Statics` holds the law functions of the parts with their constants: in Python the functions are defined in
+the part modules, in compiled code in the kernel.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ MOST_PLACES: Final = 8192
 class Statics(NamedTuple):
     """Law functions and constants that determine the static force of a hammer.
 
-    The law functions of absent parts are those of `printhammer.parts.absent`.
+    The law functions of absent parts are defined in `printhammer.parts.absent`.
     """
 
     magnet_force: Any

@@ -102,7 +102,7 @@ def _limit_text(value: float, unit: str) -> str:
 
 
 def typeset(text: str) -> str:
-    """Replace "us", ">=", "<=" and "->" in a sentence by µs, ≥, ≤ and →."""
+    """Replace "us", ">=", "<=" and "->" in a sentence with µs, ≥, ≤ and →."""
     text = re.sub(r"(?<=\d) u([ms])\b", "\N{NO-BREAK SPACE}µ\\1", text)
     return text.replace(">=", "≥").replace("<=", "≤").replace(" -> ", " → ")
 

@@ -196,7 +196,7 @@ class Result:
     def plot(self, **options: Any) -> Figure:
         """Draw the result; with an interactive backend, `pyplot.show` shows the figure.
 
-        Options are those of the plot function that `printhammer.figures.plots` registers for the class;
+        Options are passed to the plot function that `printhammer.figures.plots` registers for the class;
         `picture` selects an alternative figure.
         """
         # Imported by name, so that the physics does not depend on the figures.
@@ -250,7 +250,7 @@ class Result:
 
 
 def _worded(summary: Callable[..., Summary]) -> Callable[..., Summary]:
-    """Decorate `summary`: replace "dot" by the hammer's noun for the result of a pulse."""
+    """Decorate `summary`: replace "dot" with the hammer's noun for the result of a pulse."""
 
     @wraps(summary)
     def said(self: Result, *args: Any, **options: Any) -> Summary:

@@ -105,7 +105,7 @@ def shown(value: float, unit: str, name: str, digits: str) -> str:
 
 
 def rendered(text: str, system: System = "si", style: Callable[[str, str], str] | None = None) -> str:
-    """Replace the marks of a text by formatted quantities; `style` renders styled words."""
+    """Replace the marks of a text with formatted quantities; `style` renders styled words."""
 
     def converted(mark: re.Match[str]) -> str:
         value, unit, bare = float(mark[1]), mark[2], mark[3]
@@ -220,7 +220,7 @@ class Summary(tuple[str | Facts | Grid, ...]):
 
 
 def worded(each: Any, strike: str) -> Any:
-    """Replace "dot" and "printed" by words for the noun `strike` in texts, facts, tables and sequences."""
+    """Replace "dot" and "printed" with words for the noun `strike` in texts, facts, tables and sequences."""
     if strike == "dot":
         return each
     if isinstance(each, str):

@@ -34,7 +34,7 @@ _GAUSS = np.polynomial.legendre.leggauss(4)  # Nodes and weights of the quadratu
 class SchemeProblem(Problem):
     """Hammer under a drive, integrated with a scheme of the 1983 paper.
 
-    The arguments are those of `Problem`; the tolerance is ignored. `scale` multiplies all step sizes of the
+    The arguments are as for `Problem`; the tolerance is ignored. `scale` multiplies all step sizes of the
     paper's schedule, and `reading`, one of `READINGS`, decides when a short step is taken. Raises InputError
     if `scale` is not positive, or the hammer has damping.
     """
@@ -199,8 +199,8 @@ class SchemeProblem(Problem):
     def peaks(self, record: Record) -> FloatArray:
         """Return time [s], depth [m] and force [N] of the peak of each contact, shape (m, 3).
 
-        Time and depth are those of the step end with the largest depth; the force is the largest at any step
-        end of the contact.
+        Time and depth are taken at the step end with the largest depth; the force is the largest force at any
+        step end of the contact.
         """
         nodes = record.nodes
         out = np.zeros((len(record.contacts), 3))

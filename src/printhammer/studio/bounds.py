@@ -36,13 +36,13 @@ LARGEST: Final = {"V": LARGEST_VOLTAGE, "ohm": 1e6}
 """Largest value of a driver's constant, by its unit."""
 
 SPAN: Final = 10.0
-"""Largest factor by which a control may change a constant from its value in the loaded hammer; arbitrary."""
+"""Largest factor by which a slider may change a constant from its value in the loaded hammer; arbitrary."""
 
 SPAN_OF_PLACES: Final = 100e-6
-"""Half the control range of a position at 0 that is the only position of a device, m; arbitrary."""
+"""Half the slider range of a position at 0 that is the only position of a device, m; arbitrary."""
 
 QUARTER_TURN: Final = 0.5 * math.pi
-"""Half the control range of an angle, rad."""
+"""Half the slider range of an angle, rad."""
 
 MOST_STEPS: Final = 50_000
 """Step limit of the single run that the curves show; arbitrary."""

@@ -35,7 +35,7 @@ _PULSE: Final = (1.97, 177e-6)
 """Default peak, A, and width, s, of a current pulse, from the hammer `hendriks-1983`."""
 
 TEMPERATURES: Final = Range(-40.0, 180.0, logarithmic=False)
-"""Range of the control of the winding temperature, degC."""
+"""Slider range of the winding temperature, degC."""
 
 
 def has_rail(hammer: Hammer) -> bool:
@@ -45,7 +45,7 @@ def has_rail(hammer: Hammer) -> bool:
 
 @lru_cache(maxsize=16)
 def open_constants(hammer: Hammer) -> dict[str, tuple[Constant, Range]]:
-    """Return the coil constants that the page adds to a hammer, and their control ranges, by dotted key."""
+    """Return the coil constants that the page adds to a hammer, and their slider ranges, by dotted key."""
     if not has_rail(hammer):
         return {}
     values: dict[str, float] = {"temperature": REFERENCE}
@@ -65,9 +65,9 @@ def open_constants(hammer: Hammer) -> dict[str, tuple[Constant, Range]]:
 
 
 def span_of(hammer: Hammer, constant: Constant) -> Range | None:
-    """Return the control range of a constant of a hammer; None for a constant without a control.
+    """Return the slider range of a constant of a hammer; None for a constant without a slider.
 
-    Constants of the waveform have no such control: the pulse editor changes them.
+    Constants of the waveform have no slider: the pulse editor changes them.
     """
     section = constant.key.partition(".")[0]
     if section == "waveform":

@@ -121,7 +121,7 @@ def is_place(key: str) -> bool:
 
 
 def span_of_term(hammer: Hammer, key: str) -> Range:
-    """Return the control range of a constant of a force or contact.
+    """Return the slider range of a constant of a force or contact.
 
     Positions vary by half the largest distance between the positions of the hammer, in either direction; a
     contact stays beyond the backstop. Angles vary by a quarter turn about 0, or more if the file states more.

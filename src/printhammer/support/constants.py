@@ -38,7 +38,7 @@ class Quantity:
     symbol: str
     """Symbol of the constant in the paper or in textbooks, as plain text."""
     meaning: str
-    """Meaning of the constant in one phrase, for tables and help texts."""
+    """Description of the constant in one phrase, for tables and help texts."""
     also: tuple[str, ...] = ()
     """SI units of other dimensions that a file may use instead (for the amplitude of a waveform: A or N)."""
     gt: float | None = None
@@ -70,7 +70,7 @@ class Constant:
     source: str
     """Origin of the value, such as a figure, a measurement or a textbook."""
     meaning: str
-    """Meaning of the constant, from the `Quantity` of the field."""
+    """Description of the constant, from the `Quantity` of the field."""
     symbol: str
     """Symbol of the constant, from the `Quantity` of the field."""
     si_unit: str

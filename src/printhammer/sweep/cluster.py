@@ -52,7 +52,7 @@ def run_dask(
     The scheduler repeats a task whose worker is killed. A task that has killed several workers is abandoned
     by the scheduler; it is postponed until all other tasks are done, then computed alone on the cluster, in
     ever smaller pieces; a member that still kills its worker is recorded as lost. `client` is a
-    `distributed.Client` of the scheduler; the other arguments are those of `run_local`.
+    `distributed.Client` of the scheduler; the other arguments are as for `run_local`.
 
     Raises
     ------
@@ -87,7 +87,7 @@ class _Tasks:
     ) -> list[Index]:
         """Compute blocks concurrently; return the indices of the blocks that killed several workers.
 
-        The arguments are those of `run_local`.
+        The arguments are as for `run_local`.
         """
         left = deque(todo)
         suspects: list[Index] = []

@@ -455,7 +455,7 @@ def _decided(
 def _sample(decided: IntArray, count: int) -> IntArray:
     """Select an evenly spread sample of the decided cells, to be recomputed at a finer tolerance.
 
-    The sample size depends on `count`, the number of all cells.
+    The sample size depends on `count`, the total number of cells.
     """
     size = min(SAMPLE, max(count // 8, 1), len(decided))
     shares = (np.arange(1, size + 1) * _GOLDEN) % 1.0

@@ -123,7 +123,7 @@ def _run(
 ) -> Columns:
     """Simulate trains that all start from rest, all inside the pack, or all outside; return their columns.
 
-    The arguments are those of `run_columns`.
+    The arguments are as for `run_columns`.
     """
     rest = bool(np.isnan(states[0, 0]))
     # The cells of a basin share one regime; the columns of a diagram have one regime each.
@@ -177,7 +177,7 @@ def run_in_stretches(
 ) -> Columns:
     """Simulate trains without memory (`is_memoryless`) one period at a time.
 
-    Arguments and result are those of `run_columns`. The computation is slower than one long run, but the
+    Arguments and result are as for `run_columns`. The computation is slower than one long run, but the
     rounding error does not grow with time; see `printhammer.chaos.strobe.train.STRETCH`.
     """
     columns = blank_columns(len(regimes), firings - transient)
@@ -219,9 +219,10 @@ def run_in_stretches(
 
 
 def _train(regime: Regime, firings: int, rest: bool) -> tuple[Drive, FloatArray]:
-    """Build the drive of a train of `firings` firings; return the drive and the firing times [s].
+    """Build the drive of a train of `firings` firings; return the drive and `firings` + 1 firing times [s].
 
-    One time after the last firing is included. If `rest`, no pulses are fired before the start of the run.
+    The additional time, one period after the last firing of the train, is the time of the next firing. If
+    `rest`, no pulses are fired before the start of the run.
     """
     if rest and regime.drive is None:
         drive = regime.pulses(firings + 2)

@@ -68,8 +68,8 @@ class Node(Declared):
     def multipliers(self) -> npt.NDArray[np.complex128]:
         """Multipliers of the fixed point, largest absolute value first.
 
-        They are the eigenvalues of the monodromy matrix if the map provides this matrix, else those of the
-        derivative of the map.
+        The multipliers are the eigenvalues of the monodromy matrix if the map provides this matrix, else of
+        the derivative of the map.
         """
         value = self.value
         matrix = value.jacobian if value.monodromy is None else value.monodromy
@@ -203,7 +203,7 @@ def between(follower: Corrector, here: Node, ahead: Node, share: float) -> Node 
 def on_chord(begin: Node, end: Node, share: float, arc: float) -> Node:
     """Interpolate state and parameter linearly at the fraction `share` of the chord between two nodes.
 
-    The new node has the arc length `arc`; its other fields are those of `begin`.
+    The new node has the arc length `arc`; its other fields are copied from `begin`.
     """
     state = begin.state + share * (end.state - begin.state)
     return replace(

@@ -237,7 +237,7 @@ def fading(
     is the grazing itself. The result is None if the impact speed does not reach zero nearby. In these
     variables the branch is smooth up to the grazing. In terms of the state at a section, the curvature of the
     branch diverges, since the derivative of the strobe map grows as the inverse of the speed. The arguments
-    are those of `touch_at`.
+    are as for `touch_at`.
     """
     way = [(touch.phase, touch.speed, float(regime.value(name)))]
     speeds = [touch.speed * share for share in _SLOWER] if touch.speed else []

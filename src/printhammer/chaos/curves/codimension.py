@@ -96,10 +96,11 @@ def _along(direction: FloatArray) -> Callable[[Node], float]:
 
 
 def _tests(kind: str, rigid: bool) -> dict[tuple[str, int], Callable[[Node], float]]:
-    """Return the test functions for points of codimension two on curves of the kind `kind`.
+    """Return the test functions for points of codimension two on a bifurcation curve.
 
-    The keys are the kind of the point and the number of orbit periods per touch. `rigid` tells whether the
-    backstop is rigid, so that resonant grazings exist.
+    `kind` is the bifurcation: "fold", "period doubling", "Neimark-Sacker" or "grazing". The keys are the name
+    of the point and the number of orbit periods per touch. `rigid` tells whether the backstop is rigid, so
+    that resonant grazings exist.
     """
     if kind == "fold":
         return {
@@ -134,10 +135,11 @@ def points_along(
     coefficients: FloatArray,
     coefficient: Callable[[CurvePoint], float],
 ) -> list[CodimensionTwo]:
-    """Locate the points of codimension two on a curve of the kind `kind`, in order.
+    """Locate the points of codimension two on a bifurcation curve, in order.
 
-    `rigid` tells whether the backstop is rigid. `coefficients` are the normal-form coefficients at the nodes
-    of a curve of period doublings; `coefficient` computes this coefficient at any other point of the curve.
+    `kind` is the bifurcation, such as "fold". `rigid` tells whether the backstop is rigid. `coefficients` are
+    the normal-form coefficients at the nodes of a curve of period doublings; `coefficient` computes this
+    coefficient at any other point of the curve.
     """
     points: list[CodimensionTwo] = []
     tests = _tests(kind, rigid)

@@ -297,8 +297,8 @@ class ImpactSystem:
     def _miss(self, flight: Flight, speed: float) -> FloatArray:
         """Compute the three scaled residuals of a flight that starts at an impact with the velocity `speed`.
 
-        They are those of the displacement at the next impact, of the velocity after that impact, and of the
-        test function.
+        The residuals are the deviation of the displacement at the next impact from the position of the
+        surface, the deviation of the velocity after that impact from `speed`, and the test function.
         """
         matrix, e, w = flight.jacobian, flight.rebound, float(flight.end[1])
         determinant = e * e * float(np.linalg.det(matrix))

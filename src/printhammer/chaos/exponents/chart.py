@@ -158,7 +158,8 @@ def lyapunovs(
     Parameters
     ----------
     hammers, periods, waveform, overlap
-        Hammers or regimes, and the firing of hammers; see `printhammer.run.regime.regimes_of`.
+        Regimes, or hammers with firing periods, waveform and overlap; see
+        `printhammer.run.regime.regimes_of`.
     firings, transient
         As for `lyapunov`, for all trains.
 

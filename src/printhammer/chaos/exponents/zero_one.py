@@ -241,7 +241,7 @@ def _classify(k: float, cycle: int, rest: FloatArray, resolution: float) -> tupl
     """Classify a series by the median correlation `k`, and by whether changes in the series die out.
 
     `rest` is the series minus its means over the cycle of length `cycle`. Returns the class, and the reason
-    for "undecided", else an empty text.
+    for "undecided", else an empty string.
     """
     if k <= REGULAR:
         return "regular", ""

@@ -211,7 +211,8 @@ def strobes(
     Parameters
     ----------
     hammers, periods, drives, waveform, overlap, phase
-        Hammers or regimes, and the firing of hammers; see `printhammer.run.regime.regimes_of`.
+        Regimes, or hammers with firing periods or continuous drives, waveform, overlap and phase; see
+        `printhammer.run.regime.regimes_of`.
     points, transient, verdict
         As for `strobe`, for all trains.
     states : sequence, optional

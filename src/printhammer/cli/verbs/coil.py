@@ -76,7 +76,7 @@ def dead_time(
         ),
         "seed": opt.whole("Seed for drawing the hammers and the noise.", default=0),
     },
-    out=opt.results("the errors of the impact time"),
+    out=opt.results("the errors of the estimated impact times"),
 )
 def impact_time(
     job: Job,

@@ -56,7 +56,8 @@ def map_(
     rates: int | None = _count("Number of rates (default: 512)."),
     times: int | None = _count("Number of points on the time axis of the map (default: 512)."),
     measured: Path | None = opt.source(
-        "Measured map to compare with (CSV or NetCDF); by default, its rates and times are used."
+        "Measured map to compare with (CSV or NetCDF); its rates and times become the defaults for the"
+        " computed map."
     ),
     columns: str | None = opt.text(
         "COLUMNS",

@@ -29,7 +29,7 @@ def tuned_along(
     """Tune a table for each value of an axis, such as 'rail 90 V, 110 V, 3'; show and save the result.
 
     `header` holds the arguments for writing a C header, `budget` is the limit on the size of its arrays in
-    bytes, and `options` are those of the tuning.
+    bytes, and `options` are the options of the tuning.
     """
     from printhammer.control.axes import tune_along
 

@@ -54,7 +54,7 @@ _LARGEST_FORCE: Final = 1.15
 
 @dataclass(frozen=True)
 class ForceMap:
-    """Peak force on the pack for each of T touches, B return currents and R release times."""
+    """Peak force on the pack for all combinations of T touches, B return currents and R release times."""
 
     kind: IntArray  # `PUSHED` or `FREE`, (T,)
     speed: FloatArray  # Speed of the touch, m/s; evenly spaced within a kind, (T,)
@@ -84,7 +84,7 @@ class ForceMap:
     def force_at(self, row: int, release: float, back: float) -> float:
         """Interpolate the peak force of touch `row`, as a fraction of the single-pulse force.
 
-        The push ends `release` [s] after the touch; then the return current is `back` [A].
+        The push current flows until `release` [s] after the touch, then the return current `back` [A].
         """
         number = int(np.argmin(np.abs(self.back - back)))
         return float(np.interp(release, self.release, self.force[row, number]))
@@ -218,8 +218,9 @@ def impact_map(
 def first_pulse(kind: int, release: float, back: float, fire: float, driver: Driver) -> Switched:
     """Return the waveform of the coil current from just before a touch up to the next firing.
 
-    The touch is of the kind `kind`; a push ends `release` [s] after the touch; then the return current
-    `back` [A] flows until the next firing, `fire` [s] after the touch.
+    `kind` is `PUSHED` or `FREE`: with or without coil current before the touch. From the touch on, the push
+    current flows until `release` [s] after the touch, then the return current `back` [A] until the next
+    firing, `fire` [s] after the touch.
     """
     at, levels = [0.0], [driver.current if kind == PUSHED else 0.0]
     if release > 0.0:

@@ -59,7 +59,7 @@ from printhammer.units import from_si
 if TYPE_CHECKING:
     import pandas as pd
 
-FORCE: Final = 0.9  # Default least force of an adequate dot, relative to the single pulse; arbitrary
+FORCE: Final = 0.9  # Default required force of a dot, relative to the single pulse; arbitrary
 SPACING: Final = 0.6
 """Default time between the nodes of the current, as a fraction of the duration of the indentation by a single
 pulse; rounded to a whole fraction of the period. Arbitrary."""
@@ -108,7 +108,7 @@ class SupplyCheck(Declared):
 
 
 class LeastWork(Result, rows="node"):
-    """A burst that prints adequate dots with least coil work, from rest to rest.
+    """A burst of dots with the requested force, printed with the least coil work, from rest to rest.
 
     The Dataset contains motion and power against time, and the pack contacts; the data frame contains the
     nodes of the current. Saved as CSV, the nodes are a sampled waveform
@@ -381,7 +381,7 @@ def least_work(
     effort: Effort = _SEARCH,
     **_keywords: Unpack[InOneThread],
 ) -> LeastWork:
-    """Find a current that prints a burst of adequate dots with least coil work, from rest to rest.
+    """Find a current that prints a burst of dots with the least coil work, from rest to rest.
 
     `effort.tolerance` applies to the search; the final drive is simulated at the tolerance of the ledger.
 
@@ -394,7 +394,7 @@ def least_work(
     dots : int, optional
         Number of dots.
     force : float, optional
-        Least force of a dot, relative to the single pulse.
+        Required force of every dot, relative to the single pulse.
     largest : float or str, optional
         Limit of the absolute current [A] or text with a unit; by default 2 A or the hammer's peak current.
     slew : float, optional

@@ -102,8 +102,8 @@ class Draft:
     def judge(self, level: Sequence[History] | None = None) -> None:
         """Evaluate and store the deviations of all entries, or of the entries with the histories `level`.
 
-        If all entries are evaluated, the deviation of a history of equal gaps becomes infinite where errors
-        grow along a long row of such dots.
+        If all entries are evaluated, the deviation of a history of equal gaps becomes infinite where
+        deviations grow from dot to dot in a long row with such gaps.
         """
         lengths = range(1, self.task.gaps + 1)
         levels = [histories_of_length(self.task, n) for n in lengths] if level is None else [level]

@@ -17,7 +17,7 @@ choose one candidate per period by dynamic programming (a Viterbi recursion; R. 
 (1957)) with a penalty for changing the branch between neighbouring periods, where the table cannot be
 interpolated. A solution that is far from all grid cells is missed.
 
-The times in this module are those of the paper's hammer; the times are multiplied by the time scale of the
+The times in this module are given for the paper's hammer; they are multiplied by the time scale of the
 device.
 """
 

@@ -151,15 +151,15 @@ def tune(
     """Tune a compensation table: pulse width and advance as a function of the last gaps between dots.
 
     If a dot equals a dot from rest, the hammer is left in the same state as after a dot from rest. The pulse
-    of the next dot then depends only on the time since that dot; longer histories correct the
-    remaining error. For each history, advance and width are found by a damped Gauss-Newton
-    (Levenberg-Marquardt) iteration so that force and arrival of the last dot of patterns with that history
-    are those of the single pulse. There are usually several solutions: before or after a rebound, with or
-    without a brake pulse that removes some of the rebound. `printhammer.control.table.search` enumerates them
-    and keeps the solution whose row of dots stays nearest to the single pulse on hammers with 3 % more or
-    less current, or 10 um more or less travel; the deviation on `hammer` has a weight of eight.
-    Solutions are admitted only if a small error decays from dot to dot in a long row. No dot is fired before
-    the armature has left the pack after the preceding dot.
+    of the next dot then depends only on the time since that dot; longer histories correct the remaining
+    error. For each history, advance and width are found by a damped Gauss-Newton (Levenberg-Marquardt)
+    iteration so that force and arrival of the last dot of patterns with that history equal force and arrival
+    of the single pulse. There are usually several solutions: before or after a rebound, with or without a
+    brake pulse that removes some of the rebound. `printhammer.control.table.search` enumerates them and keeps
+    the solution whose row of dots stays nearest to the single pulse on hammers with 3 % more or less current,
+    or 10 um more or less travel; the deviation on `hammer` has a weight of eight. Solutions are admitted only
+    if a small deviation decays from dot to dot in a long row. No dot is fired before the armature has left
+    the pack after the preceding dot.
 
     Parameters
     ----------

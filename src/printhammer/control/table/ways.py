@@ -251,12 +251,14 @@ def costs(task: Task, ways: Ways) -> FloatArray:
 
 
 def growths(task: Task, ways: Ways) -> FloatArray:
-    """Compute the growth factor of an error from dot to dot, in a long row of each candidate.
+    """Compute, for each candidate, the growth factor of a deviation from dot to dot in a long row.
 
-    An unknown factor is NaN. If the first two dots meet their target, the state after them is the fixed point
-    of the row. If the cost shows that the dots miss the target, and the row looks stable, the fixed point is
-    located by iteration. If `task.located` is set, the fixed points of all rows are located: near a grazing
-    no fixed point may exist, however good the first dots are.
+    All later dots of the row repeat the second dot of the candidate. The factor is the absolute value of the
+    leading Floquet multiplier; NaN if the multiplier is unknown. The multiplier is evaluated at the state
+    after the first two dots, which is the fixed point of the row if both dots meet their target. If the cost
+    of a candidate exceeds `BAD`, or if `task.located` is set, and the row appears stable, the fixed point is
+    located by Newton's method, and the multiplier is evaluated there: near a grazing, a row may have no fixed
+    point even if its first dots meet their target.
     """
     rows = rows_of(task, ways, _SECOND + MORE)
     hammers = [task.hammers[0]] * ways.size

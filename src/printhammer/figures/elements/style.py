@@ -115,7 +115,7 @@ def styled(function: Callable[_P, Figure]) -> Callable[_P, Figure]:
 
 
 def _name_strikes(figure: Figure, strike: str) -> None:
-    """Replace the word "dot" in all texts of a figure by the hammer's word for the result of a pulse."""
+    """Replace the word "dot" in all texts of a figure with the hammer's word for the result of a pulse."""
     from matplotlib.text import Text
 
     for text in figure.findobj(Text):

@@ -324,8 +324,8 @@ class GaussNewton:
     def profile(self, solution: Solution, which: int, degrees_of_freedom: float) -> Profile:
         """Compute the profile likelihood of the parameter with index `which`, and its 95 % interval.
 
-        The noise scales are those of the solution, with the given degrees of freedom. The profile ends where
-        no fit converges, or where the parameter would change its sign.
+        The noise scales are taken from the solution, with the given degrees of freedom. The profile ends
+        where no fit converges, or where the parameter would change its sign.
         """
         error = float(np.sqrt(solution.covariance[which, which]))
         best = solution.values[which]

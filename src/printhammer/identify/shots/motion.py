@@ -114,7 +114,7 @@ def remembered(shots: Sequence[Shot], solution: Solution) -> list[str]:
 def further(fit: GaussNewton, solution: Solution, hammer: Hammer, rejected: str) -> list[str]:
     """Return remarks on held constants that the records could determine, or that the records contradict.
 
-    `rejected` is the reason for the rejection of the model, or an empty text.
+    `rejected` is the reason for the rejection of the model, or an empty string.
     """
     sentences = ["a motion depends on forces over mass only: the mass is as accurate as the known forces"]
     shooting = fit.shooting

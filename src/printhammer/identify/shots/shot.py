@@ -282,7 +282,7 @@ class Pulse(Declared, eq=False):
     )
     values: FloatArray = part("estimated values of the uncertain constants, SI, shape (n,)")
     covariance: FloatArray = part("covariance of the uncertain constants, shape (n, n)")
-    note: str = part("remark, or an empty text", default="")
+    note: str = part("remark, or an empty string", default="")
 
     def changed(self, values: Sequence[float]) -> Waveform:
         """Return the waveform with its fitted constants set to `values`."""

@@ -50,18 +50,19 @@ def judge(
     Each term is added to the linearised, weighted fit, and a t-test, with errors and degrees of freedom as in
     the fit, determines whether the term is significant. Two tests examine the residuals in the order of the
     abscissa, series by series: the runs of their signs, and von Neumann's ratio. A third test checks whether
-    the excluded rows are more consecutive than random gross errors would be. The smallest p-value is
+    the excluded rows are more clustered than gross errors at random rows would be. The smallest p-value is
     corrected for the number of tests (Bonferroni).
 
-    `terms` maps the meaning of a missing term to the values of the term, in the unit of the data. Terms,
+    `terms` maps the description of each additional term to its values, in the unit of the data. Terms,
     abscissa and series have the shape (m,) of the data.
 
     Returns
     -------
     p_value : float
-        Smallest p-value, corrected; NaN if the data are exact or too few.
+        Smallest p-value, corrected; NaN if the residuals are only rounding errors, or the data are too few.
     why : str
-        Meaning of the term, or name of the test, with the smallest p-value; empty unless the law is rejected.
+        Description of the term, or of the finding of the test, with the smallest p-value; an empty string
+        unless the law is rejected.
     """
     if solution.exact or solution.degrees_of_freedom < 3:
         return math.nan, ""

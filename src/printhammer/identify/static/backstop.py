@@ -173,13 +173,13 @@ def fit_backstop(
 
     The table has the columns ``impact speed`` and ``rebound speed``. `stiffness` is computed from the radii
     and moduli of the two bodies in contact (`Stiffness.from_bodies`), or is a known value, N/m^1.5. Without a
-    table the result contains only the stiffness, without a stiffness only the ratio l/k. The other options
-    are described with `printhammer.identify.fitting.fit`.
+    table the result contains only the stiffness, without a stiffness only the ratio l/k. For the other
+    options, see `printhammer.identify.fitting.fit`.
 
     Raises
     ------
     InputError
-        Neither a table nor a stiffness is stated, the table is invalid or too small, or its rebounds are
+        Neither a table nor a stiffness is given, the table is invalid or too small, or its rebounds are
         faster than its impacts.
     """
     k = Stiffness(float(stiffness)) if isinstance(stiffness, (int, float)) else stiffness

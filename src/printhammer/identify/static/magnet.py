@@ -74,7 +74,7 @@ class TotalLaw:
         return TotalLaw(x, current, self.position, 0.0).value(p)
 
     def richer(self, p: FloatArray, *, by_current: bool) -> dict[str, FloatArray]:
-        """Return candidate terms that equation (3) lacks, shape (m,), keyed by the meaning of each term.
+        """Return additional terms that equation (3) lacks, shape (m,), keyed by the description of each term.
 
         With `by_current`, terms that depend on the current are included, which requires more than two
         different currents.
@@ -178,7 +178,7 @@ def fit_magnet(
     requires `position`, b, the position of the backstop, m. `zero` is the sensor reading at x = 0, m; None to
     fit it. The result has the constants "magnet.F0", "magnet.Am", "magnet.Bm", "spring.Bs" and "spring.As".
     Without `spring`, the forces determine only "magnet.Am", "magnet.Bm", F0 + Bs (1 + b / As) and Bs / As.
-    The other options are described with `printhammer.identify.fitting.fit`.
+    For the other options, see `printhammer.identify.fitting.fit`.
 
     Raises
     ------

@@ -202,7 +202,7 @@ def fit_pack(
     """Fit "pack.stiffness" to a table with the columns ``indentation``, ``force`` and optionally ``branch``.
 
     `thickness` is the thickness d of the pack, platen minus front, m. With `exponents`, the exponents of
-    loading and unloading are fitted too, instead of assuming 2.7 and 11. The other options are described with
+    loading and unloading are fitted too, instead of assuming 2.7 and 11. For the other options, see
     `printhammer.identify.fitting.fit`.
 
     Raises

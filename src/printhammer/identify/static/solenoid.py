@@ -69,7 +69,7 @@ def fit_solenoid(
     `current` [A] applies to all rows of a table without a column of currents. The `CONSTANTS` are fitted for
     a magnet that pulls toward the paper and is closed at x = 0; a table over the gap does not determine the
     position at which the magnet is closed.
-    Common options are described with `printhammer.identify.fitting.fit`.
+    For the other options, see `printhammer.identify.fitting.fit`.
 
     Raises
     ------

@@ -42,7 +42,7 @@ class SpringLaw:
 def fit_spring(path: str | Path, *, position: float, robust: bool = True, columns: str | None = None) -> Fit:
     """Fit "spring.Bs" and "spring.As" to a table with the columns ``displacement`` and ``force``.
 
-    `position` is the position b of the backstop, m; common options are described with
+    `position` is the position b of the backstop, m; for the other options, see
     `printhammer.identify.fitting.fit`.
 
     Raises

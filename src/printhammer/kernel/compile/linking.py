@@ -28,7 +28,11 @@ class _Part(JITCodeLibrary):
         self._finalized = True
 
     def own_module(self) -> Any:
-        """Return the helper's module without callees; other linked modules may define the same functions."""
+        """Return the helper's module without its callees, ready to be linked with other modules.
+
+        The linkage of the functions permits duplicate definitions in the other modules. The functions of a
+        kept helper are not inlined.
+        """
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == Linkage.external:
                 function.linkage = "linkonce_odr"

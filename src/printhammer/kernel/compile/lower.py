@@ -161,7 +161,7 @@ def _lanes() -> dict[str, Any]:
 def _execute_lanes(plain: dict[str, Any], vector: dict[str, Any]) -> dict[str, Any]:
     """Execute the templates of the lane kernel, bound to laws without branches or calls.
 
-    Total force and step functions are those of the scalar kernel, with :mod:`printhammer.kernel.lanes.math`
+    Total force and step functions are taken from the scalar kernel, with :mod:`printhammer.kernel.lanes.math`
     in place of :mod:`math`, the drive in closed form, the constants of a hammer as a tuple, and all functions
     inlined. The functions that handle events are scalar and use the scalar kernel. `plain` is the namespace
     of the scalar kernel's templates; `vector` holds the laws for lanes, and the compile-time choices.
@@ -201,7 +201,7 @@ def _execute_lanes(plain: dict[str, Any], vector: dict[str, Any]) -> dict[str, A
 
 
 def _with_lane_layout(module: ModuleType) -> ModuleType:
-    """Replace the parameter indices in a template module by the indices of the layout of lanes."""
+    """Replace the parameter indices in a template module with the indices of the layout of lanes."""
     for name in _LAYOUT:
         if hasattr(module, name):
             setattr(module, name, getattr(lane_layout, name))

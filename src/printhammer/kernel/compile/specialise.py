@@ -114,7 +114,7 @@ class Kernel:
         return execute_all(TEMPLATES, {**laws, **bindings.choices}, f"{id(self):x}")
 
     def interpret(self, namespace: Mapping[str, Any]) -> None:
-        """Replace the entry points by the uncompiled functions of executed template modules."""
+        """Replace the entry points with the uncompiled functions of executed template modules."""
         for name in self._entries:
             self.__dict__[name] = namespace[name]
         self._entries = {}

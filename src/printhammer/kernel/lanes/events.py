@@ -224,7 +224,7 @@ def note_strobes(
 
 @compiled
 def enter_contact(pool: Any, i: int, v: float, slot: Any, control: Any) -> int:
-    """Start a backstop contact at zero compression with velocity `v` [m/s]; return the index of its pool."""
+    """Start a backstop contact at zero compression with velocity `v` [m/s]; return the lane's new pool."""
     unit = contact_unit(v, control)
     slot[R.UNIT] = unit
     pool[R.X * R.BLOCK + i] = 0.0

@@ -171,8 +171,8 @@ def quadratures(
     """Integrate the powers over n intervals of a run; write work and losses [J] to the rows of `out`.
 
     The columns of `out`, shape (n, 5), are the work of the coil, the work of the drive force, and the losses
-    in pack, backstop and damping. With a coil circuit, shape (n, 9), there follow the work of the supply and
-    the losses in coil, driver and shorted turn.
+    in pack, backstop and damping. With a coil circuit, `out` has the shape (n, 9); the four additional
+    columns are the work of the supply and the losses in coil, driver and shorted turn.
 
     Parameters
     ----------

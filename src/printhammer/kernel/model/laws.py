@@ -78,7 +78,7 @@ LAW_FUNCTIONS = {
     ),
     "damping": ("damping_force", "friction_force"),
 }
-"""Names of the law functions that each part may define."""
+"""Names of the law functions of each part, by role; a part need not define all of them."""
 
 PACKING = {role: (f"{role}_packed",) for role in LAW_FUNCTIONS} | {
     "magnet": ("magnet_packed", "magnet_domain"),

@@ -1,8 +1,7 @@
 """Printed line: position on the paper, darkness and fault of each dot.
 
-The rules are those of `printhammer.printing.page.page` and `printhammer.printing.dots.judging` for a
-hammer in open loop: each wire of each line is a run from rest, a member of an ensemble with dots and extra
-contacts.
+The rules are as in `printhammer.printing.page.page` and `printhammer.printing.dots.judging` for a hammer in
+open loop: each wire of each line is a run from rest, a member of an ensemble with dots and extra contacts.
 """
 
 from __future__ import annotations

@@ -204,7 +204,7 @@ def is_shown(states: Any, scales: Any, period: int) -> bool:
 def settled_period(states: Any, scales: Any, period: int, planar: bool) -> int:
     """Return the period of a settled motion whose states agree `period` firings apart; 0 if undecided.
 
-    The rules are those of `printhammer.chaos.orbits.settled`, without Newton's method. A motion is `planar`
+    The rules are as in `printhammer.chaos.orbits.settled`, without Newton's method. A motion is `planar`
     if displacement and velocity are its complete state at a firing; its period stays undecided if the states
     alone do not prove a period. A motion that is not planar is undecided only if its states still move.
     `states` and `scales` are as for `write_distances`.

@@ -86,7 +86,7 @@ if TYPE_CHECKING:
 def set_live_moves(first: int, last: int, train: Train, forcing: Forcing) -> None:
     """Write to `live_moves` the derivatives of the active waveform pieces with respect to all constants.
 
-    The order of the pieces is that of `pass_edges`.
+    The pieces are in the same order as in `pass_edges`.
     """
     fire_moves, piece_moves, live_moves = forcing.fire_moves, forcing.piece_moves, forcing.live_moves
     for k in range(fire_moves.shape[0]):

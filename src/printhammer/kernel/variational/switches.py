@@ -391,7 +391,11 @@ def leave_at_edge(node: Any, pulse: int, piece: int, columns: Any, setting: Sett
 
 @compiled
 def pass_moving_edges(node: Any, train: Train, first: int, last: int, columns: Any, setting: Setting) -> None:
-    """Propagate the columns through all drive edges at a node, before `pass_edges` processes the edges."""
+    """Propagate the columns through all drive edges at a node; the edge times may depend on the constants.
+
+    Must be called before `pass_edges`: `train`, `first` and `last` still describe the pulses that are active
+    before the edges.
+    """
     firings, begins, pieces, replace, under_way, live = train
     t = node[0]
     value = drive_value(t, live)

@@ -122,14 +122,14 @@ def _numbers_of(part: Part, origin: float) -> tuple[tuple[str | None, ...], tupl
 
 
 def entries() -> dict[str, Plain]:
-    """Return the plain functions of the web page, by name."""
+    """Return the functions that the web page can call, by name, with the types of their arguments."""
     from printhammer.kernel.compile.signatures import Plain
 
     return {name: Plain(*entry) for name, entry in _ENTRIES.items()}
 
 
 def templates() -> Iterator[Module]:
-    """Yield the code templates of plain functions, also for a coil circuit if the function calls laws.
+    """Yield the code templates of the page's functions; functions that call laws also with a coil circuit.
 
     Functions that pack the constants of parts are omitted: they have a template for each combination of laws.
     """

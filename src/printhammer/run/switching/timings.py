@@ -1,12 +1,12 @@
 """Switching times of contacts: operate, release and bounce times, and contact forces.
 
-The contacts are those of the list ``[[contact]]``, the terms those of IEC 61810-1. A contact on the front
-side of the armature is a make contact: it closes when the relay operates, and opens when the relay releases.
-A contact on the back side is a break contact: it opens when the relay operates, and closes when the relay
-releases. A contact bounces if it switches more than once; the bounce time is the time from the first to the
-last of these switchings. Operate and release times end at the first switching: they exclude the bounce time.
-A bistable (latching) relay keeps its state after switch-off, and is reset by a pulse of reversed sign; its
-reset time begins at the switch-on of this pulse.
+The contacts are declared in the list ``[[contact]]``; the terms are defined in IEC 61810-1. A contact on the
+front side of the armature is a make contact: it closes when the relay operates, and opens when the relay
+releases. A contact on the back side is a break contact: it opens when the relay operates, and closes when the
+relay releases. A contact bounces if it switches more than once; the bounce time is the time from the first to
+the last of these switchings. Operate and release times end at the first switching: they exclude the bounce
+time. A bistable (latching) relay keeps its state after switch-off, and is reset by a pulse of reversed sign;
+its reset time begins at the switch-on of this pulse.
 
 All times follow from `Motion.closings`. Weakness: contacts have no mass, so that only the rebound of the
 armature makes them bounce, not the vibration of the contact spring.
@@ -86,8 +86,8 @@ def is_reversed(waveform: Waveform, first: Waveform) -> bool:
 def timings_of(problem: Problem, record: Record, closings: Sequence[Closing]) -> list[Timing]:
     """Return the switching times of all contacts, in the order of the hammer file, then of the firings.
 
-    `closings` are those of the run, from `printhammer.run.contacts.closings_of`. A sinusoidal force, which is
-    never switched, gives no switching times.
+    `closings` are all closings of the run, from `printhammer.run.contacts.closings_of`. A sinusoidal force,
+    which is never switched, gives no switching times.
     """
     timings: list[Timing] = []
     if isinstance(problem.drive, SineForce):
@@ -129,8 +129,8 @@ def _timing(
 ) -> Timing:
     """Compute the switching times and forces of one contact after one firing.
 
-    `number` is the index of the firing, and `span` describes the firing, as `_Span` states; `closings` are
-    those of the contact.
+    `number` is the index of the firing, and `span` describes the firing, see `_Span`; `closings` are the
+    closings of the contact.
     """
     on, off, end, is_reset = span
     makes = contact.side == "front"
@@ -208,7 +208,7 @@ def timing_facts(timings: Sequence[Timing], closings: Sequence[Closing], end: fl
 
 
 def _lost(closings: Sequence[Closing]) -> str:
-    """Describe the energy that a contact dissipated; an empty text for an elastic contact."""
+    """Describe the energy that a contact dissipated; return an empty string for an elastic contact."""
     loss = math.fsum(each.loss for each in closings)
     return f", dissipates {quantity(loss, 'J')}" if loss else ""
 

@@ -91,7 +91,7 @@ def split_heading(cell: str) -> Heading:
 
 
 def unit_of(text: str) -> str:
-    """Parse a cell such as "(us)", "Volts" or "V DC" as a unit; empty text if the cell is not a unit."""
+    """Parse a cell such as "(us)", "Volts" or "V DC" as a unit; an empty string if it is not a unit."""
     bare = re.sub(r"\s*(DC|AC|dc|ac)$", "", text.strip().strip("()[]{}").strip()) or text.strip()
     if _NUMBERED.fullmatch(bare):
         return ""
@@ -460,7 +460,7 @@ def _clock(
 
 
 def _stated(where: str, name: str, text: str, si: str) -> float | None:
-    """Parse a number of the metadata, in the SI unit `si` or with its unit; None for an empty text."""
+    """Parse a number of the metadata, in the SI unit `si` or with its unit; None for an empty string."""
     if not text:
         return None
     with located(f"{where}: {name}", file=where, key=name):
