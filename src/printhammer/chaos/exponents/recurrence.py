@@ -2,7 +2,7 @@
 
 The recurrence matrix has a point at (i, j) where the states i and j lie within a threshold of each other. Its
 diagonal lines are stretches during which the motion repeats an earlier stretch; its vertical lines are
-stretches during which the motion stays in place. The quantities are those of N. Marwan, M. C. Romano, M.
+stretches during which the motion stays in place. The quantities are defined by N. Marwan, M. C. Romano, M.
 Thiel and J. Kurths, Phys. Rep. 438 (2007) 237, section 3.5.
 """
 

@@ -158,9 +158,9 @@ class Orbit(Result):
     def kind(self) -> str:
         """Stability type of the orbit: "stable", "saddle", "unstable" or "undecided".
 
-        Small perturbations of a stable orbit decay, those of an unstable orbit grow; a saddle has a growing
-        and a decaying direction. An orbit is undecided if a multiplier is within 1e-6 of the unit circle or
-        the motion has no derivative.
+        Small perturbations of a stable orbit decay, perturbations of an unstable orbit grow; a saddle has a
+        growing and a decaying direction. An orbit is undecided if a multiplier is within 1e-6 of the unit
+        circle or the motion has no derivative.
         """
         sizes = np.abs(self.multipliers)
         if not np.isfinite(sizes).all() or (np.abs(sizes - 1.0) <= NEUTRAL).any():

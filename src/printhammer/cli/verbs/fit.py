@@ -123,8 +123,9 @@ def solenoid(
 ) -> Answer:
     """Fit the magnetic circuit of a solenoid or pot magnet: gap, fringing, core and leakage.
 
-    Force and inductance measured at the same current determine the saturation of the core. The
-    constants are those of the magnet law `reluctance`, except the displacement at which its gap closes.
+    Force and inductance measured at the same current determine the saturation of the core. All constants of
+    the magnet law `reluctance` are fitted, except the number of turns and the displacement at which the gap
+    closes.
     """
     if example:
         table = files("printhammer").joinpath("identify", "static", "pot-magnet.csv")

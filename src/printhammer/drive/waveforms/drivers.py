@@ -1,7 +1,7 @@
 """Drivers of a coil: a switched voltage supply, and the path of the decaying current.
 
-The latest firing always replaces earlier firings: a driver is a single output stage. Voltages are those of
-the supply; a diode, the resistance of the supply and the thresholds of a chopper act in the circuit of the
+The latest firing always replaces earlier firings: a driver is a single output stage. Voltages are supply
+voltages; a diode, the resistance of the supply and the thresholds of a chopper act in the circuit of the
 coil; see `printhammer.kernel.model.circuit`. After the supply is switched off the current decays against a
 voltage to zero, and stays zero until the coil drives it again.
 

@@ -1,6 +1,6 @@
 """Shapes of a current or force pulse, and chains of pulses.
 
-The paper gives no formula for its current pulse. The four shapes in this module are those of common hammer
+The paper gives no formula for its current pulse. The four shapes in this module occur in common hammer
 drivers: a half sine, a rectangle whose current rises and decays with the time constant L/R of a coil, a
 trapezoid, and a measured record. `SHAPES` maps the name in a file to the class.
 

@@ -338,7 +338,7 @@ def _label_curves(
 ) -> None:
     """Label each of `curves` far from the other curves, the curves `further`, and the position lines.
 
-    `x` are the abscissas of all curves, and `lines` those of the vertical position lines, in data units.
+    `x` are the abscissas of all curves, and `lines` the abscissas of the vertical lines, in data units.
     """
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
     across = (x - left) / (right - left)

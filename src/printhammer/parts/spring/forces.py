@@ -10,7 +10,7 @@ the position x0 of an entry and the indentation d of a contact, the sum is
 Source: Newton's law of gravity near the ground, Hooke's law; H. Hertz (1882) for n = 3/2. The force of a
 contact is continuous when the contact closes. Several contacts may be closed at once, also together with pack
 or backstop: in a relay, the contact spring engages before the armature meets the pole. Contacts with damping
-have a dissipative part as well: `printhammer.parts.spring.sums`; sampled forces are those of
+have a dissipative part as well: `printhammer.parts.spring.sums`; sampled forces are defined in
 `printhammer.parts.spring.sampled`. Validity: quasi-static contacts. Weakness: contacts have no mass.
 
 Packed constants: c[0] is the number of rows. The five numbers of a row follow: 0, x0, F, B, D for a force; 1

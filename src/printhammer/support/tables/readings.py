@@ -419,7 +419,7 @@ def _in_time(
 ) -> tuple[dict[str, FloatArray], IntArray]:
     """Remove column delays by interpolation to common times; drop incomplete rows.
 
-    The common times are those of the first column, minus its delay; all other columns are interpolated
+    The common times are the times of the first column, minus its delay; all other columns are interpolated
     linearly.
     """
     times = values["time"]
