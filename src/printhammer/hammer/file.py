@@ -315,7 +315,7 @@ def entries_of(document: Mapping[str, Any], section: str) -> list[Mapping[str, A
     entries = document.get(section, [])
     if not isinstance(entries, list) or not all(isinstance(entry, Mapping) for entry in entries):
         raise InputError.of(section, entries, f"tables [[{section}]]", written=shown(entries))
-    names: list[Any] = []
+    names: list[Any] = ["backstop", "pack"] if section == "contact" else []
     for number, entry in enumerate(entries, 1):
         name = entry.get("name")
         key = f"{section}[{number}].name"
@@ -470,10 +470,14 @@ def _check_order(contents: Contents) -> None:
     for (key, place), (after, end) in pairwise([*places.items(), *ends.items()]):
         if not place < end:
             raise InputError(f"{written(key)}: expected a position before {written(after)}", key=written(key))
+    first = places.get("backstop.position", -math.inf)
+    last = pack.front if isinstance(pack, PackPart) and pack.rigid else math.inf
     for key, constant in contents.constants.items():
-        before = places.get("backstop.position", -math.inf)
-        if key.startswith("contact.") and key.endswith(".position") and constant.si < before:
-            expected = f"a position not before {written('backstop.position')}"
+        if key.startswith("contact.") and key.endswith(".position") and not first <= constant.si <= last:
+            before, stop = (
+                ("before", "backstop.position") if constant.si < first else ("beyond", "pack.front")
+            )
+            expected = f"a position not {before} {written(stop)}"
             raise InputError.of(key, constant.value, expected, unit=constant.unit)
     for role in ("magnet", "spring"):
         part = contents.parts.get(role)
