@@ -47,7 +47,6 @@ POLE = table(
 )
 SPRING = table("[spring]", law="preload", preload=written(-0.5, "N"), stiffness=written(100.0, "N/m"))
 BACKSTOP = table("[backstop]", law="rigid", position=written(0.1, "mm"), restitution=written(0.3, "1"))
-FRONT = table("[pack]", law="rigid", front=written(0.45, "mm"), restitution=written(0.3, "1"))
 WHOLE = HEAD + SPRING + BACKSTOP + WEIGHT + CONTACT + POLE
 
 
@@ -156,7 +155,6 @@ def test_a_weight_follows_the_mass_and_needs_no_spring() -> None:
         (CONTACT + f"damping = {written(0.3, 'N s/m')}\n", "contact.no.damping"),
         (CONTACT + POLE.replace("0.5", "0.4"), "contact.pole.position"),
         (CONTACT.replace('"no"', '"pack"'), "contact[1].name"),
-        (CONTACT + POLE + FRONT, "contact.pole.position"),
         ("".join(WEIGHT.replace('"weight"', f'"w{k}"') for k in range(12)), "force"),
     ],
 )

@@ -58,7 +58,6 @@ MOVED = {
 """Constants of spring, forces and contacts as sliders of the page set them."""
 REFUSED: list[tuple[dict[str, float], str]] = [
     ({"contact.make.position": -1e-5}, "expected a position not before backstop.position = 0 m"),
-    ({"pack.front": 0.35e-3}, "expected a position not beyond pack.front = 0.00035 m"),
     ({"contact.second.position": 0.33e-3}, "expected another position than that of contact.make"),
     ({"force.guide.static": 0.05}, "force.guide.static = 0.05 N: expected at least force.guide.kinetic"),
 ]

@@ -125,14 +125,13 @@ export function valuesOf({ constants, open }, values) {
   return (key) => values[key] ?? own.get(key);
 }
 
-/** The contacts of a hammer at other values of constants; refused behind the backstop, beyond a rigid front, and at one position on one side. */
-export function contactsOf({ contacts, rigid_front: hard }, value) {
-  const [placed, backstop, front] = [[], value("backstop.position") ?? -Infinity, hard ? value("pack.front") : Infinity];
+/** The contacts of a hammer at other values of constants; refused behind the backstop, and at one position on one side. */
+export function contactsOf({ contacts }, value) {
+  const [placed, backstop] = [[], value("backstop.position") ?? -Infinity];
   for (const contact of contacts) {
     const key = `contact.${contact.name}.position`;
     const position = value(key);
     if (position < backstop) throw new Refusal(`${key} = ${short(position)} m: expected a position not before backstop.position = ${short(backstop)} m`);
-    if (position > front) throw new Refusal(`${key} = ${short(position)} m: expected a position not beyond pack.front = ${short(front)} m`);
     const same = placed.find((other) => other.side === contact.side && other.position === position);
     if (same) throw new Refusal(`${key} = ${short(position)} m: expected another position than that of contact.${same.name}`);
     placed.push({ ...contact, position });
