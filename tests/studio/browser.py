@@ -183,8 +183,10 @@ def started(command: list[str], pattern: str) -> Iterator[str]:
     process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
     assert process.stderr is not None
     try:
-        found = filter(None, (re.search(rf"{pattern} (ws://\S+)", line) for line in process.stderr))
-        yield next(found)[1]
+        found = (re.search(rf"{pattern} (ws://\S+)", line) for line in process.stderr)
+        address = next(filter(None, found), None)
+        assert address is not None, f"{command[0]} did not start"
+        yield address[1]
     finally:
         process.terminate()
         process.wait(20)

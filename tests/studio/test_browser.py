@@ -240,12 +240,17 @@ def test_presets_patterns_shapes_and_units(page: Page) -> None:
     assert page.run("window.studio.studio.frames.motion.fired") == pytest.approx([0.0, 0.002, 0.003])
     page.run("window.studio.studio.store.set({ views: ['motion', 'energy', 'map'] }); 1")
     page.wait("window.studio.studio.frames.map?.pattern === '1011'")
+    page.run("helpers.type('#control-pattern', '10x1')")
+    assert state(page)["pattern"] == "1011"
+    assert page.run("document.querySelector('#control-pattern').getAttribute('aria-invalid')") == "true"
     page.run("helpers.choose('#control-shape', 'half-sine')")
     settled(page, "state.waveform.shape === 'half-sine'")
     page.run("helpers.choose('[aria-label=units]', '1')")
     assert page.run("document.querySelector('[data-number=\"forms thickness\"]').value") == "7"
     page.run("helpers.enter('[data-number=\"forms thickness\"]', '8')")
     settled(page, "Math.abs(state.constants['pack.thickness'] - 8 * 25.4e-6) < 1e-9")
+    page.run("helpers.enter('[data-number=\"rate\"]', 'fast')")
+    assert page.run("document.querySelector('[data-number=rate]').value") == "1000"
     assert page.complaints == []
 
 

@@ -249,11 +249,27 @@ cells = st.sampled_from(
 heads = st.sampled_from(
     ["time [us]", "t/ms", "x [mm]", "current (A)", "I", "CH1 [V]", "Force in N", "s", "A", "", "sec", "Volt"]
 )
-FACTS = (
-    "Model,XYZ|Sample Interval,1e-6|XInc:,2 us|t0 = -1 ms|dt = 10 us,t0 = 1|XOrg:,-4e-06|Start,0|Zero Index,2"
+
+
+facts = st.sampled_from(
+    [
+        "Model,XYZ",
+        "Sample Interval,1e-6",
+        "XInc:,2 us",
+        "t0 = -1 ms",
+        "dt = 10 us,t0 = 1",
+        "XOrg:,-4e-06",
+        "Start,0",
+        "Zero Index,2",
+        "Horizontal Units,ms",
+        "Vertical Units,V,mA",
+        "LECROY,1",
+        "# Sample rate: 1 MHz",
+        "; sigrok",
+        "Points,3",
+        "",
+    ]
 )
-FACTS += "|Horizontal Units,ms|Vertical Units,V,mA|LECROY,1|# Sample rate: 1 MHz|; sigrok|Points,3|"
-facts = st.sampled_from(FACTS.split("|"))
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)

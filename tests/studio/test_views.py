@@ -108,8 +108,11 @@ def test_stories_show_what_they_tell_and_figure_6_shows_both_curves(page: Page) 
             for other, said, second in (("700 µs", "lost", False), ("660 µs", "prints again", True)):
                 page.wait(f"{STUDIO}.ghosts.length === 1 && {STUDIO}.ghosts[0].name === {other!r}")
                 page.wait(f"{STUDIO}.remarks().some(([, text]) => text.includes({said!r}))")
+                assert page.run(f"{STUDIO}.frames.dots.dots.map((dot) => dot.struck)") == [True, second]
                 first, again = page.run(f"{STUDIO}.frames.dots.dots.map((dot) => dot.peak_force ?? 0)")
                 assert (again > first) == second
+                interval = 700e-6 if second else 660e-6
+                assert page.run(f"1 / {STUDIO}.store.state.rate") == pytest.approx(interval, abs=1e-12)
                 page.run("document.querySelector('.notice .switch[aria-pressed=false]').click()")
                 page.wait(SEEN)
         if name == "The second dot lost":
@@ -117,7 +120,9 @@ def test_stories_show_what_they_tell_and_figure_6_shows_both_curves(page: Page) 
             assert page.run(f"{lost}.list.length") > 100
         if name == "A strange train":
             page.wait(f"{STUDIO}.frames.strobe?.verdict?.verdict === 'strange'")
-            page.wait("document.querySelector('.view-strobe .caption').textContent.includes('never repeats')")
+            page.wait(
+                "document.querySelector('.view-strobe .caption').textContent.includes('never repeats itself')"
+            )
     low = page.run(
         f"(({{ data, places, fired }}) => Math.min(...[...data.x].filter((_x, k) => data.t[k] > 6e-4"
         f" && data.t[k] < fired.at(-1))) - places.backstop)({STUDIO}.frames.motion)"

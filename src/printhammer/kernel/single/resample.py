@@ -134,7 +134,7 @@ def state_in_step(
     law = ForceLaw(mode, memory, hammer, drive)
     if HAS_CIRCUIT:
         x1, v1, _a1, _error_x, _error_v, electric, _error = whole_time_step(t0, x0, v0, a0, t - t0, law)
-        return x0 if rests else x1, v0 if rests else v1, 0.0, electric
+        return x1, v1, 0.0, electric
     x1, v1, _a1, _error_x, _error_v = plain_step(t0, x0, v0, a0, t - t0, law)
     return x1, v1, 0.0, first
 
