@@ -304,3 +304,20 @@ def test_no_stroke_at_all() -> None:
     assert found.error < 1e-7
     assert len(found.touches("pack")[0]) == len(found.touches("pack")[1])
     assert FRONT > STOP + 1e-6
+
+
+def test_a_contact_from_rest_begins_as_a_parabola() -> None:
+    """At first, the force of the backstop, k d^1.5, is negligible beside the spring."""
+    hammer = ph.Hammer.build(
+        1e-3,
+        spring={"law": "preload", "preload": -2.0, "stiffness": 0.0},
+        backstop={"law": "hertz", "position": 0.0, "stiffness": 1e8, "damping": 0.0},
+    )
+    drive = ph.PulseTrain(
+        Trapezoid(amplitude=1.0, quantity="force", rise=0.0, width=1e-4, fall=0.0), at=[5e-3]
+    )
+    motion = ph.simulate(hammer, drive, duration=6e-3, state=(0.0, 0.0))
+    t = np.geomspace(1e-13, 1e-9, 60)
+    x, v = motion.at(t)[:2]
+    np.testing.assert_allclose(x, -0.5 * 2e3 * t**2, rtol=1e-9)
+    np.testing.assert_allclose(v, -2e3 * t, rtol=1e-9)
